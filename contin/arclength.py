@@ -1,0 +1,482 @@
+"""Pseudo-arclength continuation: a run is an iterable of points over an explicit state.
+
+    run = Continuation(system, x, settings)
+    for point in run:
+        ...
+    print(run.stop)
+
+One step is: predict, correct, judge (accept or halve), look for events between the two ends and locate them, accept,
+refine the mesh. The loop knows of a system only its interface (residual, linearize, weights, adapt), not what it is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from contin.branch import Branch, Point, Stop
+from contin.corrector import Newton, correct
+from contin.errors import ConvergenceError, ProblemError
+from contin.events import Monitor, Trial, find_zero, fold, limit, sign_changed, user_zero
+from contin.mesh import MeshControl, adapted_mesh
+from contin.switching import inner, locate_branch_point
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What to follow, how carefully, and where to stop. Frozen, checked when made.
+
+    Attributes
+    ----------
+    primary : str, optional
+        The parameter of folds and of the printed columns; the first free one by default.
+    direction : int
+        +1 or -1: the way to go from the first point, by the sign of the primary parameter's change.
+    step, min_step, max_step : float
+        First, smallest and largest step of arclength.
+    max_points : int
+        Regular points after which the run ends.
+    limits : mapping of str to pair of float
+        The run ends where a parameter or functional leaves its interval.
+    zeros : mapping of str to sequence of float
+        Values of parameters or functionals to label (UZ).
+    trivial : str, optional
+        A parameter or functional that vanishes on a known trivial branch only: the run ends where it changes sign.
+    monitors : sequence of Monitor
+        Events of one's own.
+    folds, branch_points, errors : bool
+        Whether to look for folds, for branch points, and to estimate the discretization error of labelled points (by
+        solving them again on the mesh halved).
+    angle : float
+        Largest angle between the tangents of consecutive points, radians.
+    accuracy : float
+        Distance between predicted and corrected point that the step aims at, as a fraction of the step.
+    newton, mesh :
+        See :class:`Newton`, :class:`MeshControl`.
+    """
+
+    primary: str | None = None
+    direction: int = 1
+    step: float = 0.05
+    min_step: float = 1e-6
+    max_step: float = 1e6
+    max_points: int = 2000
+    limits: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    zeros: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    trivial: str | None = None
+    monitors: Sequence[Monitor] = ()
+    folds: bool = True
+    branch_points: bool = True
+    errors: bool = False
+    angle: float = 0.35
+    accuracy: float = 0.02
+    newton: Newton = field(default_factory=Newton)
+    mesh: MeshControl = field(default_factory=MeshControl)
+
+    def __post_init__(self):
+        if self.direction not in (1, -1):
+            raise ProblemError(f"direction: {self.direction} must be +1 or -1")
+        if not 0 < self.min_step <= self.step <= self.max_step:
+            raise ProblemError(
+                f"step: {self.step} must be positive and lie between min_step {self.min_step} and max_step {self.max_step}"
+            )
+        if self.max_points < 1:
+            raise ProblemError(f"max_points: {self.max_points} must be at least 1")
+        for name in ("angle", "accuracy"):
+            if not 0 < getattr(self, name) < 1.5:
+                raise ProblemError(f"{name}: {getattr(self, name)} must lie between 0 and 1.5")
+        for name, ends in self.limits.items():
+            if len(ends) != 2 or not ends[0] < ends[1]:
+                raise ProblemError(f"limits: {name}: {ends} must be two numbers, the first the smaller")
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Everything that the next step depends on; with it a run continues as if never interrupted.
+
+    ``x``, ``tangent`` and ``previous_tangent`` live on ``system``; ``sign`` is that of the determinant on this mesh;
+    ``start`` and ``start_tangent`` are the run's first point, for closed branches, on the mesh it was computed on.
+    """
+
+    system: object
+    x: np.ndarray
+    tangent: np.ndarray
+    previous_tangent: np.ndarray | None
+    previous_step: float
+    step: float
+    sign: float
+    arclength: float
+    accepted: int
+    singular: bool
+
+
+class Continuation:
+    """One run along a branch; iterate over it for the points, then read ``stop``.
+
+    Parameters
+    ----------
+    system : Collocation or alike
+    x : ndarray, shape (size,)
+        A first point; corrected at fixed primary parameter unless a tangent is given.
+    settings : Settings
+    tangent : ndarray, shape (size,), optional
+        Where to go; needed when x is a branch point. Its sign is then kept.
+    state : State, optional
+        Continue from here instead (x and tangent are then not used).
+
+    Raises
+    ------
+    ProblemError
+        Names or numbers that do not fit the problem.
+    ConvergenceError
+        The first point cannot be corrected.
+    """
+
+    def __init__(self, system, x, settings: Settings = Settings(), tangent=None, state: State | None = None):
+        self.settings = settings
+        self.primary = settings.primary or system.free[0]
+        self.stop: Stop | None = None
+        self._check(system)
+        self._monitors = self._all_monitors()
+        self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
+        self._resumed = state is not None
+        self._start = (self.state.system, self.state.x, self.state.tangent)
+
+    def _check(self, system):
+        if len(system.free) != system.problem.free_size:
+            raise ProblemError(
+                f"free parameters: {len(system.free)} given ({', '.join(system.free)}), a curve of this problem needs "
+                f"{system.problem.free_size} (conditions - states + 1)"
+            )
+        if self.primary not in system.free:
+            raise ProblemError(f"primary: {self.primary!r} is not one of the free parameters {', '.join(system.free)}")
+        known = (*system.problem.parameters, *system.problem.functionals)
+        trivial = () if self.settings.trivial is None else (self.settings.trivial,)
+        for name in (*self.settings.limits, *self.settings.zeros, *trivial):
+            if name not in known:
+                raise ProblemError(f"{name!r} is neither a parameter nor a functional ({', '.join(known)})")
+
+    def _all_monitors(self):
+        settings = self.settings
+        monitors = [fold(self.primary)] if settings.folds else []
+        monitors += [user_zero(name, value) for name, values in settings.zeros.items() for value in values]
+        monitors += [limit(name, value) for name, values in settings.limits.items() for value in values]
+        return [*monitors, *settings.monitors]
+
+    # --- the first point -----------------------------------------------------------------------------------------
+
+    def _first(self, system, x, tangent) -> State:
+        settings = self.settings
+        if tangent is not None:
+            tangent = tangent / np.sqrt(inner(system, tangent, tangent))
+            return State(system, x, tangent, None, 1.0, settings.step, np.nan, 0.0, 0, True)
+        row = np.zeros(system.size)
+        row[system.parameter_index(self.primary)] = 1.0
+        for _ in range(3):
+            corrected = correct(system, x, row, row @ x, settings.newton)
+            x = corrected.x
+            mesh = adapted_mesh(system, x, settings.mesh) if settings.mesh.every else None
+            if mesh is None:
+                break
+            system, carry = system.on_mesh(mesh)
+            x, row = carry(x), np.append(np.zeros(system.state_size), row[-len(system.free) :])
+        tangent = self._tangent(system, x, row)
+        tangent *= settings.direction * (np.sign(tangent[system.parameter_index(self.primary)]) or 1.0)
+        sign = system.linearize(x, (system.weights * tangent,))[1].sign
+        return State(system, x, tangent, None, 1.0, settings.step, sign, 0.0, 0, False)
+
+    @staticmethod
+    def _tangent(system, x, row):
+        """The unit vector along the curve at x with row.tangent > 0."""
+        _, factors = system.linearize(x, (row,))
+        tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
+        return tangent / np.sqrt(inner(system, tangent, tangent))
+
+    # --- the loop ------------------------------------------------------------------------------------------------
+
+    def __iter__(self) -> Iterator[Point]:
+        if not self._resumed:
+            state = self.state
+            label = "BP" if state.singular else "EP"
+            trial = Trial(state.system, state.x, state.tangent, state.sign)
+            yield self._point(label, "start", trial, 0.0)
+            if (stop := self._out_of_limits(trial)) is not None:
+                self.stop = stop
+                return
+        while self.stop is None:
+            yield from self._advance()
+
+    def _out_of_limits(self, trial) -> Stop | None:
+        for name, (low, high) in self.settings.limits.items():
+            if not low <= trial[name] <= high:
+                return Stop("limit", f"{name} = {trial[name]:g} at the start lies outside {low:g} ... {high:g}")
+        return None
+
+    def _advance(self) -> Iterator[Point]:
+        """One step: the labelled points inside it, then the point at its end."""
+        state = self.state
+        try:
+            step, trial, distance = self._step(state)
+        except ConvergenceError as error:
+            self.stop = Stop(
+                "no convergence", f"the step became smaller than min_step = {self.settings.min_step:g} ({error})",
+                "more intervals, a smaller min_step, or a start elsewhere may help",
+            )  # fmt: skip
+            yield self._point("MX", "no convergence", Trial(state.system, state.x, state.tangent, state.sign), 0.0)
+            return
+        for point, stop in self._events(state, trial, step):
+            yield point
+            if stop is not None:
+                self.stop = stop
+                return
+        self.state = self._accept(state, trial, step, distance)
+        if self.state.accepted >= self.settings.max_points:
+            self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
+        yield self._point("EP" if self.stop else "", "max points" if self.stop else "", trial, step, state)
+        self._refine()
+
+    # --- one step ------------------------------------------------------------------------------------------------
+
+    def _step(self, state: State):
+        """Predict and correct, halving the step until the corrected point can be believed."""
+        step, settings = state.step, self.settings
+        while True:
+            try:
+                guess = self._predict(state, step)
+                trial = self._trial(state, guess, step)
+                gap = guess - trial.x
+                distance = np.sqrt(inner(state.system, gap, gap))
+                cosine = inner(state.system, trial.tangent, state.tangent)
+                if cosine >= np.cos(settings.angle) and distance <= 0.3 * step:
+                    return step, trial, distance
+                problem = ConvergenceError(f"tangents turn by {np.arccos(np.clip(cosine, -1, 1)):.2f} rad in one step")
+            except ConvergenceError as error:
+                problem = error
+            step /= 2
+            if step < settings.min_step:
+                raise problem
+
+    @staticmethod
+    def _predict(state: State, step: float):
+        """Along the tangent, with the curvature known from the last step."""
+        guess = state.x + step * state.tangent
+        if state.previous_tangent is not None:
+            guess += (step**2 / (2 * state.previous_step)) * (state.tangent - state.previous_tangent)
+        return guess
+
+    def _trial(self, state: State, guess, step: float, exact=False) -> Trial:
+        """The point of the curve at ``step`` along the tangent; ``exact``: with the tangent taken right there."""
+        system = state.system
+        row = system.weights * state.tangent
+        done = correct(system, guess, row, row @ state.x + step, self.settings.newton)
+        factors = system.linearize(done.x, (row,))[1] if exact else done.factors
+        tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
+        tangent /= np.sqrt(inner(system, tangent, tangent))
+        return Trial(system, done.x, tangent, factors.sign, done.iterations, done.residual)
+
+    def _accept(self, state: State, trial: Trial, step: float, distance: float) -> State:
+        """The next state, its step chosen so that the predictor's error is ``accuracy`` of it."""
+        settings = self.settings
+        order = 2 if state.previous_tangent is None else 3
+        aim = settings.accuracy * step
+        factor = 2.0 if distance == 0 else (aim / distance) ** (1 / order)
+        turn = np.arccos(np.clip(inner(state.system, trial.tangent, state.tangent), -1, 1))
+        factor = min(factor, 0.8 * settings.angle / max(turn, 1e-12))
+        following = float(np.clip(step * np.clip(factor, 0.3, 2.0), settings.min_step, settings.max_step))
+        gone = trial.x - state.x
+        return State(
+            state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
+            state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
+        )  # fmt: skip
+
+    def _refine(self):
+        """Adapt the mesh now and then, and correct the point on it."""
+        control, state = self.settings.mesh, self.state
+        if not control.every or state.accepted % control.every or self.stop:
+            return
+        mesh = adapted_mesh(state.system, state.x, control)
+        if mesh is None:
+            return
+        system, carry = state.system.on_mesh(mesh)
+        tangent = carry(state.tangent)
+        tangent /= np.sqrt(inner(system, tangent, tangent))
+        previous = None if state.previous_tangent is None else carry(state.previous_tangent)
+        x, row = carry(state.x), system.weights * tangent
+        try:
+            done = correct(system, x, row, row @ x, self.settings.newton)
+        except ConvergenceError:
+            return  # the old mesh still serves; the step control will notice if it does not
+        _, factors = system.linearize(done.x, (row,))
+        tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
+        tangent /= np.sqrt(inner(system, tangent, tangent))
+        self.state = dataclasses.replace(
+            state, system=system, x=done.x, tangent=tangent, previous_tangent=previous, sign=factors.sign
+        )
+
+    # --- events --------------------------------------------------------------------------------------------------
+
+    def _events(self, state: State, trial: Trial, step: float):
+        """The labelled points between the two ends of a step, in order, each with the stop that it causes or None."""
+        found = []
+        if not state.singular:
+            before = Trial(state.system, state.x, state.tangent, state.sign)
+            home = self._returned(state, trial, step, before)
+            branch_point = None
+            if home is not None:
+                found.append(home)
+            elif self.settings.branch_points and sign_changed(state.sign, trial.sign):
+                branch_point = self._branch_point(state, trial, step)
+                found.append((*branch_point, None))
+            special = found[0][1].x if found else None
+            for monitor in self._monitors:
+                if sign_changed(monitor.function(before), monitor.function(trial)):
+                    located = self._locate(state, trial, step, monitor)
+                    if special is None or monitor.label != "LP" or np.max(np.abs(located[1].x - special)) > 1e-4:
+                        found.append(located)
+        closed = self._closed(state, trial, step)
+        if closed is not None:
+            found.append(closed)
+        for _, point, stop in sorted(found, key=lambda item: item[0]):
+            yield point, stop
+
+    def _between(self, state, trial, step, at):
+        """A guess on the curve by the cubic through both ends and their tangents."""
+        s = at / step
+        ahead = trial.x - state.x
+        rate = step / max(inner(state.system, state.tangent, trial.tangent), 0.1)
+        a, b = state.tangent * step, trial.tangent * rate
+        return state.x + s * a + s**2 * (3 * ahead - 2 * a - b) + s**3 * (a + b - 2 * ahead)
+
+    def _at(self, state, trial, step, at, exact=True) -> Trial:
+        return self._trial(state, self._between(state, trial, step, at), at, exact)
+
+    def _locate(self, state, trial, step, monitor: Monitor):
+        """The zero of a monitor inside a step; where location fails, the nearer end, named "possible"."""
+        exact = monitor.label == "LP"
+        ends = monitor.function(Trial(state.system, state.x, state.tangent, state.sign)), monitor.function(trial)
+        name = monitor.name
+        try:
+            at = find_zero(
+                lambda s: monitor.function(self._at(state, trial, step, s, exact)), 0.0, ends[0], step, ends[1], 1e-12 * step
+            )
+            there = self._at(state, trial, step, at)
+        except ConvergenceError:
+            at, there, name = step, trial, f"possible {monitor.name}"
+        stop = None
+        if monitor.terminal:
+            stop = Stop("limit", f"reached {monitor.name}") if monitor.label == "EP" else Stop("event", f"met {monitor.name}")
+        return at, self._point(monitor.label, name, there, at, state), stop
+
+    def _branch_point(self, state, trial, step):
+        """The branch point inside a step, its bracket halved until the locator's answer lies inside it."""
+        low, high = 0.0, step
+        for _ in range(12):
+            middle = (low + high) / 2
+            try:
+                found = locate_branch_point(state.system, self._between(state, trial, step, middle), self.settings.newton)
+                at = inner(state.system, state.tangent, found.x - state.x)
+                off = found.x - self._between(state, trial, step, at)
+                if -1e-9 * step <= at <= step * (1 + 1e-9) and np.sqrt(inner(state.system, off, off)) < 0.1 * step:
+                    point = Trial(state.system, found.x, np.full_like(found.x, np.nan), np.nan)
+                    return at, self._point("BP", "", point, at, state, details=found)
+            except ConvergenceError:
+                pass
+            try:
+                sign = self._at(state, trial, step, middle, exact=False).sign
+            except ConvergenceError:
+                break
+            low, high = (middle, high) if sign == state.sign else (low, middle)
+        return high, self._point("BP", "possible", trial, high, state)
+
+    def _returned(self, state, trial, step, before):
+        """The end of a branch on the trivial one, where ``settings.trivial`` passes zero."""
+        name = self.settings.trivial
+        if name is None or not sign_changed(before[name], trial[name]):
+            return None
+        stop = Stop("trivial branch", f"returned to the trivial branch ({name} = 0)")
+        at, point = self._branch_point(state, trial, step) if self.settings.branch_points else (step, None)
+        if point is None or abs(point[name]) > 1e-6 * max(abs(before[name]), abs(trial[name])):
+            monitor = Monitor("EP", "trivial branch", lambda there: there[name], terminal=True)
+            at, point, _ = self._locate(state, trial, step, monitor)
+        return at, dataclasses.replace(point, label="EP", name="trivial branch"), stop
+
+    def _closed(self, state, trial, step):
+        """The end of a branch that comes back to its first point."""
+        home, x, tangent = self._start
+        if state.accepted < 3:
+            return None
+        p, q = x[home.state_size :], trial.x[state.system.state_size :]
+        if np.max(np.abs(p - q)) > 2 * step:
+            return None
+        if home is not state.system:
+            _, carry = home.on_mesh(state.system.mesh)
+            x, tangent = carry(x), carry(tangent)
+        gaps = [end - x for end in (state.x, trial.x)]
+        passed = [inner(state.system, gap, tangent) for gap in gaps]
+        if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, tangent) < 0.5:
+            return None
+        at = step * passed[0] / (passed[0] - passed[1])
+        off = self._between(state, trial, step, at) - x
+        if np.sqrt(inner(state.system, off, off)) > 0.1 * step:
+            return None
+        there = Trial(state.system, x, tangent, trial.sign, trial.iterations, trial.residual)
+        return at, self._point("EP", "closed", there, at, state), Stop("closed", "the branch closed on its first point")
+
+    # --- what comes out ------------------------------------------------------------------------------------------
+
+    def _point(self, label, name, trial: Trial, gone: float, state: State | None = None, details=None) -> Point:
+        system = trial.system
+        parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
+        arclength = (state or self.state).arclength + gone
+        errors = self._errors(label, trial) if label and label != "MX" and self.settings.errors else {}
+        return Point(
+            label, name, parameters, trial.functionals, trial.x, trial.tangent, system, arclength, trial.iterations,
+            trial.residual, errors, details,
+        )  # fmt: skip
+
+    def _errors(self, label, trial: Trial) -> dict[str, float]:
+        """Difference of the free parameters to the same special point on the mesh halved."""
+        coarse = trial.system
+        fine = np.sort(np.concatenate([coarse.mesh, (coarse.mesh[1:] + coarse.mesh[:-1]) / 2]))
+        system, carry = coarse.on_mesh(fine)
+        x = carry(trial.x)
+        try:
+            if label == "BP" or not np.all(np.isfinite(trial.tangent)):
+                better = locate_branch_point(system, x, self.settings.newton).x
+            elif label == "LP":
+                better = self._fold_again(system, x, carry(trial.tangent))
+            else:
+                row = system.weights * carry(trial.tangent)
+                if label in ("EP", "UZ"):  # most end at a value of the primary parameter: hold it
+                    row = np.zeros(system.size)
+                    row[system.parameter_index(self.primary)] = 1.0
+                better = correct(system, x, row, row @ x, self.settings.newton).x
+        except ConvergenceError:
+            return {name: np.nan for name in system.free}
+        return {name: abs(float(a - b)) for name, a, b in zip(system.free, better[system.state_size :], x[system.state_size :])}
+
+    def _fold_again(self, system, x, tangent):
+        """The fold near x on another mesh, by the secant method along the tangent."""
+        tangent = tangent / np.sqrt(inner(system, tangent, tangent))
+        state = State(system, x, tangent, None, 1.0, 1.0, 1.0, 0.0, 0, False)
+        at = system.parameter_index(self.primary)
+        s, points = [0.0, 1e-3], []
+        for _ in range(12):
+            trial = self._trial(state, x + s[len(points)] * tangent, s[len(points)], exact=True)
+            points.append(trial)
+            if len(points) > 1:
+                f0, f1 = points[-2].tangent[at], points[-1].tangent[at]
+                if f1 == f0 or abs(s[-1] - s[-2]) < 1e-9:
+                    return trial.x
+                s.append(s[-1] - f1 * (s[-1] - s[-2]) / (f1 - f0))
+        raise ConvergenceError("the fold was not found again on the finer mesh")
+
+
+def follow(system, x, settings: Settings = Settings(), tangent=None) -> Branch:
+    """Run to the end and return the branch: :class:`Continuation` as one call."""
+    run = Continuation(system, x, settings, tangent)
+    points = list(run)
+    return Branch(points, run.stop)

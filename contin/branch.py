@@ -1,0 +1,86 @@
+"""Points and branches: plain data, and looking things up in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One solution on a branch.
+
+    Attributes
+    ----------
+    label : str
+        AUTO's two letters: EP end, LP fold (limit point), BP branch point, UZ user zero, MX failed; "" for a regular point.
+    name : str
+        What the label refers to (the monitor's name), "" for a regular point.
+    parameters, functionals : mapping of str to float
+        All parameters; the problem's functionals.
+    x, tangent : ndarray, shape (size,)
+        Unknowns of ``system``, and the unit tangent (``nan`` at a branch point, which has several).
+    system : object
+        The discretized problem of this point.
+    arclength : float
+        Distance travelled from the branch's first point, in the weighted norm.
+    iterations, residual : int, float
+        Newton iterations taken, and the largest residual they ended with.
+    errors : mapping of str to float
+        Estimated discretization error of the free parameters, where it was asked for.
+    details : object
+        What the location found besides: the :class:`contin.switching.BranchPoint` of a BP.
+    """
+
+    label: str
+    name: str
+    parameters: Mapping[str, float]
+    functionals: Mapping[str, float]
+    x: np.ndarray
+    tangent: np.ndarray
+    system: object
+    arclength: float
+    iterations: int
+    residual: float
+    errors: Mapping[str, float] = field(default_factory=dict)
+    details: object = None
+
+    def __getitem__(self, name: str) -> float:
+        """A parameter or functional by name."""
+        return self.parameters[name] if name in self.parameters else self.functionals[name]
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why a run ended: a short ``reason``, a sentence, and what could be changed."""
+
+    reason: str
+    message: str
+    advice: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.message}; {self.advice}" if self.advice else self.message
+
+
+@dataclass
+class Branch:
+    """The points of one branch in order, and why it stopped."""
+
+    points: list[Point] = field(default_factory=list)
+    stop: Stop | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __iter__(self):
+        return iter(self.points)
+
+    def column(self, name: str) -> np.ndarray:
+        """A parameter or functional over all points."""
+        return np.array([point[name] for point in self.points])
+
+    def labelled(self, label: str) -> list[Point]:
+        """The points that carry a label, in order."""
+        return [point for point in self.points if point.label == label]

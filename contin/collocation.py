@@ -1,0 +1,298 @@
+"""Orthogonal collocation at Gauss points on a mesh: the discrete problem, its residual and its Jacobian.
+
+On each of N intervals the solution is a polynomial of degree d through d + 1 Lobatto nodes (the end nodes shared), and
+satisfies the equation at the d Gauss points: error O(h^(2 d)) at the mesh points (superconvergence, de Boor & Swartz
+1973). Integrals use the same Gauss points, so they converge as fast.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from contin.condensation import Factorization
+from contin.errors import ProblemError
+from contin.problem import BoundaryValueProblem
+
+DEGREES = range(2, 9)
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Tables of one degree d on the unit interval.
+
+    ``nodes`` (d + 1,) Lobatto points and ``node_weights`` their quadrature; ``points`` (d,) Gauss points and
+    ``weights`` theirs; ``value`` and ``slope`` (d, d + 1) take nodal values to the Gauss points; ``highest`` (d + 1,)
+    gives the d-th derivative; ``barycentric`` (d + 1,) for interpolation; ``constant`` is max |prod (x - node)| / (d + 1)!.
+    """
+
+    degree: int
+    nodes: np.ndarray
+    node_weights: np.ndarray
+    points: np.ndarray
+    weights: np.ndarray
+    value: np.ndarray
+    slope: np.ndarray
+    highest: np.ndarray
+    barycentric: np.ndarray
+    constant: float
+
+
+@functools.cache
+def basis(degree: int) -> Basis:
+    """The tables of a degree from 2 to 8."""
+    if degree not in DEGREES:
+        raise ProblemError(f"degree: {degree!r} must be a whole number from 2 to 8")
+    legendre = np.polynomial.legendre
+    points, weights = legendre.leggauss(degree)
+    top = np.zeros(degree + 1)
+    top[-1] = 1.0
+    nodes = np.concatenate([[-1.0], np.sort(legendre.legroots(legendre.legder(top)).real), [1.0]])
+    node_weights = 2 / (degree * (degree + 1) * legendre.legval(nodes, top) ** 2)
+    nodes, points = (nodes + 1) / 2, (points + 1) / 2
+    differences = nodes[:, None] - nodes + np.eye(degree + 1)
+    barycentric = 1 / differences.prod(axis=1)
+    value = interpolation(nodes, barycentric, points)
+    nodal_slope = barycentric / barycentric[:, None] / differences
+    np.fill_diagonal(nodal_slope, 0.0)
+    np.fill_diagonal(nodal_slope, -nodal_slope.sum(axis=1))
+    factorial = np.prod(np.arange(1.0, degree + 1))
+    fine = np.linspace(0, 1, 2001)
+    constant = np.abs((fine[:, None] - nodes).prod(axis=1)).max() / (factorial * (degree + 1))
+    tables = (nodes, node_weights / 2, points, weights / 2, value, value @ nodal_slope, factorial * barycentric, barycentric)
+    return Basis(degree, *tables, constant)
+
+
+def interpolation(nodes, barycentric, at):
+    """Matrix (len(at), len(nodes)) that evaluates the polynomial through the nodes ``at`` points (barycentric form)."""
+    distance = at[:, None] - nodes
+    exact = distance == 0
+    terms = barycentric / np.where(exact, 1.0, distance)
+    matrix = terms / terms.sum(axis=1, keepdims=True)
+    return np.where(exact.any(axis=1, keepdims=True), exact, matrix)
+
+
+@njit(
+    "void(f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,::1], i8, f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1],"
+    "f8[:,::1])",
+    cache=True, error_model="numpy", nogil=True,
+)  # fmt: skip
+def assemble(value, slope, weights, h, jacobian, n, columns, rows, local, border, corner):
+    """Fill the blocks that :class:`contin.condensation.Factorization` takes.
+
+    ``jacobian`` (points, n + n_int, n + k) of rhs and integrands; ``columns`` (c, equations) and ``rows`` (r, unknowns)
+    are the extra ones. Equations are scaled by h.
+    """
+    d = weights.size
+    intervals = h.size
+    n_int = jacobian.shape[1] - n
+    k = jacobian.shape[2] - n
+    c, r = columns.shape[0], rows.shape[0]
+    inner = n * (d - 1)
+    size = (intervals * d + 1) * n
+    corner[:, :] = 0.0
+    border[:, :, :] = 0.0
+    for j in range(intervals):
+        for i in range(d):
+            point = jacobian[j * d + i]
+            for node in range(d + 1):
+                start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
+                scale = h[j] * value[i, node]
+                for a in range(n):
+                    for b in range(n):
+                        local[j, i * n + a, start + b] = -scale * point[a, b]
+                    local[j, i * n + a, start + a] += slope[i, node]
+                for q in range(n_int):
+                    for b in range(n):
+                        border[j, q, start + b] += weights[i] * scale * point[n + q, b]
+            for a in range(n):
+                for b in range(k):
+                    local[j, i * n + a, inner + 2 * n + b] = -h[j] * point[a, n + b]
+                for b in range(c):
+                    local[j, i * n + a, inner + 2 * n + k + b] = columns[b, (j * d + i) * n + a]
+            for q in range(n_int):
+                for b in range(k):
+                    corner[q, b] += weights[i] * h[j] * point[n + q, n + b]
+        for q in range(r):
+            for node in range(d + (1 if j == intervals - 1 else 0)):
+                start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
+                for b in range(n):
+                    border[j, n_int + q, start + b] = rows[q, (j * d + node) * n + b]
+    for q in range(r):
+        corner[n_int + q, :] = rows[q, size:]
+    tail = columns.shape[1] - n_int
+    for b in range(c):
+        for q in range(n_int):
+            corner[q, k + b] = columns[b, tail + q]
+
+
+class Collocation:
+    """A problem discretized on a mesh: what the continuation loop works on.
+
+    A vector ``x`` of unknowns, shape (size,), holds the states at the mesh's nodes in order, (N d + 1, n) flattened,
+    then the free parameters. A residual, shape (size - 1,) on a curve, holds collocation (scaled by h), boundary and
+    integral conditions.
+
+    Parameters
+    ----------
+    problem : BoundaryValueProblem
+    mesh : ndarray, shape (N + 1,)
+        Mesh points, increasing, from one end of the domain to the other.
+    degree : int
+        Polynomial degree d, 2 to 8 (AUTO's NCOL; N is its NTST).
+    free : sequence of str
+        The free parameters.
+    parameters : mapping of str to float
+        Values of all parameters; those of the free ones are ignored.
+
+    Raises
+    ------
+    ProblemError
+        An unknown parameter, a bad mesh or degree.
+    """
+
+    def __init__(self, problem: BoundaryValueProblem, mesh, degree: int, free, parameters):
+        self.problem, self.degree, self.free = problem, degree, tuple(free)
+        names = tuple(problem.parameters)
+        for name in (*self.free, *parameters):
+            if name not in names:
+                raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}")
+        self.basis = basis(degree)
+        self.mesh = np.array(mesh, dtype=float)
+        self._h = np.diff(self.mesh)
+        a, b = problem.domain
+        if self.mesh.ndim != 1 or self.mesh.size < 2 or not np.all(self._h > 0) or self.mesh[0] != a or self.mesh[-1] != b:
+            raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
+        self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
+        self._free = np.array([names.index(name) for name in self.free], dtype=np.int64)
+        self._n, self._d, self.intervals = len(problem.states), degree, self._h.size
+        self._times = (self.mesh[:-1, None] + self._h[:, None] * self.basis.points).ravel()
+        self.state_size = (self.intervals * degree + 1) * self._n
+        self.size = self.state_size + len(self.free)
+        self.equations = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
+        node_weights = np.zeros(self.intervals * degree + 1)
+        shares = (self._h[:, None] * self.basis.node_weights) / (b - a)
+        for node in range(degree + 1):
+            node_weights[node : node + self.intervals * degree : degree] += shares[:, node]
+        #: Weights of the inner product: the mean over the domain of u.v, plus p.q of the free parameters.
+        self.weights = np.concatenate([np.repeat(node_weights, self._n), np.ones(len(self.free))])
+
+    # --- vectors of unknowns -------------------------------------------------------------------------------------
+
+    @property
+    def nodes(self):
+        """All nodes, shape (N d + 1,)."""
+        inner = (self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel()
+        return np.append(inner, self.mesh[-1])
+
+    def pack(self, states, values):
+        """A vector of unknowns from states (N d + 1, n) at the nodes and the mapping of free parameters."""
+        return np.concatenate([np.asarray(states, dtype=float).ravel(), [float(values[name]) for name in self.free]])
+
+    def states(self, x):
+        """States at the nodes, a view of shape (N d + 1, n)."""
+        return x[: self.state_size].reshape(-1, self._n)
+
+    def all_parameters(self, x):
+        """Values of all parameters, shape (number of names,), the free ones from x."""
+        p = self.parameters.copy()
+        p[self._free] = x[self.state_size :]
+        return p
+
+    def parameter(self, x, name: str) -> float:
+        """The value of one parameter by name."""
+        return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
+
+    def parameter_index(self, name: str) -> int:
+        """Where the free parameter ``name`` stands in x."""
+        return self.state_size + self.free.index(name)
+
+    def _local(self, states):
+        """States by interval, a strided view (N, d + 1, n)."""
+        row = states.strides[0]
+        shape = (self.intervals, self._d + 1, self._n)
+        return np.lib.stride_tricks.as_strided(states, shape, (self._d * row, row, states.strides[1]), writeable=False)
+
+    def at_gauss_points(self, x):
+        """States at the Gauss points, shape (N d, n)."""
+        return np.matmul(self.basis.value, self._local(self.states(x))).reshape(-1, self._n)
+
+    def evaluate(self, x, times):
+        """States at ``times`` (m,), shape (m, n), by the piecewise polynomial."""
+        j = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, self.intervals - 1)
+        matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
+        return np.einsum("ij,ijk->ik", matrix, self._local(self.states(x))[j])
+
+    # --- the discrete equations ----------------------------------------------------------------------------------
+
+    def _residual(self, x, states, field, boundary):
+        n, d = self._n, self._d
+        slope = np.matmul(self.basis.slope, self._local(states)).reshape(-1, n)
+        h = np.repeat(self._h, d)
+        integrals = (np.tile(self.basis.weights, self.intervals) * h) @ field[:, n:]
+        return np.concatenate([(slope - h[:, None] * field[:, :n]).ravel(), boundary[0], integrals])
+
+    def residual(self, x):
+        """Residual of the discrete equations at x, shape (equations,)."""
+        p, u = self.all_parameters(x), self.states(x)
+        field = self.problem.batch("field").values(self._times, self.at_gauss_points(x), _NONE(self._n), p)
+        boundary = self.problem.batch("boundary").values(_TIME, u[:1], u[-1:], p)
+        return self._residual(x, u, field, boundary)
+
+    def linearize(self, x, rows=(), columns=()):
+        """Residual at x, and the factored matrix [[F_x, columns^T], [rows]].
+
+        ``rows`` (r, size + c) and ``columns`` (c, equations) make it square: size + c = equations + r. Equations of
+        the result are ordered [residual | rows], unknowns [x | multipliers of the columns].
+        """
+        problem, n, d, k = self.problem, self._n, self._d, len(self.free)
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        p, u = self.all_parameters(x), self.states(x)
+        points = self.at_gauss_points(x)
+        field, jacobian = problem.batch("field").jacobian(self._times, points, _NONE(n), p, self._free)
+        boundary, ends = problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, self._free)
+        c, r = len(columns), len(rows) + problem.integral_size
+        local = np.empty((self.intervals, n * d, n * (d + 1) + k + c))
+        border = np.empty((self.intervals, r, n * (d + 1) + k + c))
+        corner = np.empty((r, k + c))
+        assemble(
+            self.basis.value, self.basis.slope, self.basis.weights, self._h, jacobian, n, columns, rows, local, border, corner
+        )
+        bc = self.intervals * n * d
+        at_boundary = columns[:, bc : bc + problem.boundary_size].T
+        last = np.concatenate([ends[0, :, n:], at_boundary], axis=1)
+        factors = Factorization(local, border, corner, np.ascontiguousarray(ends[0, :, :n]), np.ascontiguousarray(last))
+        return self._residual(x, u, field, boundary), factors
+
+    def functionals(self, x):
+        """Values of the problem's functionals, in their order, by the same quadrature."""
+        if not self.problem.functionals:
+            return np.empty(0)
+        batch = self.problem.batch("functionals")
+        values = batch.values(self._times, self.at_gauss_points(x), _NONE(self._n), self.all_parameters(x))
+        return (np.tile(self.basis.weights, self.intervals) * np.repeat(self._h, self._d)) @ values
+
+    def on_mesh(self, mesh):
+        """The same problem on another mesh, and a function that carries vectors of unknowns over to it."""
+        other = Collocation(
+            self.problem, mesh, self.degree, self.free, dict(zip(self.problem.parameters, self.parameters))
+        )
+        nodes = other.nodes
+
+        def carry(x):
+            return np.concatenate([self.evaluate(x, nodes).ravel(), x[self.state_size :]])
+
+        return other, carry
+
+
+_TIME = np.zeros(1)
+
+
+@functools.cache
+def _NONE(n):
+    """The absent second state of a function of one point."""
+    return np.empty((0, n))

@@ -1,0 +1,350 @@
+"""From a user's plain Python function to a compiled batch evaluation with its exact Jacobian.
+
+A function of a point, ``f(t, u, p)``, is wrapped in a loop over many points that also differentiates it by the
+complex step: with h = 2^-300 the imaginary part of ``f(u + i h e_j)`` divided by h is the derivative to round-off.
+The wrapper is written as a small module into a cache directory named after a fingerprint of the user's code
+(bytecode, constants, closures, everything it calls), so a second process compiles nothing and an edit of a helper in
+another file is never missed.
+"""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import hashlib
+import importlib.util
+import inspect
+import keyword
+import math
+import os
+import sys
+import tempfile
+import types
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numba
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from contin.errors import ProblemError
+
+_TEMPLATE = '''"""Generated; safe to delete."""
+from collections import namedtuple
+import numpy as np
+from numba import njit
+
+U = namedtuple("U", {states})
+V = namedtuple("V", {states})
+P = namedtuple("P", {parameters})
+STEP = 2.0 ** -300
+
+
+@njit("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], i8[::1], f8[:,::1], f8[:,:,::1])",
+      cache=True, error_model="numpy", nogil=True)
+def evaluate(t, u, v, p, free, out, jac):
+    for i in range(u.shape[0]):
+{real}
+    if jac.size == 0:
+        return
+    seed = np.zeros({n} + {nv} + {k})
+    for i in range(u.shape[0]):
+        for column in range(jac.shape[2]):
+            slot = column if column < {n} + {nv} else {n} + {nv} + free[column - {n} - {nv}]
+            seed[slot] = STEP
+{complex}
+            seed[slot] = 0.0
+'''
+
+
+def _analytic_abs(z):
+    return z if z.real >= 0 else -z
+
+
+def _analytic_sign(z):
+    return 1.0 if z.real > 0 else (-1.0 if z.real < 0 else 0.0)
+
+
+def _analytic_max(a, b):
+    return a + 0 * b if a.real >= b.real else b + 0 * a
+
+
+def _analytic_min(a, b):
+    return a + 0 * b if a.real <= b.real else b + 0 * a
+
+
+def _analytic_atan2(y, x):
+    real = np.arctan2(y.real, x.real)
+    square = x.real * x.real + y.real * y.real
+    return real + 1j * ((x.real * y.imag - y.real * x.imag) / square)
+
+
+#: What cannot be differentiated by a complex step as numpy defines it, and what replaces it.
+_REPLACED = {
+    "abs": _analytic_abs, "absolute": _analytic_abs, "fabs": _analytic_abs, "sign": _analytic_sign,
+    "maximum": _analytic_max, "fmax": _analytic_max, "minimum": _analytic_min, "fmin": _analytic_min,
+    "max": _analytic_max, "min": _analytic_min,
+}  # fmt: skip
+#: Functions that exist in ``math`` under another name than in numpy.
+_MATH_NAMES = {
+    "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "asinh": np.arcsinh, "acosh": np.arccosh,
+    "atanh": np.arctanh, "pow": np.power,
+}  # fmt: skip
+_MATH_SAME = ("sqrt", "exp", "expm1", "log", "log1p", "log10", "sin", "cos", "tan", "sinh", "cosh", "tanh")
+_MATH = {getattr(math, name): getattr(np, name) for name in _MATH_SAME}
+_MATH |= {getattr(math, name): function for name, function in _MATH_NAMES.items()}
+_SCALARS = {math.fabs: _analytic_abs, abs: _analytic_abs, max: _analytic_max, min: _analytic_min}
+_SCALARS |= {getattr(np, name): f for name, f in _REPLACED.items() if name not in ("max", "min")}
+_SCALARS |= {math.atan2: _analytic_atan2, np.arctan2: _analytic_atan2}
+
+
+class _Prepared:
+    """Users' functions made ready for numba: what they call compiled too, ``math`` made complex-aware, fingerprinted."""
+
+    def __init__(self) -> None:
+        self._done: dict[object, Dispatcher] = {}
+        self._hash = hashlib.sha256()
+
+    def fingerprint(self) -> str:
+        return self._hash.hexdigest()
+
+    def note(self, *what: object) -> None:
+        for item in what:
+            self._hash.update(repr(item).encode() + b"\0")
+
+    def function(self, function: Callable) -> Dispatcher:
+        """Compile ``function`` and all plain Python functions that it refers to."""
+        function = getattr(function, "py_func", function)
+        if not isinstance(function, types.FunctionType):
+            raise ProblemError(f"{function!r} must be a plain Python function (def or lambda)")
+        if function in self._done:
+            self.note("again", function.__name__)
+            return self._done[function]
+        code = function.__code__
+        names = self._code(code)
+        self.note(function.__defaults__)
+        globals_ = {"__name__": function.__module__, "__builtins__": __builtins__}
+        for name in sorted(names):
+            if name in function.__globals__:
+                globals_[name] = self._value(function.__globals__[name], names)
+            elif name in ("abs", "max", "min"):
+                globals_[name] = self._value(getattr(builtins, name), names)
+        cells = [types.CellType(self._value(cell.cell_contents, names)) for cell in function.__closure__ or ()]
+        copy = types.FunctionType(code, globals_, function.__name__, function.__defaults__, tuple(cells) or None)
+        self._done[function] = numba.njit(copy, error_model="numpy")
+        return self._done[function]
+
+    def _code(self, code: types.CodeType) -> set[str]:
+        """Take the fingerprint of a code object and of those inside it; the names that they use."""
+        self.note(code.co_code, code.co_names, code.co_varnames)
+        names = set(code.co_names)
+        for constant in code.co_consts:
+            if isinstance(constant, types.CodeType):
+                names |= self._code(constant)
+            else:
+                self.note(constant)
+        return names
+
+    def _value(self, value: object, names: set[str]) -> object:
+        """The stand-in for a global or closure value inside the compiled code."""
+        replaced = _replacement(value)
+        if replaced is not None:
+            self.note(value)
+            return replaced
+        if isinstance(value, (types.FunctionType, Dispatcher)):
+            return self.function(value)
+        if isinstance(value, types.ModuleType):
+            return self._module(value, names)
+        if isinstance(value, np.ndarray):
+            self.note(value.shape, value.dtype, value.tobytes())
+        else:
+            self.note(value)
+        return value
+
+    def _module(self, module: types.ModuleType, names: set[str]) -> types.ModuleType:
+        """A copy of a module that holds just the ``names`` used, made complex-aware."""
+        stand_in = types.ModuleType(module.__name__)
+        self.note(module.__name__)
+        for name in sorted(names & set(dir(module))):
+            value = getattr(module, name)
+            if module is np or module is math:
+                value = value if (replaced := _replacement(value)) is None else replaced
+            else:
+                value = self._value(value, names)
+            setattr(stand_in, name, value)
+        return stand_in
+
+
+def _replacement(value: object) -> object | None:
+    """What stands for a function that is not analytic, or that exists for real numbers only; None for all others."""
+    try:
+        if value in _MATH:
+            return _MATH[value]
+        if value in _SCALARS:
+            return numba.njit(_SCALARS[value])
+    except TypeError:  # unhashable: an array or a list, never one of these functions
+        pass
+    return None
+
+
+def check_names(kind: str, names: Sequence[str]) -> tuple[str, ...]:
+    """``names`` as a tuple, or a :class:`ProblemError` that says which one cannot be used."""
+    names = tuple(names)
+    for name in names:
+        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
+            raise ProblemError(f"{kind}: {name!r} is not usable as a name (a Python identifier, no keyword, no leading _)")
+        if names.count(name) > 1:
+            raise ProblemError(f"{kind}: the name {name!r} stands twice")
+    return names
+
+
+def outputs(function: Callable, arguments: Sequence[tuple[str, ...] | None], what: str) -> int:
+    """How many values ``function`` returns (0: a single number), found by one call in Python with NaN everywhere."""
+    plain = getattr(function, "py_func", function)
+    values = [math.nan if names is None else namedtuple("Values", names)(*[math.nan] * len(names)) for names in arguments]
+    try:
+        with np.errstate(all="ignore"):
+            result = plain(*values)
+    except Exception as error:
+        raise ProblemError(f"{what} cannot be called: {type(error).__name__}: {error}") from error
+    return len(result) if isinstance(result, (tuple, list, np.ndarray)) else 0
+
+
+def cache_directory() -> Path:
+    """Where compiled problems are kept: ``CONTIN_CACHE_DIR``, else the user's cache directory, else a temporary one."""
+    chosen = os.environ.get("CONTIN_CACHE_DIR")
+    if not chosen:
+        from platformdirs import user_cache_dir
+
+        chosen = os.path.join(user_cache_dir("contin", appauthor=False), "problems")
+    try:
+        os.makedirs(chosen, exist_ok=True)
+        if os.access(chosen, os.W_OK):
+            return Path(chosen)
+    except OSError:
+        pass
+    return _temporary_directory()
+
+
+@functools.cache
+def _temporary_directory() -> Path:
+    path = Path(tempfile.mkdtemp(prefix="contin-"))
+    print(f"contin: no writable cache, compiling into {path}; set CONTIN_CACHE_DIR to keep it", file=sys.stderr)
+    return path
+
+
+class Batch:
+    """Functions of a point, compiled together: values and exact Jacobian at many points in one call.
+
+    Parameters
+    ----------
+    functions : sequence of callable
+        Each ``f(t, u, p)`` of a time and two named tuples, or with ``ends=True`` ``f(u, v, p)`` of the states at both
+        ends. It returns a number or a tuple of numbers; with one argument more it fills that array instead, and
+        gets arrays in place of named tuples.
+    counts : sequence of int
+        Number of values of each function; 0 stands for one number that is no tuple.
+    states, parameters : tuple of str
+        Names, in order.
+    """
+
+    def __init__(self, functions, counts, states, parameters, *, ends=False):
+        self.states, self.parameters, self.ends = tuple(states), tuple(parameters), ends
+        self.count = sum(max(count, 1) for count in counts)
+        fills = [argument_count(function) == 4 for function in functions]
+        prepared = _Prepared()
+        prepared.note(numba.__version__, np.__version__, sys.version)
+        dispatchers = {f"function{i}": prepared.function(function) for i, function in enumerate(functions)}
+        source = self._source(counts, fills)
+        prepared.note(source)
+        names = " and ".join(function.__name__ for function in functions)
+        self._evaluate = _module(prepared.fingerprint(), dispatchers, names, source).evaluate
+
+    def _source(self, counts, fills) -> str:
+        n, k = len(self.states), len(self.parameters)
+        nv = n if self.ends else 0
+
+        def calls(indent, dtype, number, result):
+            """Lines that call every function at point i and store the results."""
+            u, v, p = (
+                "".join(number(f"{letter}{j}]", slot + j) + ", " for j in range(size))
+                for letter, size, slot in (("u[i, ", n, 0), ("v[i, ", nv, n), ("p[", k, n + nv))
+            )
+            lines, row = [], 0
+            for index, (count, fill) in enumerate(zip(counts, fills)):
+                wrap = (lambda name, text: f"np.array([{text}])") if fill else (lambda name, text: f"{name}({text})")
+                first = f"{wrap('U', u)}, {wrap('V', v)}" if self.ends else f"t[i], {wrap('U', u)}"
+                if fill:
+                    lines.append(f"r = np.zeros({count}, np.{dtype})")
+                    lines.append(f"function{index}({first}, {wrap('P', p)}, r)")
+                else:
+                    lines.append(f"r = function{index}({first}, {wrap('P', p)})")
+                for j in range(max(count, 1)):
+                    lines.append(result(row, f"r[{j}]" if count else "r"))
+                    row += 1
+            return "".join(" " * indent + line + "\n" for line in lines)
+
+        real = calls(8, "float64", lambda text, slot: text, lambda row, r: f"out[i, {row}] = {r}")
+        step = calls(
+            12, "complex128", lambda text, slot: f"complex({text}, seed[{slot}])",
+            lambda row, r: f"jac[i, {row}, column] = complex({r}).imag / STEP",
+        )  # fmt: skip
+        return _TEMPLATE.format(
+            states=self.states, parameters=self.parameters, n=n, nv=nv, k=k, real=real, complex=step
+        )
+
+    def values(self, t, u, v, p):
+        """Values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
+        out = np.empty((len(u), self.count))
+        self._evaluate(t, u, v, p, _NOTHING, out, _NO_JACOBIAN)
+        return out
+
+    def jacobian(self, t, u, v, p, free):
+        """Values and derivatives, shape (points, count, n [+ n] + len(free)): by u, by v, by the free parameters."""
+        width = u.shape[1] * (2 if self.ends else 1) + free.size
+        out, jac = np.empty((len(u), self.count)), np.empty((len(u), self.count, width))
+        self._evaluate(t, u, v, p, free, out, jac)
+        return out, jac
+
+
+_NOTHING = np.empty(0, np.int64)
+_NO_JACOBIAN = np.empty((0, 0, 0))
+
+
+def _module(key: str, dispatchers: dict[str, Dispatcher], name: str, source: str) -> types.ModuleType:
+    """The generated module of this key, loaded (compiled machine code from the cache where it is there)."""
+    path = cache_directory() / f"f{key[:32]}.py"
+    if not path.exists() or path.read_text() != source:
+        write_text(path, source)
+    spec = importlib.util.spec_from_file_location(f"contin_{path.stem}", path)
+    module = importlib.util.module_from_spec(spec)
+    vars(module).update(dispatchers)
+    sys.modules[spec.name] = module  # numba looks it up by name when it loads the compiled code
+    try:
+        spec.loader.exec_module(module)
+    except numba.core.errors.NumbaError as error:
+        raise ProblemError(_explain(name, error)) from error
+    return module
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file so that no other process ever sees half of it."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    with os.fdopen(handle, "w") as file:
+        file.write(text)
+    os.replace(temporary, path)
+
+
+def _explain(name: str, error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    reason = next((line for line in lines if line.startswith(("No implementation", "Untyped", "Unknown", "Invalid"))), None)
+    return (
+        f"function {name!r} cannot be compiled for real and complex numbers: {reason or lines[0]} "
+        "(decide on the real part, `if u.x.real > 0:`; use numpy or math functions of numbers only)"
+    )
+
+
+def argument_count(function: Callable) -> int:
+    """Number of positional arguments of a user's function."""
+    return len(inspect.signature(getattr(function, "py_func", function)).parameters)

@@ -1,0 +1,315 @@
+"""Factorization of bordered almost-block-diagonal matrices, by condensation, with partial pivoting throughout.
+
+The matrix of one collocation step couples, in interval j, the unknowns [interior_j | left_j | right_j | parameters],
+where right_j = left_{j+1}. Below the intervals stand the boundary conditions (first and last mesh point, parameters)
+and r border rows (integral conditions, arclength, ...) that touch everything. It is eliminated in three stages:
+
+1. in each interval, the interior unknowns (local pivoting; border rows follow);
+2. the mesh points 1 ... N-1, one after the other, each from the 2n rows that contain it (border rows follow);
+3. what is left, dense: first and last mesh point and the parameters.
+
+That is the scheme of de Boor & Weiss (1980) in the order that AUTO uses. Cost N (n d)^3, memory N (n d)^2, and nothing of
+the size of the whole is ever stored densely. All stages keep their multipliers, so solves with the matrix and with its
+transpose cost a back-substitution.
+
+Vectors of unknowns are [mesh and interior values in order | parameters]; vectors of equations are
+[collocation | boundary | border rows].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+_OPTIONS = {"cache": True, "error_model": "numpy", "nogil": True}
+
+
+@njit(inline="never", **_OPTIONS)
+def _eliminate(block, columns, pivots, border, border_pivot):
+    """Eliminate the first ``columns`` columns of ``block`` (rows, width) by partial pivoting, in place.
+
+    ``border`` (r, width) holds rows that are reduced but never chosen as pivots. Multipliers stay where they are made.
+    Returns the sign of the product of pivots, swaps included.
+    """
+    rows, width = block.shape
+    sign = 1.0
+    for c in range(columns):
+        best, at = abs(block[c, c]), c
+        for i in range(c + 1, rows):
+            if abs(block[i, c]) > best:
+                best, at = abs(block[i, c]), i
+        pivots[c] = at
+        if at != c:
+            sign = -sign
+            for j in range(width):
+                block[c, j], block[at, j] = block[at, j], block[c, j]
+        pivot = block[c, c]
+        if pivot < 0:
+            sign = -sign
+        border_pivot[0] = min(border_pivot[0], abs(pivot))
+        for i in range(c + 1, rows):
+            factor = block[i, c] / pivot
+            block[i, c] = factor
+            if factor != 0.0:
+                for j in range(c + 1, width):
+                    block[i, j] -= factor * block[c, j]
+        for i in range(border.shape[0]):
+            factor = border[i, c] / pivot
+            border[i, c] = factor
+            if factor != 0.0:
+                for j in range(c + 1, width):
+                    border[i, j] -= factor * block[c, j]
+    return sign
+
+
+@njit(
+    "f8(i8, f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1],"
+    "i8[:,::1], i8[:,::1], i8[::1])",
+    **_OPTIONS,
+)
+def factorize(n, local, border, border_corner, chain, chain_border, first, last, dense, piv_local, piv_chain, piv_dense):
+    """Factor in place; the arrays are described in :class:`Factorization`. Returns the sign of the determinant."""
+    intervals, rows, width = local.shape
+    inner = rows - n
+    r, k = border_corner.shape
+    smallest = np.full(1, np.inf)
+    sign = 1.0
+    for j in range(intervals):
+        border[j, :, inner + 2 * n :] = border_corner
+        sign *= _eliminate(local[j], inner, piv_local[j], border[j], smallest)
+        border_corner[:, :] = border[j, :, inner + 2 * n :]
+    # rows left over from interval 0: coefficients of the first mesh point, of the current one, of the parameters
+    current = np.zeros((n, 2 * n + k))
+    current[:, :n] = local[0, inner:, inner : inner + n]
+    current[:, n:] = local[0, inner:, inner + n :]
+    border_first = border[0, :, inner : inner + n].copy()
+    border_right = border[0, :, inner + n : inner + 2 * n].copy()
+    for j in range(1, intervals):
+        block, edge = chain[j - 1], chain_border[j - 1]
+        block[:n, :n] = current[:, n : 2 * n]
+        block[:n, n : 2 * n] = current[:, :n]
+        block[:n, 2 * n : 3 * n] = 0.0
+        block[:n, 3 * n :] = current[:, 2 * n :]
+        block[n:, :n] = local[j, inner:, inner : inner + n]
+        block[n:, n : 2 * n] = 0.0
+        block[n:, 2 * n :] = local[j, inner:, inner + n :]
+        edge[:, :n] = border_right + border[j, :, inner : inner + n]
+        edge[:, n : 2 * n] = border_first
+        edge[:, 2 * n : 3 * n] = border[j, :, inner + n : inner + 2 * n]
+        edge[:, 3 * n :] = border_corner
+        sign *= _eliminate(block, n, piv_chain[j - 1], edge, smallest)
+        current[:, :n] = block[n:, n : 2 * n]
+        current[:, n:] = block[n:, 2 * n :]
+        border_first[:, :] = edge[:, n : 2 * n]
+        border_right[:, :] = edge[:, 2 * n : 3 * n]
+        border_corner[:, :] = edge[:, 3 * n :]
+    bc = first.shape[0]
+    dense[:n, :] = current
+    dense[n : n + bc, :n] = first
+    dense[n : n + bc, n:] = last
+    dense[n + bc :, :n] = border_first
+    dense[n + bc :, n : 2 * n] = border_right
+    dense[n + bc :, 2 * n :] = border_corner
+    return sign * _eliminate(dense, dense.shape[0], piv_dense, np.empty((0, dense.shape[0])), smallest)
+
+
+@njit(inline="never", **_OPTIONS)
+def _forward(block, columns, pivots, border, x, y):
+    """Apply the elimination of ``block`` to the right-hand sides ``x`` (rows) of its rows and ``y`` of the border."""
+    for c in range(columns):
+        x[c], x[pivots[c]] = x[pivots[c]], x[c]
+    for c in range(columns):
+        value = x[c]
+        if value != 0.0:
+            for i in range(c + 1, block.shape[0]):
+                x[i] -= block[i, c] * value
+            for i in range(border.shape[0]):
+                y[i] -= border[i, c] * value
+
+
+@njit(inline="never", **_OPTIONS)
+def _backward(block, columns, x, known):
+    """Solve the upper triangle of the eliminated ``columns`` for x[:columns]; ``known`` are the unknowns after them."""
+    for c in range(columns - 1, -1, -1):
+        value = x[c]
+        for j in range(c + 1, columns):
+            value -= block[c, j] * x[j]
+        for j in range(columns, block.shape[1]):
+            value -= block[c, j] * known[j - columns]
+        x[c] = value / block[c, c]
+
+
+@njit(
+    "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],"
+    "i8[:,::1], i8[:,::1], i8[::1], f8[::1], f8[::1])",
+    **_OPTIONS,
+)
+def solve(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, b, x):
+    """Solve J x = b with the factors; ``b`` (equations) is overwritten."""
+    intervals, rows, width = local.shape
+    inner = rows - n
+    r, k = border.shape[1], width - inner - 2 * n
+    size = dense.shape[0]
+    edge = b[b.size - r :]
+    for j in range(intervals):
+        _forward(local[j], inner, piv_local[j], border[j], b[j * rows : (j + 1) * rows], edge)
+    pair = np.empty((max(intervals - 1, 1), 2 * n))
+    current = b[inner:rows].copy()
+    for j in range(1, intervals):
+        pair[j - 1, :n] = current
+        pair[j - 1, n:] = b[j * rows + inner : (j + 1) * rows]
+        _forward(chain[j - 1], n, piv_chain[j - 1], chain_border[j - 1], pair[j - 1], edge)
+        current[:] = pair[j - 1, n:]
+    z = np.empty(size)
+    z[:n] = current
+    z[n:] = b[intervals * rows :]
+    none = np.empty((0, size))
+    _forward(dense, size, piv_dense, none, z, edge)
+    _backward(dense, size, z, edge)
+    x[:n] = z[:n]
+    x[x.size - k - n :] = z[n:]
+    known = np.empty(2 * n + k)
+    known[:n] = z[:n]
+    known[2 * n :] = z[2 * n :]
+    for j in range(intervals - 1, 0, -1):
+        known[n : 2 * n] = x[(j + 1) * rows : (j + 1) * rows + n]
+        _backward(chain[j - 1], n, pair[j - 1], known)
+        x[j * rows : j * rows + n] = pair[j - 1, :n]
+    for j in range(intervals):
+        known[:n] = x[j * rows : j * rows + n]
+        known[n : 2 * n] = x[(j + 1) * rows : (j + 1) * rows + n]
+        _backward(local[j], inner, b[j * rows : (j + 1) * rows], known)
+        x[j * rows + n : (j + 1) * rows] = b[j * rows : j * rows + inner]
+
+
+@njit(inline="never", **_OPTIONS)
+def _forward_transposed(block, columns, x, rest):
+    """Solve U^T z = x for the eliminated columns, in place; subtract what z contributes to the columns after them."""
+    for c in range(columns):
+        value = x[c] / block[c, c]
+        x[c] = value
+        if value != 0.0:
+            for j in range(c + 1, columns):
+                x[j] -= block[c, j] * value
+            for j in range(columns, block.shape[1]):
+                rest[j - columns] -= block[c, j] * value
+
+
+@njit(inline="never", **_OPTIONS)
+def _backward_transposed(block, columns, pivots, border, x, y):
+    """Apply the transpose of the elimination of ``block`` to the multipliers x of its rows and y of the border."""
+    for c in range(columns - 1, -1, -1):
+        value = x[c]
+        for i in range(c + 1, block.shape[0]):
+            value -= block[i, c] * x[i]
+        for i in range(border.shape[0]):
+            value -= border[i, c] * y[i]
+        x[c] = value
+    for c in range(columns - 1, -1, -1):
+        x[c], x[pivots[c]] = x[pivots[c]], x[c]
+
+
+@njit(
+    "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],"
+    "i8[:,::1], i8[:,::1], i8[::1], f8[::1], f8[::1])",
+    **_OPTIONS,
+)
+def solve_transposed(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, c, y):
+    """Solve J^T y = c with the factors; ``c`` (unknowns) is overwritten."""
+    intervals, rows, width = local.shape
+    inner = rows - n
+    r, k = border.shape[1], width - inner - 2 * n
+    size = dense.shape[0]
+    rest = np.empty(2 * n + k)
+    for j in range(intervals):
+        rest[:n] = c[j * rows : j * rows + n]
+        rest[n : 2 * n] = c[(j + 1) * rows : (j + 1) * rows + n]
+        rest[2 * n :] = c[c.size - k :]
+        _forward_transposed(local[j], inner, c[j * rows + n : (j + 1) * rows], rest)
+        c[j * rows : j * rows + n] = rest[:n]
+        c[(j + 1) * rows : (j + 1) * rows + n] = rest[n : 2 * n]
+        c[c.size - k :] = rest[2 * n :]
+    for j in range(1, intervals):
+        rest[:n] = c[:n]
+        rest[n : 2 * n] = c[(j + 1) * rows : (j + 1) * rows + n]
+        rest[2 * n :] = c[c.size - k :]
+        _forward_transposed(chain[j - 1], n, c[j * rows : j * rows + n], rest)
+        c[:n] = rest[:n]
+        c[(j + 1) * rows : (j + 1) * rows + n] = rest[n : 2 * n]
+        c[c.size - k :] = rest[2 * n :]
+    z = np.empty(size)
+    z[:n] = c[:n]
+    z[n:] = c[c.size - k - n :]
+    none = np.empty((0, size))
+    _forward_transposed(dense, size, z, rest)
+    _backward_transposed(dense, size, piv_dense, none, z, rest)
+    y[intervals * rows :] = z[n:]
+    edge = y[y.size - r :]
+    current = z[:n].copy()
+    pair = np.empty(2 * n)
+    for j in range(intervals - 1, 0, -1):
+        pair[:n] = c[j * rows : j * rows + n]
+        pair[n:] = current
+        _backward_transposed(chain[j - 1], n, piv_chain[j - 1], chain_border[j - 1], pair, edge)
+        current[:] = pair[:n]
+        y[j * rows + inner : (j + 1) * rows] = pair[n:]
+    y[inner:rows] = current
+    for j in range(intervals):
+        y[j * rows : j * rows + inner] = c[j * rows + n : (j + 1) * rows]
+        _backward_transposed(local[j], inner, piv_local[j], border[j], y[j * rows : (j + 1) * rows], edge)
+
+
+class Factorization:
+    """A factored bordered almost-block-diagonal matrix: solves, transposed solves, sign of the determinant.
+
+    Parameters
+    ----------
+    local : ndarray, shape (intervals, n d, n (d + 1) + k)
+        Collocation rows; columns [interior n (d - 1) | left n | right n | parameters k]. Overwritten.
+    border : ndarray, shape (intervals, r, n (d + 1) + k)
+        Border rows on the same columns, each interval's share (a row is the sum over intervals); the last k columns
+        are work space. Overwritten.
+    corner : ndarray, shape (r, k)
+        Border rows on the parameters. Overwritten.
+    first, last : ndarray, shapes (n_bc, n) and (n_bc, n + k)
+        Boundary conditions on the first mesh point, and on [last mesh point | parameters].
+
+    Raises
+    ------
+    ValueError
+        If the matrix is not square.
+    """
+
+    def __init__(self, local, border, corner, first, last):
+        intervals, rows, width = local.shape
+        r, k = corner.shape
+        n = first.shape[1]
+        size = 2 * n + k
+        if n + len(first) + r != size:
+            raise ValueError(f"{len(first)} boundary conditions and {r} border rows for {n} states and {k} parameters")
+        self._n = n
+        self._unknowns = intervals * rows + n + k
+        chain = np.empty((max(intervals - 1, 0), 2 * n, 3 * n + k))
+        edge = np.empty((max(intervals - 1, 0), r, 3 * n + k))
+        dense = np.empty((size, size))
+        pivots = (
+            np.empty((intervals, rows - n), np.int64),
+            np.empty((max(intervals - 1, 0), n), np.int64),
+            np.empty(size, np.int64),
+        )
+        sign = factorize(n, local, border, corner, chain, edge, first, last, dense, *pivots)
+        self._factors = (n, local, border, chain, edge, dense, *pivots)
+        #: Sign of the determinant up to a factor that depends on the shape only.
+        self.sign = sign if np.isfinite(dense[-1, -1]) else np.nan
+
+    def solve(self, b):
+        """The x (unknowns,) with J x = b (equations,)."""
+        x = np.empty(self._unknowns)
+        solve(*self._factors, np.array(b, dtype=float), x)
+        return x
+
+    def solve_transposed(self, c):
+        """The y (equations,) with J^T y = c (unknowns,)."""
+        y = np.empty(self._unknowns)
+        solve_transposed(*self._factors, np.array(c, dtype=float), y)
+        return y

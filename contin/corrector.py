@@ -1,0 +1,99 @@
+"""Newton's method, then chord steps, on F(x) = 0 together with linear conditions on x."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contin.errors import ConvergenceError, ProblemError
+
+
+@dataclass(frozen=True)
+class Newton:
+    """How to correct: stop when the estimated error of every component is below ``tolerance`` (1 + |x|).
+
+    ``tolerance`` may be as small as round-off; iterations that stagnate there count as converged.
+    """
+
+    tolerance: float = 1e-12
+    max_iterations: int = 10
+
+    def __post_init__(self):
+        if not 0 < self.tolerance < 1:
+            raise ProblemError(f"newton tolerance: {self.tolerance} must lie between 0 and 1")
+        if self.max_iterations < 1:
+            raise ProblemError(f"max_iterations: {self.max_iterations} must be at least 1")
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A corrected x, the last factorization (taken one Newton step before x or nearer), and how it went."""
+
+    x: np.ndarray
+    factors: object
+    iterations: int
+    residual: float
+
+
+#: After an update below this the factorization is kept (chord steps gain at least as much a step as this is small).
+_CHORD = 1e-3
+#: Updates that small and no longer shrinking are round-off.
+_ROUND_OFF = 1e-9
+
+
+def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), factors=None) -> Corrected:
+    """Solve F(x) = 0 and row.x = target, starting from ``guess``.
+
+    Parameters
+    ----------
+    system : Collocation or alike
+        Has ``residual(x)`` and ``linearize(x, rows)``.
+    guess : ndarray, shape (size,)
+    row : ndarray, shape (size,), optional
+        The linear condition; without it F = 0 must be square.
+    factors : optional
+        A factorization from near by to start with.
+
+    Raises
+    ------
+    ConvergenceError
+        Not converged, or not finite; the message holds the last updates.
+    """
+    rows = () if row is None else (row,)
+    x, history = np.array(guess, dtype=float), []
+    with np.errstate(all="ignore"):
+        for _ in range(newton.max_iterations):
+            if factors is None:
+                residual, factors = system.linearize(x, rows)
+                fresh = True
+            else:
+                residual, fresh = system.residual(x), False
+            full = residual if row is None else np.append(residual, row @ x - target)
+            update = factors.solve(full)
+            size = float(np.max(np.abs(update) / (1 + np.abs(x))))
+            if not np.isfinite(size):
+                break
+            history.append(size)
+            x = x - update
+            rate = _rate(history, fresh)
+            if size * rate <= newton.tolerance or (size < _ROUND_OFF and len(history) > 1 and rate >= 0.5):
+                return Corrected(x, factors, len(history), float(np.max(np.abs(full))))
+            if len(history) > 2 and size > 2 * history[-2] > _ROUND_OFF:
+                break
+            if size > _CHORD or rate > 0.2:
+                factors = None
+    updates = ", ".join(f"{size:.1e}" for size in history) or "not finite"
+    raise ConvergenceError(f"Newton did not converge (updates {updates})")
+
+
+def _rate(history, fresh) -> float:
+    """Estimated ratio of the error after the last update to its size."""
+    last = history[-1]
+    if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
+        ratio = last if len(history) < 2 else max(last, last / history[-2] * min(1.0, last / history[-2]))
+        return min(1.0, ratio)
+    if len(history) < 2:
+        return 1.0
+    ratio = last / history[-2]
+    return ratio / (1 - ratio) if ratio < 0.5 else 1.0

@@ -1,0 +1,137 @@
+"""What the user states: a boundary value problem in plain functions and names; no numerics here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from contin.compilation import Batch, argument_count, check_names, outputs
+from contin.errors import ProblemError
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryValueProblem:
+    """u' = rhs(t, u, p) on ``domain``, with conditions at both ends and under the integral.
+
+    Every function is plain Python; ``u`` and ``p`` come as named tuples (``u.x``, ``p.mu``, ``x, y = u``). They are
+    compiled, and differentiated to round-off by the complex step: decide on real parts (``if u.x.real > 0``).
+    A function with one argument more fills that array instead of returning a tuple, and gets arrays: the way for
+    states too many to name. It then needs ``boundary_count`` or ``integral_count``.
+
+    Parameters
+    ----------
+    rhs : callable
+        ``rhs(t, u, p)`` returns the n derivatives.
+    boundary : callable
+        ``boundary(u0, u1, p)`` returns the n_bc quantities that vanish, from the states at both ends.
+    states : sequence of str, or int
+        Names of the n states; a number n stands for u0, u1, ...
+    parameters : mapping of str to float
+        Names and default values.
+    integrals : callable, optional
+        ``integrals(t, u, p)`` returns the n_int integrands whose integral over the domain vanishes.
+    domain : pair of float
+        Ends of the independent variable, finite and increasing.
+    functionals : mapping of str to callable, optional
+        ``f(t, u, p)``: integrands whose integrals over the domain are columns of every point.
+
+    Raises
+    ------
+    ProblemError
+        A name, a domain or a function that cannot be used; the message says which and why.
+
+    Notes
+    -----
+    A curve needs n_bc + n_int - n + 1 free parameters, an isolated solution one fewer.
+    """
+
+    rhs: Callable
+    boundary: Callable
+    states: Sequence[str] | int
+    parameters: Mapping[str, float]
+    integrals: Callable | None = None
+    domain: tuple[float, float] = (0.0, 1.0)
+    functionals: Mapping[str, Callable] = field(default_factory=dict)
+    boundary_count: int | None = None
+    integral_count: int | None = None
+
+    def __post_init__(self) -> None:
+        states = tuple(f"u{i}" for i in range(self.states)) if isinstance(self.states, int) else self.states
+        object.__setattr__(self, "states", check_names("states", states))
+        check_names("parameters", self.parameters)
+        check_names("functionals", [*self.functionals, *self.parameters])
+        for name, value in self.parameters.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)) or not math.isfinite(value):
+                raise ProblemError(f"parameters: {name} = {value!r} must be a finite number")
+        a, b = self.domain
+        if not (math.isfinite(a) and math.isfinite(b) and a < b):
+            raise ProblemError(f"domain: {self.domain} must be two finite numbers, the first the smaller")
+        if not self.states:
+            raise ProblemError("states: there must be at least one")
+        p, u = tuple(self.parameters), self.states
+        counts = {
+            "rhs": self._count("rhs", self.rhs, (None, u, p), len(u)),
+            "boundary": self._count("boundary", self.boundary, (u, u, p), self.boundary_count),
+            "integrals": self._count("integrals", self.integrals, (None, u, p), self.integral_count),
+        }
+        if counts["rhs"] != len(u):
+            raise ProblemError(f"rhs returns {counts['rhs']} values for the {len(u)} states {', '.join(u[:8])}")
+        object.__setattr__(self, "_counts", counts)
+        object.__setattr__(self, "_batches", {})
+
+    @staticmethod
+    def _count(name, function, arguments, given):
+        if function is None:
+            return 0
+        expected = len(arguments)
+        if (found := argument_count(function)) not in (expected, expected + 1):
+            raise ProblemError(f"{name} takes {found} arguments, must take {expected} (or {expected + 1}, to fill the last)")
+        if found == expected + 1:
+            if given is None:
+                raise ProblemError(f"{name} fills an array: say how many values with {name.rstrip('s')}_count")
+            return given
+        return max(outputs(function, arguments, name), 1)
+
+    @property
+    def boundary_size(self) -> int:
+        """n_bc, the number of boundary conditions."""
+        return self._counts["boundary"]
+
+    @property
+    def integral_size(self) -> int:
+        """n_int, the number of integral conditions."""
+        return self._counts["integrals"]
+
+    @property
+    def free_size(self) -> int:
+        """Number of free parameters on a curve of solutions: n_bc + n_int - n + 1."""
+        return self.boundary_size + self.integral_size - len(self.states) + 1
+
+    def batch(self, name: str) -> Batch:
+        """The compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked."""
+        if name not in self._batches:
+            self._batches[name] = self._compile(name)
+        return self._batches[name]
+
+    def _compile(self, name: str) -> Batch:
+        p, u = tuple(self.parameters), self.states
+        if name == "boundary":
+            return Batch([self.boundary], [self._shape(self.boundary, (u, u, p), self.boundary_size)], u, p, ends=True)
+        if name == "functionals":
+            functions = list(self.functionals.values())
+            if any(argument_count(f) != 3 or outputs(f, (None, u, p), "a functional") for f in functions):
+                raise ProblemError("functionals: each must be f(t, u, p) and return one number")
+            return Batch(functions, [0] * len(functions), u, p)
+        functions = [f for f in (self.rhs, self.integrals) if f is not None]
+        sizes = (len(u), self.integral_size)
+        return Batch(functions, [self._shape(f, (None, u, p), size) for f, size in zip(functions, sizes)], u, p)
+
+    @staticmethod
+    def _shape(function, arguments, size):
+        """The size as a Batch wants it: 0 for a function that returns a bare number."""
+        if size > 1 or argument_count(function) == len(arguments) + 1:
+            return size
+        return outputs(function, arguments, function.__name__)

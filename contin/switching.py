@@ -1,0 +1,143 @@
+"""Branch points: located through their own regular equations, with the tangents of all branches that meet there.
+
+At a simple branch point F_x (N x (N + 1)) has a two-dimensional kernel. With one column psi and two rows Phi added, the
+matrix M = [[F_x, psi], [Phi, 0]] is regular, and M [v_i; g_i] = [0; e_i] defines the kernel v and two numbers g that vanish
+exactly there (Griewank & Reddien 1984). Lyapunov-Schmidt makes it plain: on the manifold F(x) + beta psi = 0, g is the
+gradient of the scalar beta over the two coordinates s = Phi.x; the branch point is where the gradient vanishes, and the
+Hessian of beta is the algebraic bifurcation equation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contin.corrector import Newton
+from contin.errors import ConvergenceError
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """A simple branch point.
+
+    Attributes
+    ----------
+    x : ndarray, shape (size,)
+    tangents : tuple of ndarray
+        Unit tangents of the two branches; empty where none is real (an isolated point).
+    kernel : ndarray, shape (2, size)
+        Orthonormal basis of the kernel of F_x.
+    left : ndarray, shape (equations,)
+        Left null vector.
+    hessian : ndarray, shape (2, 2)
+        Coefficients of the algebraic bifurcation equation a.H.a = 0 of the tangents a.kernel.
+    imperfection : float
+        The residual beta by which the discrete equations miss a perfect bifurcation.
+    """
+
+    x: np.ndarray
+    tangents: tuple
+    kernel: np.ndarray
+    left: np.ndarray
+    hessian: np.ndarray
+    imperfection: float
+
+
+def inner(system, a, b) -> float:
+    """The weighted inner product of two vectors of unknowns."""
+    return float((system.weights * a) @ b)
+
+
+def _orthonormal(system, vectors):
+    result = []
+    for vector in vectors:
+        for _ in range(2):
+            for other in result:
+                vector = vector - inner(system, vector, other) * other
+        result.append(vector / np.sqrt(inner(system, vector, vector)))
+    return np.array(result)
+
+
+class _Bordered:
+    """M at x for given borders: its kernel vectors, the numbers g, corrections."""
+
+    def __init__(self, system, x, phi, psi):
+        self.rows = np.pad(phi * system.weights, ((0, 0), (0, 1)))
+        self.residual, self.factors = system.linearize(x, self.rows, psi[None, :])
+        zeros = np.zeros(system.equations)
+        solutions = [self.factors.solve(np.concatenate([zeros, unit])) for unit in np.eye(2)]
+        self.kernel, self.g = np.array([s[:-1] for s in solutions]), np.array([s[-1] for s in solutions])
+
+    def left(self, system):
+        unit = np.zeros(system.size + 1)
+        unit[-1] = 1.0
+        left = self.factors.solve_transposed(unit)[: system.equations]
+        return left / np.linalg.norm(left)
+
+
+def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: int = 12) -> BranchPoint:
+    """The branch point near x.
+
+    Raises
+    ------
+    ConvergenceError
+        None was found near x.
+    """
+    random = np.random.default_rng(20240501)
+    phi = _orthonormal(system, random.standard_normal((2, system.size)))
+    psi = random.standard_normal(system.equations) / np.sqrt(system.equations)
+    x, beta, hessian, last = np.array(x, dtype=float), 0.0, None, np.inf
+    with np.errstate(all="ignore"):
+        for iteration in range(max_iterations):
+            matrix = _Bordered(system, x, phi, psi)
+            if iteration < 2:  # borders of random numbers first, then of the kernel itself: the best conditioned
+                if not np.all(np.isfinite(matrix.kernel)):
+                    raise ConvergenceError("no branch point near by: the bordered matrix is singular")
+                phi, psi = _orthonormal(system, matrix.kernel), matrix.left(system)
+                continue
+            if hessian is None:
+                hessian = _hessian(system, x, phi, psi, matrix.kernel)
+            # one Newton step for F + beta psi = 0 and, through its gradient g, for grad beta = 0
+            correction = matrix.factors.solve(np.concatenate([matrix.residual + beta * psi, [0.0, 0.0]]))
+            drop, *_ = np.linalg.lstsq(hessian, matrix.g, rcond=1e-9)
+            update = correction[:-1] + drop @ matrix.kernel
+            beta -= correction[-1]
+            x = x - update
+            size = float(np.max(np.abs(update) / (1 + np.abs(x))))
+            if not np.isfinite(size) or size > 10:
+                break
+            if size <= newton.tolerance or (size < 1e-9 and size > 0.3 * last):
+                return _finish(system, x, phi, psi, beta)
+            if size > 0.05 * last:
+                hessian = None
+            last = size
+    raise ConvergenceError(f"no branch point near by (last update {last:.1e})")
+
+
+def _hessian(system, x, phi, psi, kernel, scale=1e-4):
+    """The Hessian of beta, shape (2, 2), by central differences of its exact gradient."""
+    columns = []
+    for vector in kernel:
+        g = [_Bordered(system, x + sign * scale * vector, phi, psi).g for sign in (1, -1)]
+        columns.append((g[0] - g[1]) / (2 * scale))
+    hessian = np.array(columns)
+    return (hessian + hessian.T) / 2
+
+
+def _finish(system, x, phi, psi, beta) -> BranchPoint:
+    matrix = _Bordered(system, x, phi, psi)
+    kernel, left = _orthonormal(system, matrix.kernel), matrix.left(system)
+    hessian = _hessian(system, x, kernel, left, kernel)
+    tangents = [a @ kernel for a in _null_directions(hessian)]
+    return BranchPoint(x, tuple(tangents), kernel, left, hessian, float(abs(beta)))
+
+
+def _null_directions(hessian):
+    """Unit vectors a with a.H.a = 0: two where det H < 0, none otherwise."""
+    values, vectors = np.linalg.eigh(hessian)
+    if not values[0] < 0 < values[1]:
+        return []
+    ratio = np.sqrt(-values[0] / values[1])
+    directions = [vectors[:, 0] + sign * ratio * vectors[:, 1] for sign in (1, -1)]
+    return [direction / np.linalg.norm(direction) for direction in directions]

@@ -1,0 +1,35 @@
+"""Linear stability of the m-covered circle: the circle bifurcations (section 6.2 of Audoly & Seffen 2015)."""
+
+from __future__ import annotations
+
+import math
+
+from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
+
+
+def thresholds(law: Law, m: int, n: int, nu: float) -> tuple[float, ...]:
+    """The values of kappa_n (L = 2 pi) where the mode of wavenumber n leaves the m-covered circle: m K, b = 0 in (25b).
+
+    One value for the ribbon (equation (27)) and the flat rod, two for the isotropic rod (nearer to kappa_n = m first).
+    With k = n/m, M = 1 - K and g infinite, b = 0 reads 1 - K = t (1 - k^2); nu -> 0 is a removable singularity of (27).
+
+    Raises
+    ------
+    ValueError
+        n = m, a rigid rotation; or no finite value (t of the ribbon vanishes for this mode).
+    """
+    if n == m:
+        raise ValueError(f"n = m = {m} is a rigid rotation, not a bifurcation")
+    s = (n / m) ** 2 - 1
+    if law is RIBBON:  # 1 - K = -2 (1 - nu K) s
+        if 1 + 2 * nu * s == 0:
+            raise ValueError(f"m = {m}, n = {n}, nu = {nu:g}: the mode has no finite threshold")
+        return (m * (1 + 2 * s) / (1 + 2 * nu * s),)
+    if law is FLAT_ROD:
+        return (m * (1 + 2 * s / (1 + nu)),)
+    if law is ISOTROPIC_ROD:  # M^2 - (1 + t) M - t s = 0
+        t = 1 / (1 + nu)
+        root = math.sqrt((1 + t) ** 2 + 4 * t * s)
+        values = (m * (1 - (1 + t - root) / 2), m * (1 - (1 + t + root) / 2))
+        return tuple(sorted(values, key=lambda value: abs(value - m)))
+    raise ValueError(f"the law {law.name!r} has no closed formula here")
