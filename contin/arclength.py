@@ -48,8 +48,8 @@ class Settings:
     monitors : sequence of Monitor
         Events of one's own.
     folds, branch_points, errors : bool
-        Whether to look for folds, for branch points, and to estimate the discretization error of labelled points (by
-        solving them again on the mesh halved).
+        Whether to look for folds, for branch points, and to solve labelled points again on the mesh halved, until that
+        changes them by less than the mesh tolerance: the last change is their error estimate.
     angle : float
         Largest angle between the tangents of consecutive points, radians.
     accuracy : float
@@ -98,7 +98,7 @@ class State:
     """Everything that the next step depends on; with it a run continues as if never interrupted.
 
     ``x``, ``tangent`` and ``previous_tangent`` live on ``system``; ``sign`` is that of the determinant on this mesh;
-    ``start`` and ``start_tangent`` are the run's first point, for closed branches, on the mesh it was computed on.
+    ``accepted`` counts the regular points; ``singular`` says that x is a branch point.
     """
 
     system: object
@@ -111,6 +111,18 @@ class State:
     arclength: float
     accepted: int
     singular: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Event:
+    """What was located inside a step: at which distance along the tangent, what, and the stop that it causes."""
+
+    at: float
+    label: str
+    name: str
+    trial: Trial
+    stop: Stop | None = None
+    details: object = None
 
 
 class Continuation:
@@ -126,6 +138,8 @@ class Continuation:
         Where to go; needed when x is a branch point. Its sign is then kept.
     state : State, optional
         Continue from here instead (x and tangent are then not used).
+    start : tuple (system, x, tangent), optional
+        With ``state``: the first point of the run that is continued, to recognise a closed branch.
 
     Raises
     ------
@@ -135,7 +149,7 @@ class Continuation:
         The first point cannot be corrected.
     """
 
-    def __init__(self, system, x, settings: Settings = Settings(), tangent=None, state: State | None = None):
+    def __init__(self, system, x, settings: Settings = Settings(), tangent=None, state: State | None = None, start=None):
         self.settings = settings
         self.primary = settings.primary or system.free[0]
         self.stop: Stop | None = None
@@ -143,7 +157,7 @@ class Continuation:
         self._monitors = self._all_monitors()
         self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
         self._resumed = state is not None
-        self._start = (self.state.system, self.state.x, self.state.tangent)
+        self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
     def _check(self, system):
         if len(system.free) != system.problem.free_size:
@@ -216,7 +230,8 @@ class Continuation:
         return None
 
     def _advance(self) -> Iterator[Point]:
-        """One step: the labelled points inside it, then the point at its end."""
+        """One step: the mesh refined if due, the labelled points inside the step, then the point at its end."""
+        self._refine()
         state = self.state
         try:
             step, trial, distance = self._step(state)
@@ -236,7 +251,6 @@ class Continuation:
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
         yield self._point("EP" if self.stop else "", "max points" if self.stop else "", trial, step, state)
-        self._refine()
 
     # --- one step ------------------------------------------------------------------------------------------------
 
@@ -275,7 +289,7 @@ class Continuation:
         factors = system.linearize(done.x, (row,))[1] if exact else done.factors
         tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
         tangent /= np.sqrt(inner(system, tangent, tangent))
-        return Trial(system, done.x, tangent, factors.sign, done.iterations, done.residual)
+        return Trial(system, done.x, tangent, factors.sign, done.iterations, done.error)
 
     def _accept(self, state: State, trial: Trial, step: float, distance: float) -> State:
         """The next state, its step chosen so that the predictor's error is ``accuracy`` of it."""
@@ -295,7 +309,7 @@ class Continuation:
     def _refine(self):
         """Adapt the mesh now and then, and correct the point on it."""
         control, state = self.settings.mesh, self.state
-        if not control.every or state.accepted % control.every or self.stop:
+        if state.singular or not control.every or state.accepted % control.every:
             return
         mesh = adapted_mesh(state.system, state.x, control)
         if mesh is None:
@@ -324,23 +338,21 @@ class Continuation:
         if not state.singular:
             before = Trial(state.system, state.x, state.tangent, state.sign)
             home = self._returned(state, trial, step, before)
-            branch_point = None
             if home is not None:
                 found.append(home)
             elif self.settings.branch_points and sign_changed(state.sign, trial.sign):
-                branch_point = self._branch_point(state, trial, step)
-                found.append((*branch_point, None))
-            special = found[0][1].x if found else None
+                found.append(self._branch_point(state, trial, step))
             for monitor in self._monitors:
                 if sign_changed(monitor.function(before), monitor.function(trial)):
-                    located = self._locate(state, trial, step, monitor)
-                    if special is None or monitor.label != "LP" or np.max(np.abs(located[1].x - special)) > 1e-4:
-                        found.append(located)
+                    event = self._locate(state, trial, step, monitor)
+                    # where branches cross, a turn of the parameter is no fold of its own
+                    if monitor.label != "LP" or all(np.max(np.abs(event.trial.x - f.trial.x)) > 1e-4 for f in found[:1]):
+                        found.append(event)
         closed = self._closed(state, trial, step)
         if closed is not None:
             found.append(closed)
-        for _, point, stop in sorted(found, key=lambda item: item[0]):
-            yield point, stop
+        for event in sorted(found, key=lambda event: event.at):
+            yield self._point(event.label, event.name, event.trial, event.at, state, event.details), event.stop
 
     def _between(self, state, trial, step, at):
         """A guess on the curve by the cubic through both ends and their tangents."""
@@ -368,7 +380,7 @@ class Continuation:
         stop = None
         if monitor.terminal:
             stop = Stop("limit", f"reached {monitor.name}") if monitor.label == "EP" else Stop("event", f"met {monitor.name}")
-        return at, self._point(monitor.label, name, there, at, state), stop
+        return _Event(at, monitor.label, name, there, stop)
 
     def _branch_point(self, state, trial, step):
         """The branch point inside a step, its bracket halved until the locator's answer lies inside it."""
@@ -380,8 +392,8 @@ class Continuation:
                 at = inner(state.system, state.tangent, found.x - state.x)
                 off = found.x - self._between(state, trial, step, at)
                 if -1e-9 * step <= at <= step * (1 + 1e-9) and np.sqrt(inner(state.system, off, off)) < 0.1 * step:
-                    point = Trial(state.system, found.x, np.full_like(found.x, np.nan), np.nan)
-                    return at, self._point("BP", "", point, at, state, details=found)
+                    there = Trial(state.system, found.x, np.full_like(found.x, np.nan), np.nan)
+                    return _Event(at, "BP", "", there, details=found)
             except ConvergenceError:
                 pass
             try:
@@ -389,7 +401,7 @@ class Continuation:
             except ConvergenceError:
                 break
             low, high = (middle, high) if sign == state.sign else (low, middle)
-        return high, self._point("BP", "possible", trial, high, state)
+        return _Event(high, "BP", "possible", trial)
 
     def _returned(self, state, trial, step, before):
         """The end of a branch on the trivial one, where ``settings.trivial`` passes zero."""
@@ -397,15 +409,15 @@ class Continuation:
         if name is None or not sign_changed(before[name], trial[name]):
             return None
         stop = Stop("trivial branch", f"returned to the trivial branch ({name} = 0)")
-        at, point = self._branch_point(state, trial, step) if self.settings.branch_points else (step, None)
-        if point is None or abs(point[name]) > 1e-6 * max(abs(before[name]), abs(trial[name])):
+        event = self._branch_point(state, trial, step) if self.settings.branch_points else None
+        if event is None or abs(event.trial[name]) > 1e-6 * max(abs(before[name]), abs(trial[name])):
             monitor = Monitor("EP", "trivial branch", lambda there: there[name], terminal=True)
-            at, point, _ = self._locate(state, trial, step, monitor)
-        return at, dataclasses.replace(point, label="EP", name="trivial branch"), stop
+            event = self._locate(state, trial, step, monitor)
+        return dataclasses.replace(event, label="EP", name="trivial branch", stop=stop)
 
     def _closed(self, state, trial, step):
         """The end of a branch that comes back to its first point."""
-        home, x, tangent = self._start
+        home, x, tangent = self.start
         if state.accepted < 3:
             return None
         p, q = x[home.state_size :], trial.x[state.system.state_size :]
@@ -422,43 +434,57 @@ class Continuation:
         off = self._between(state, trial, step, at) - x
         if np.sqrt(inner(state.system, off, off)) > 0.1 * step:
             return None
-        there = Trial(state.system, x, tangent, trial.sign, trial.iterations, trial.residual)
-        return at, self._point("EP", "closed", there, at, state), Stop("closed", "the branch closed on its first point")
+        there = Trial(state.system, x, tangent, trial.sign, trial.iterations, trial.newton_error)
+        return _Event(at, "EP", "closed", there, Stop("closed", "the branch closed on its first point"))
 
     # --- what comes out ------------------------------------------------------------------------------------------
 
     def _point(self, label, name, trial: Trial, gone: float, state: State | None = None, details=None) -> Point:
+        arclength, errors = (state or self.state).arclength + gone, {}
+        if label and label != "MX" and self.settings.errors:
+            trial, errors, details = self._refined(label, trial, details)
         system = trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
-        arclength = (state or self.state).arclength + gone
-        errors = self._errors(label, trial) if label and label != "MX" and self.settings.errors else {}
         return Point(
             label, name, parameters, trial.functionals, trial.x, trial.tangent, system, arclength, trial.iterations,
-            trial.residual, errors, details,
+            trial.newton_error, errors, details,
         )  # fmt: skip
 
-    def _errors(self, label, trial: Trial) -> dict[str, float]:
-        """Difference of the free parameters to the same special point on the mesh halved."""
-        coarse = trial.system
-        fine = np.sort(np.concatenate([coarse.mesh, (coarse.mesh[1:] + coarse.mesh[:-1]) / 2]))
-        system, carry = coarse.on_mesh(fine)
-        x = carry(trial.x)
-        try:
-            if label == "BP" or not np.all(np.isfinite(trial.tangent)):
-                better = locate_branch_point(system, x, self.settings.newton).x
-            elif label == "LP":
-                better = self._fold_again(system, x, carry(trial.tangent))
-            else:
-                row = system.weights * carry(trial.tangent)
-                if label in ("EP", "UZ"):  # most end at a value of the primary parameter: hold it
-                    row = np.zeros(system.size)
-                    row[system.parameter_index(self.primary)] = 1.0
-                better = correct(system, x, row, row @ x, self.settings.newton).x
-        except ConvergenceError:
-            return {name: np.nan for name in system.free}
-        return {name: abs(float(a - b)) for name, a, b in zip(system.free, better[system.state_size :], x[system.state_size :])}
+    def _refined(self, label, trial: Trial, details):
+        """The same special point on a mesh halved until its free parameters agree to the mesh tolerance.
 
-    def _fold_again(self, system, x, tangent):
+        Returns the last solution, by how much its parameters differ from the one before, and its details.
+        """
+        errors = dict.fromkeys(trial.system.free, np.nan)
+        for _ in range(4):
+            coarse = trial.system
+            system, carry = coarse.on_mesh(np.sort(np.append(coarse.mesh, (coarse.mesh[1:] + coarse.mesh[:-1]) / 2)))
+            tangent = carry(trial.tangent)
+            try:
+                if label == "BP" or not np.all(np.isfinite(tangent)):
+                    details = locate_branch_point(system, carry(trial.x), self.settings.newton)
+                    better = Trial(system, details.x, tangent, np.nan)
+                elif label == "LP":
+                    better = self._fold_again(system, carry(trial.x), tangent)
+                else:
+                    better = self._held(system, carry(trial.x), tangent)
+            except ConvergenceError:
+                break
+            steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
+            steps = np.maximum(steps, 16 * np.finfo(float).eps * (1 + np.abs(better.x[system.state_size :]).max()))
+            errors, trial = dict(zip(system.free, map(float, steps))), better
+            if np.all(steps <= self.settings.mesh.tolerance * (1 + np.abs(trial.x[system.state_size :]))):
+                break
+        return trial, errors, details
+
+    def _held(self, system, x, tangent) -> Trial:
+        """The point near x with the same primary parameter, on another mesh."""
+        row = np.zeros(system.size)
+        row[system.parameter_index(self.primary)] = 1.0
+        done = correct(system, x, row, row @ x, self.settings.newton)
+        return Trial(system, done.x, tangent / np.sqrt(inner(system, tangent, tangent)), np.nan, done.iterations, done.error)
+
+    def _fold_again(self, system, x, tangent) -> Trial:
         """The fold near x on another mesh, by the secant method along the tangent."""
         tangent = tangent / np.sqrt(inner(system, tangent, tangent))
         state = State(system, x, tangent, None, 1.0, 1.0, 1.0, 0.0, 0, False)
@@ -470,7 +496,7 @@ class Continuation:
             if len(points) > 1:
                 f0, f1 = points[-2].tangent[at], points[-1].tangent[at]
                 if f1 == f0 or abs(s[-1] - s[-2]) < 1e-9:
-                    return trial.x
+                    return trial
                 s.append(s[-1] - f1 * (s[-1] - s[-2]) / (f1 - f0))
         raise ConvergenceError("the fold was not found again on the finer mesh")
 

@@ -26,8 +26,8 @@ class Point:
         The discretized problem of this point.
     arclength : float
         Distance travelled from the branch's first point, in the weighted norm.
-    iterations, residual : int, float
-        Newton iterations taken, and the largest residual they ended with.
+    iterations, newton_error : int, float
+        Newton iterations taken, and the estimated error that they left (the largest, relative to 1 + |x|).
     errors : mapping of str to float
         Estimated discretization error of the free parameters, where it was asked for.
     details : object
@@ -43,7 +43,7 @@ class Point:
     system: object
     arclength: float
     iterations: int
-    residual: float
+    newton_error: float
     errors: Mapping[str, float] = field(default_factory=dict)
     details: object = None
 

@@ -93,9 +93,13 @@ def assemble(value, slope, weights, h, jacobian, n, columns, rows, local, border
     c, r = columns.shape[0], rows.shape[0]
     inner = n * (d - 1)
     size = (intervals * d + 1) * n
-    corner[:, :] = 0.0
-    border[:, :, :] = 0.0
+    for q in range(n_int + r):
+        for b in range(k + c):
+            corner[q, b] = rows[q - n_int, size + b] if q >= n_int else 0.0
     for j in range(intervals):
+        for q in range(n_int + r):
+            for b in range(border.shape[2]):
+                border[j, q, b] = 0.0
         for i in range(d):
             point = jacobian[j * d + i]
             for node in range(d + 1):
@@ -121,8 +125,6 @@ def assemble(value, slope, weights, h, jacobian, n, columns, rows, local, border
                 start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
                 for b in range(n):
                     border[j, n_int + q, start + b] = rows[q, (j * d + node) * n + b]
-    for q in range(r):
-        corner[n_int + q, :] = rows[q, size:]
     tail = columns.shape[1] - n_int
     for b in range(c):
         for q in range(n_int):
@@ -278,9 +280,7 @@ class Collocation:
 
     def on_mesh(self, mesh):
         """The same problem on another mesh, and a function that carries vectors of unknowns over to it."""
-        other = Collocation(
-            self.problem, mesh, self.degree, self.free, dict(zip(self.problem.parameters, self.parameters))
-        )
+        other = Collocation(self.problem, mesh, self.degree, self.free, dict(zip(self.problem.parameters, self.parameters)))
         nodes = other.nodes
 
         def carry(x):

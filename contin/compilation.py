@@ -290,9 +290,7 @@ class Batch:
             12, "complex128", lambda text, slot: f"complex({text}, seed[{slot}])",
             lambda row, r: f"jac[i, {row}, column] = complex({r}).imag / STEP",
         )  # fmt: skip
-        return _TEMPLATE.format(
-            states=self.states, parameters=self.parameters, n=n, nv=nv, k=k, real=real, complex=step
-        )
+        return _TEMPLATE.format(states=self.states, parameters=self.parameters, n=n, nv=nv, k=k, real=real, complex=step)
 
     def values(self, t, u, v, p):
         """Values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""

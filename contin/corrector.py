@@ -28,12 +28,12 @@ class Newton:
 
 @dataclass(frozen=True)
 class Corrected:
-    """A corrected x, the last factorization (taken one Newton step before x or nearer), and how it went."""
+    """A corrected x, the last factorization (taken one Newton step before x or nearer), and the estimated error left."""
 
     x: np.ndarray
     factors: object
     iterations: int
-    residual: float
+    error: float
 
 
 #: After an update below this the factorization is kept (chord steps gain at least as much a step as this is small).
@@ -78,7 +78,7 @@ def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), fact
             x = x - update
             rate = _rate(history, fresh)
             if size * rate <= newton.tolerance or (size < _ROUND_OFF and len(history) > 1 and rate >= 0.5):
-                return Corrected(x, factors, len(history), float(np.max(np.abs(full))))
+                return Corrected(x, factors, len(history), size * rate)
             if len(history) > 2 and size > 2 * history[-2] > _ROUND_OFF:
                 break
             if size > _CHORD or rate > 0.2:

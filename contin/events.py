@@ -35,9 +35,9 @@ class Monitor:
 class Trial:
     """A corrected point as monitors see it: ``trial["mu"]``, ``trial.tangent``, ``trial.sign`` (of the determinant)."""
 
-    def __init__(self, system, x, tangent, sign, iterations=0, residual=0.0):
+    def __init__(self, system, x, tangent, sign, iterations=0, newton_error=0.0):
         self.system, self.x, self.tangent, self.sign = system, x, tangent, sign
-        self.iterations, self.residual = iterations, residual
+        self.iterations, self.newton_error = iterations, newton_error
         self._functionals = None
 
     @property

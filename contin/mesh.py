@@ -17,7 +17,7 @@ class MeshControl:
     ----------
     tolerance : float
         Wanted error at the mesh points. Collocation is superconvergent there, h^(2 d), while the monitor sees the error
-        h^(d+1) between them; so that one is kept below a tenth of tolerance^((d+1)/(2 d)).
+        h^(d+1) between them; so that one is kept below 0.03 tolerance^((d+1)/(2 d)).
     min_intervals, max_intervals : int
         Bounds on the number of intervals N.
     every : int
@@ -69,7 +69,7 @@ def adapted_mesh(system, x, control: MeshControl):
     phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
     phi = np.maximum(phi, 0.1 * (phi @ h) / h.sum())
     total = phi @ h
-    allowed = (0.1 * control.tolerance ** ((d + 1) / (2 * d)) / system.basis.constant) ** (1 / (d + 1))
+    allowed = (0.03 * control.tolerance ** ((d + 1) / (2 * d)) / system.basis.constant) ** (1 / (d + 1))
     wanted = int(np.clip(np.ceil(total / allowed), control.min_intervals, control.max_intervals))
     enough = wanted <= h.size <= max(1.6 * wanted, control.min_intervals)
     if enough and (phi * h).max() <= 1.5 * max(total / h.size, allowed * wanted / h.size):

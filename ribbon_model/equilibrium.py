@@ -45,7 +45,7 @@ class Domain:
         states = [np.cos(half_angle), np.sin(half_angle), zero, zero]
         if "x1" in self.problem.states:
             states += [zero, (np.cos(2 * half_angle) - 1) / m, np.sin(2 * half_angle) / m]
-        values = {name: 0.0 for name in self.free} | {"kappa_n": kappa_n, "M1": m - kappa_n}
+        values = dict.fromkeys(self.free, 0.0) | {"kappa_n": kappa_n, "M1": m - kappa_n}
         return system.pack(np.array(states).T, values)
 
 

@@ -31,17 +31,17 @@ import numpy as np
 _SPACING, _TAIL = 1 / 6, 38.0
 _IMAGINARY_STEP = 1e-30
 _HOMOCLINIC = -300.0  # log(q)/2 at which the follower stops, before q underflows
-_SHORTEST_STEP, _MOST_STEPS = 1e-7, 20_000
+_SHORTEST_STEP = 1e-7
 
 
 @dataclass(frozen=True)
 class ExactPoint:
     """One equilibrium on the primary branch (m, n) (B = 1, L = 2 pi).
 
-    `kappa_star` is (28); `c` = omega_1 (1 + eta**2); `eta_max_squared` and `q` are A and q above (q is kept because the
-    subtraction loses it when small); the moment is `mu` e_z, e_z being the axis about which the centreline turns m times;
-    `energy` is (7) divided by L. `label`: 'BP' a circle, 'LP' a fold of kappa_n, 'EP' a limit of kappa_n, 'MX' too close to
-    a homoclinic orbit to go on, '' otherwise.
+    `kappa_star` is (28), `c` = omega_1 (1 + eta**2), `eta_max_squared` and `q` are A and q above (q is kept because the
+    subtraction would lose a small one), the moment is `mu` e_z with e_z the axis about which the centreline turns m
+    times, `energy` is (7) divided by L. `label` is 'BP' on a circle, 'LP' at a fold of kappa_n, 'EP' at a limit of
+    kappa_n, 'MX' where the branch is too close to a homoclinic orbit to go on, '' elsewhere.
     """
 
     m: int
@@ -60,17 +60,18 @@ class ExactPoint:
 def bifurcation(m, n, nu):
     """kappa_n = m K^{m,n} at which the branch leaves the m-covered circle, eq. (27), regular at nu = 0.
 
-    Raises ValueError if (m, n) is no buckling mode or nu is outside (-1, 1), and ZeroDivisionError if the branch starts at
-    infinite kappa_n (some nu < 0).
+    Raises ValueError if (m, n) is no buckling mode or nu is outside (-1, 1), and ZeroDivisionError if the branch starts
+    at infinite kappa_n (some nu < 0).
     """
-    _check(m, n, nu)
+    _check_mode(m, n, nu)
     return m * (2 * n**2 - m**2) / (m**2 + 2 * nu * (n**2 - m**2))  # (27) with the common factor nu cancelled
 
 
 def residuals(c, A, kappa_n, m, n, nu):
     """Defects of closure of a quarter wave: shape (2,), length minus pi/2n, azimuth minus pi m/2n in [-pi/2, pi/2].
 
-    Raises ValueError as `bifurcation`, and if A < 0, c = nu kappa_n or q <= 0 (eta would not oscillate through zero).
+    Raises ValueError as `bifurcation`, if m is a multiple of 2n (the centreline would stay open), and if A < 0,
+    c = nu kappa_n or q <= 0 (eta would not oscillate through zero).
     """
     _check(m, n, nu)
     azimuth, mean, mean_squared, _ = _quadratures(np.float64(A), _q(c, A, kappa_n, nu))
@@ -131,10 +132,11 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05):
     Raises
     ------
     ValueError
-        As `bifurcation`, or if the branch starts outside `kappa_limits`.
+        As `bifurcation`, if m is a multiple of 2n, or if the branch starts outside `kappa_limits`.
     RuntimeError
         If the follower cannot proceed.
     """
+    _check(m, n, nu)
     start, (lowest, highest) = bifurcation(m, n, nu), kappa_limits
     if not lowest <= start <= highest:
         raise ValueError(f"branch ({m}, {n}) starts at kappa_n = {start:.6g}, outside {tuple(kappa_limits)}")
@@ -149,16 +151,17 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05):
 
     points = [_point(_circle(m, n), m, n, nu, "BP")]
     for line, length, ahead in _segments(m, n, step):
-        stops = [(length, "MX" if ahead[1] < _HOMOCLINIC else "")]
+        stops = [(length, ahead, "MX" if ahead[1] < _HOMOCLINIC else "")]
         if turning(line(0.0)) * turning(ahead) < 0:
-            stops.insert(0, (_root(turning, line, 0.0, length), "LP"))
+            fold = _root(turning, line, 0.0, length)
+            stops.insert(0, (fold, line(fold), "LP"))
         last = 0.0
-        for s, label in stops:
-            if room(line(s)) < 0:
-                return [*points, _point(line(_root(room, line, last, s)), m, n, nu, "EP")]
-            if line(s)[0] < 0:
+        for s, z, label in stops:
+            if z[0] < 0 and room(_circle(2 * n - m, n)) >= 0:
                 return [*points, _point(_circle(2 * n - m, n), m, n, nu, "BP")]
-            points.append(_point(line(s), m, n, nu, label))
+            if room(z) < 0:
+                return [*points, _point(line(_root(room, line, last, s)), m, n, nu, "EP")]
+            points.append(_point(z, m, n, nu, label))
             last = s
     return points
 
@@ -169,18 +172,24 @@ def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0)):
 
 
 def end(m, n, nu):
-    """(covering index, kappa_n) of the circle where the branch ends, or None. Raises as `bifurcation`.
+    """(covering index, kappa_n) of the circle where the branch ends, or None. Raises as `curve`.
 
-    None if the branch never returns to a circle (2n - m <= 0), or has infinite kappa_n somewhere on the way.
+    None if the branch never returns to a circle (2n < m), or has infinite kappa_n somewhere on the way.
     """
     _check(m, n, nu)
-    if 2 * n - m <= 0:
+    if 2 * n < m:
         return None
     signs = {np.sign(_along(ahead, m, n, nu)[2][0]) for _, _, ahead in _segments(m, n, 0.05)}
     return (2 * n - m, bifurcation(2 * n - m, n, nu)) if len(signs) == 1 else None
 
 
 def _check(m, n, nu):
+    _check_mode(m, n, nu)
+    if m % (2 * n) == 0:  # every two-fold axis then lies in the mirror plane: the mean of d_3 normal to it is free
+        raise ValueError(f"branch ({m}, {n}) does not close with R = 0, because m is a multiple of 2n")
+
+
+def _check_mode(m, n, nu):
     if min(m, n) < 1 or m == n:
         raise ValueError(f"(m, n) = ({m}, {n}) is no buckling mode: need m, n >= 1 and n != m (a rigid motion)")
     if not -1 < nu < 1:
@@ -276,20 +285,18 @@ def _segments(m, n, step):
     z = _circle(m, n)
     tangent = _tangent(z, m, n)
     tangent, length = tangent * np.sign(tangent[0]), step / 10  # A grows from 0
-    for _ in range(_MOST_STEPS):
+    while length > _SHORTEST_STEP:
         ahead = _correct(z + length * tangent, tangent, m, n)
         turned = tangent if ahead is None else _tangent(ahead, m, n)
         cosine = turned @ tangent
         if ahead is None or abs(cosine) < 0.985:
             length /= 2
-            if length < _SHORTEST_STEP:
-                raise RuntimeError(f"branch ({m}, {n}) lost near A = {np.expm1(z[0]):.6g}")
             continue
         yield lambda s, z=z, tangent=tangent: _correct(z + s * tangent, tangent, m, n), length, ahead
         if ahead[0] < 0 or ahead[1] < _HOMOCLINIC:
             return
         z, tangent, length = ahead, turned * np.sign(cosine), min(1.5 * length, step)
-    raise RuntimeError(f"branch ({m}, {n}) is longer than {_MOST_STEPS} steps: take a larger step")
+    raise RuntimeError(f"branch ({m}, {n}) lost near A = {np.expm1(z[0]):.6g}, q = {np.exp(2 * z[1]):.6g}")
 
 
 def _root(function, line, lower, upper):

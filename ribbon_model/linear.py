@@ -16,14 +16,15 @@ def thresholds(law: Law, m: int, n: int, nu: float) -> tuple[float, ...]:
     Raises
     ------
     ValueError
-        n = m, a rigid rotation; or no finite value (t of the ribbon vanishes for this mode).
+        n = m, a rigid rotation; or, for nu < 0, a mode whose threshold lies beyond kappa_n = m / nu, where the ribbon's
+        tangent twisting modulus t = 2 (1 - nu K) is not positive and the law's regular root ends.
     """
     if n == m:
         raise ValueError(f"n = m = {m} is a rigid rotation, not a bifurcation")
     s = (n / m) ** 2 - 1
     if law is RIBBON:  # 1 - K = -2 (1 - nu K) s
-        if 1 + 2 * nu * s == 0:
-            raise ValueError(f"m = {m}, n = {n}, nu = {nu:g}: the mode has no finite threshold")
+        if 1 + 2 * nu * s <= 0:  # 1 - nu K = (1 - nu) / (1 + 2 nu s) is the tangent twisting modulus over 2
+            raise ValueError(f"m = {m}, n = {n}, nu = {nu:g}: no threshold where the ribbon's twisting modulus is positive")
         return (m * (1 + 2 * s) / (1 + 2 * nu * s),)
     if law is FLAT_ROD:
         return (m * (1 + 2 * s / (1 + nu)),)

@@ -1,0 +1,61 @@
+"""Reading a branch file back: tables, and the solution of a point as a shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from branches.store import open_branch
+from ribbon_model.laws import LAWS
+from ribbon_model.shape import Shape, closed_strip
+
+
+@dataclass(frozen=True)
+class StoredBranch:
+    """A branch file in memory: the scene, the tables of points and events (structured arrays), the kept solutions."""
+
+    config: dict
+    status: str
+    stop: str
+    points: np.ndarray
+    events: np.ndarray
+    index: np.ndarray
+    t: np.ndarray
+    states: np.ndarray
+
+    def kept(self) -> np.ndarray:
+        """Numbers of the points whose full solution is kept."""
+        return self.index["point"]
+
+    def solution(self, point: int) -> tuple[np.ndarray, np.ndarray, int, dict[str, float]]:
+        """Nodes t (K,), states (K, n), degree and parameters of a kept point."""
+        row = self.index[np.flatnonzero(self.index["point"] == point)[0]]
+        here = slice(row["start"], row["start"] + row["count"])
+        names = [name for name in self.points.dtype.names if self.points.dtype[name].kind == "f"]
+        return self.t[here], self.states[here], int(row["degree"]), {name: float(self.points[point][name]) for name in names}
+
+    def shape(self, point: int) -> Shape:
+        """The closed strip at a kept point."""
+        t, states, degree, parameters = self.solution(point)
+        return closed_strip(LAWS[self.config["law"]], t, states, degree, parameters)
+
+
+def read_branch(path: str | Path) -> StoredBranch:
+    """The branch in a file.
+
+    Raises
+    ------
+    StoreError
+        See :func:`branches.store.open_branch`.
+    """
+    from branches.config import parse
+
+    with open_branch(Path(path)) as file:
+        solutions = file["solutions"]
+        config = parse(file.attrs["config"], str(path)).model_dump()
+        return StoredBranch(
+            config, file.attrs["status"], file.attrs["stop"], file["points"][:], file["events"][:],
+            solutions["index"][:], solutions["t"][:], solutions["states"][:],
+        )  # fmt: skip

@@ -1,0 +1,300 @@
+"""Branches in HDF5: rows appended as a run goes, the file on disk replaced whole so that it is valid at any instant.
+
+The layout is described in docs/file-format.md. The file grows in memory; a checkpoint writes its image beside the final name
+and renames it, so a killed run, a full disk or a power cut leave the last checkpoint, never half a file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import platform
+import tempfile
+import time
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from contin import Collocation, Point, State, Stop
+
+FORMAT = "ribbon continuation branch"
+FORMAT_VERSION = 1
+
+#: Columns of /points and /events that are not parameters or functionals: name, type, meaning.
+_BOOKKEEPING = (
+    ("point", "i4", "running number of the point along the branch, labelled points included"),
+    ("label", "S2", "AUTO's label: BP branch point, LP fold, UZ user value, EP end, MX failed; empty for a regular point"),
+    ("arclength", "f8", "distance from the first point in the continuation norm"),
+    ("intervals", "i4", "mesh intervals N of this point's solution"),
+    ("iterations", "i4", "Newton iterations"),
+    ("newton_error", "f8", "estimated relative error left by Newton's method"),
+)
+MEANINGS = {
+    "kappa_n": "natural curvature kappa_n L / 2 pi (dimensionless)",
+    "kappa_star": "conjugate curvature of equation (28), mean of dH/dkappa_n (dimensionless)",
+    "energy": "strain energy / (2 pi B / L), without the constant kappa_n^2 / 2",
+    "nu": "Poisson's ratio",
+    "M1": "moment about d1 at S = 0, in units of B 2 pi / L",
+    "M2": "moment about d2 at S = 0; zero on a planar circle",
+    "M3": "moment about d3 at S = 0",
+    "R1": "force along d1 at S = 0, in units of B (2 pi / L)^2",
+    "R2": "force along d2 at S = 0",
+    "R3": "force along d3 at S = 0",
+    "length": "length of the domain, in units of L / 2 pi",
+    "turn": "angle by which d2 turns about the moment over the cell",
+    "sense": "sign of the moment on the circle",
+    "unfold": "unfolding parameter of closure, zero",
+}  # fmt: skip
+
+
+class StoreError(Exception):
+    """A result file that cannot be written or read; the message is one sentence."""
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything a result depends on."""
+    result = {"python": platform.python_version()}
+    for package in ("ribbon-continuation", "numpy", "numba", "h5py"):
+        with contextlib.suppress(PackageNotFoundError):
+            result[package] = version(package)
+    return result
+
+
+class BranchWriter:
+    """One branch on its way to disk.
+
+    Parameters
+    ----------
+    path : Path
+        The final name. It is replaced at every checkpoint.
+    config_text : str
+        The scene, as text.
+    problem : BoundaryValueProblem
+        Gives the names of columns.
+    free : sequence of str
+        Free parameters.
+    resume : bytes, optional
+        The image of an unfinished file to go on with.
+    """
+
+    #: Seconds between checkpoints while a run goes.
+    INTERVAL = 0.5
+
+    def __init__(self, path: Path, config_text: str, problem, free, stride: int, resume: bytes | None = None):
+        self.path, self._stride, self._free = Path(path), stride, tuple(free)
+        self._buffer: list[tuple[Point, int]] = []
+        self._file = h5py.File.in_memory(resume)
+        if resume is None:
+            self._create(config_text, problem)
+            self.count = 0
+        else:
+            self.count = self._rewind()
+        self._saved = time.monotonic()
+        self._spent = 0.0
+
+    def _create(self, config_text, problem):
+        file, free = self._file, self._free
+        file.attrs.update({
+            "format": FORMAT, "format_version": FORMAT_VERSION, "config": config_text, "status": "running", "stop": "",
+            "stop_reason": "", "units": "bending modulus B = 1, length L = 2 pi", "platform": platform.platform(),
+            "versions": json.dumps(versions()), "states": list(problem.states), "free_parameters": list(free),
+        })  # fmt: skip
+        values = [(name, "f8", MEANINGS.get(name, name)) for name in (*problem.parameters, *problem.functionals)]
+        errors = [(f"error_{name}", "f8", f"estimated discretization error of {name}") for name in free]
+        named = [("name", "S32", "what the label refers to")]
+        self._columns = {"points": (*_BOOKKEEPING, *values), "events": (*_BOOKKEEPING, *named, *values, *errors)}
+        for table, columns in self._columns.items():
+            kind = np.dtype([(name, kind) for name, kind, _ in columns])
+            data = file.create_dataset(table, (0,), kind, maxshape=(None,), chunks=(256,))
+            for name, _, meaning in columns:
+                data.attrs[name] = meaning
+        group = file.create_group("solutions")
+        kind = np.dtype([("point", "i4"), ("start", "i8"), ("count", "i4"), ("degree", "i4")])
+        index = group.create_dataset("index", (0,), kind, maxshape=(None,), chunks=(256,))
+        index.attrs["meaning"] = "rows start:start+count of t and states are the nodes of this point's solution"
+        t = group.create_dataset("t", (0,), "f8", maxshape=(None,), chunks=(1024,))
+        t.attrs["meaning"] = "nodes on the unit interval, arc length S = length * t; every degree-th is a mesh point"
+        n = len(problem.states)
+        states = group.create_dataset("states", (0, n), "f8", maxshape=(None, n), chunks=(1024, n))
+        states.attrs["meaning"] = "unit quaternion of the directors (q0 scalar), then the centreline where it is a state"
+        states.attrs["columns"] = list(problem.states)
+
+    # --- while the run goes --------------------------------------------------------------------------------------
+
+    def append(self, point: Point) -> None:
+        """Take one more point; it reaches the disk with the next checkpoint."""
+        self._buffer.append((point, self.count))
+        self.count += 1
+
+    def due(self) -> bool:
+        """Whether it is time for a checkpoint: every half second, and never more than a tenth of the run's time."""
+        return time.monotonic() - self._saved > max(self.INTERVAL, 10 * self._spent)
+
+    def checkpoint(self, state: State | None, start, stop: Stop | None = None, status: str = "running") -> None:
+        """Write everything so far, and what a resumed run starts from.
+
+        Raises
+        ------
+        StoreError
+            The file cannot be written; the one on disk is as it was.
+        """
+        began = time.monotonic()
+        self._flush()
+        self._file.attrs["status"] = status
+        self._file.attrs["stop"] = str(stop or "")
+        self._file.attrs["stop_reason"] = stop.reason if stop else ""
+        if state is not None:
+            self._write_state(state, start)
+        self._file.flush()
+        _replace(self.path, self._file.id.get_file_image())
+        self._saved = time.monotonic()
+        self._spent = self._saved - began
+
+    def _flush(self):
+        points = [self._row("points", point, number) for point, number in self._buffer]
+        events = [self._row("events", point, number) for point, number in self._buffer if point.label]
+        _extend(self._file["points"], points)
+        _extend(self._file["events"], events)
+        kept = [(p, i) for p, i in self._buffer if p.label or i % self._stride == 0]
+        if kept:
+            group, rows = self._file["solutions"], []
+            start = len(group["t"])
+            for point, number in kept:
+                count = len(point.system.nodes)
+                rows.append((number, start, count, point.system.degree))
+                start += count
+            _extend(group["index"], rows)
+            _extend(group["t"], np.concatenate([point.system.nodes for point, _ in kept]))
+            _extend(group["states"], np.concatenate([point.system.states(point.x) for point, _ in kept]))
+        self._buffer.clear()
+
+    def _row(self, table: str, point: Point, number: int) -> tuple:
+        values = {
+            **point.parameters, **point.functionals, "point": number, "label": point.label.encode(),
+            "name": point.name.encode(), "arclength": point.arclength, "intervals": point.system.intervals,
+            "iterations": point.iterations, "newton_error": point.newton_error,
+            **{f"error_{name}": point.errors.get(name, np.nan) for name in self._free},
+        }  # fmt: skip
+        return tuple(values[name] for name in self._file[table].dtype.names)
+
+    # --- what a resumed run needs --------------------------------------------------------------------------------
+
+    def _write_state(self, state: State, start):
+        if "resume" in self._file:
+            del self._file["resume"]
+        group = self._file.create_group("resume")
+        group.attrs["meaning"] = "the state of the run after its last regular point, for --resume"
+        for name in ("previous_step", "step", "sign", "arclength", "accepted", "singular"):
+            group.attrs[name] = getattr(state, name)
+        counts = {"points": len(self._file["points"]), "events": len(self._file["events"])}
+        counts |= {name: len(self._file["solutions"][name]) for name in ("index", "t")}
+        group.attrs["rows"] = json.dumps(counts)
+        here = {"x": state.x, "tangent": state.tangent, "previous": state.previous_tangent}
+        _write_vectors(group.create_group("here"), state.system, **here)
+        _write_vectors(group.create_group("start"), start[0], x=start[1], tangent=start[2])
+
+    def _rewind(self) -> int:
+        """Cut the tables back to the rows that the saved state follows; the number of points kept."""
+        rows = json.loads(self._file["resume"].attrs["rows"])
+        for table in ("points", "events"):
+            self._file[table].resize(rows[table], axis=0)
+        for table, name in (("index", "index"), ("t", "t"), ("states", "t")):
+            self._file["solutions"][table].resize(rows[name], axis=0)
+        return rows["points"]
+
+    def close(self) -> None:
+        """Release the memory."""
+        self._file.close()
+
+
+def _write_vectors(group, system, **vectors):
+    group.create_dataset("mesh", data=system.mesh)
+    group.create_dataset("parameters", data=system.parameters)
+    group.attrs["degree"] = system.degree
+    for name, vector in vectors.items():
+        if vector is not None:
+            group.create_dataset(name, data=vector)
+
+
+def _read_vectors(group, problem, free):
+    parameters = dict(zip(problem.parameters, group["parameters"][:]))
+    system = Collocation(problem, group["mesh"][:], int(group.attrs["degree"]), free, parameters)
+    return system, {name: group[name][:] for name in ("x", "tangent", "previous") if name in group}
+
+
+def _extend(dataset, rows):
+    if len(rows):
+        start = len(dataset)
+        dataset.resize(start + len(rows), axis=0)
+        dataset[start:] = rows if isinstance(rows, np.ndarray) else np.array(rows, dtype=dataset.dtype)
+
+
+def _replace(path: Path, image: bytes) -> None:
+    """Put a whole file in place of ``path``, or leave it untouched."""
+    temporary = None
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            file.write(image)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                os.unlink(temporary)
+        raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
+
+
+def _umask() -> int:
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
+
+
+@contextlib.contextmanager
+def open_branch(path: Path):
+    """The open HDF5 file of a branch, for reading.
+
+    Raises
+    ------
+    StoreError
+        Not there, not HDF5, or not a branch that this version reads.
+    """
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        reason = "there is no such file" if not Path(path).exists() else "it is not a readable HDF5 file"
+        raise StoreError(f"cannot read {str(path)!r}: {reason}") from error
+    with file:
+        if file.attrs.get("format") != FORMAT or "points" not in file:
+            raise StoreError(f"cannot read {str(path)!r}: it is not a branch written by this program")
+        if file.attrs["format_version"] != FORMAT_VERSION:
+            raise StoreError(f"cannot read {str(path)!r}: its format is {file.attrs['format_version']}, not {FORMAT_VERSION}")
+        yield file
+
+
+def read_state(path: Path, problem, free):
+    """The saved state of a run, its first point (system, x, tangent), and the file's image.
+
+    Raises
+    ------
+    StoreError
+        The file holds no state to go on from.
+    """
+    with open_branch(path) as file:
+        if "resume" not in file:
+            raise StoreError(f"{str(path)!r} holds nothing to resume; run it again without --resume")
+        group = file["resume"]
+        system, here = _read_vectors(group["here"], problem, free)
+        first, start = _read_vectors(group["start"], problem, free)
+        a = group.attrs
+        state = State(
+            system, here["x"], here["tangent"], here.get("previous"), float(a["previous_step"]), float(a["step"]),
+            float(a["sign"]), float(a["arclength"]), int(a["accepted"]), bool(a["singular"]),
+        )  # fmt: skip
+    return state, (first, start["x"], start["tangent"]), Path(path).read_bytes()
