@@ -151,9 +151,9 @@ class Continuation:
 
     def __init__(self, system, x, settings: Settings = Settings(), tangent=None, state: State | None = None, start=None):
         self.settings = settings
-        self.primary = settings.primary or system.free[0]
         self.stop: Stop | None = None
         self._check(system)
+        self.primary = settings.primary or system.free[0]
         self._monitors = self._all_monitors()
         self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
         self._resumed = state is not None
@@ -165,8 +165,9 @@ class Continuation:
                 f"free parameters: {len(system.free)} given ({', '.join(system.free)}), a curve of this problem needs "
                 f"{system.problem.free_size} (conditions - states + 1)"
             )
-        if self.primary not in system.free:
-            raise ProblemError(f"primary: {self.primary!r} is not one of the free parameters {', '.join(system.free)}")
+        primary = self.settings.primary
+        if primary is not None and primary not in system.free:
+            raise ProblemError(f"primary: {primary!r} is not one of the free parameters {', '.join(system.free)}")
         known = (*system.problem.parameters, *system.problem.functionals)
         trivial = () if self.settings.trivial is None else (self.settings.trivial,)
         for name in (*self.settings.limits, *self.settings.zeros, *trivial):
@@ -261,6 +262,8 @@ class Continuation:
             try:
                 guess = self._predict(state, step)
                 trial = self._trial(state, guess, step)
+                if not np.all(np.isfinite(state.system.residual(trial.x))):
+                    raise ConvergenceError("the equations are not finite at the corrected point")
                 gap = guess - trial.x
                 distance = np.sqrt(inner(state.system, gap, gap))
                 cosine = inner(state.system, trial.tangent, state.tangent)

@@ -75,9 +75,8 @@ def _analytic_min(a, b):
 
 
 def _analytic_atan2(y, x):
-    real = np.arctan2(y.real, x.real)
-    square = x.real * x.real + y.real * y.real
-    return real + 1j * ((x.real * y.imag - y.real * x.imag) / square)
+    a, b = x.real, y.real  # turned by the real angle, what is left is analytic
+    return np.arctan2(b, a) + np.arctan((y * a - x * b) / (x * a + y * b))
 
 
 #: What cannot be differentiated by a complex step as numpy defines it, and what replaces it.

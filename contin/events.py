@@ -81,6 +81,8 @@ def find_zero(function: Callable[[float], float], a, fa, b, fb, tolerance) -> fl
     ConvergenceError
         If 60 evaluations do not do (a jump, not a zero).
     """
+    if fb == 0:
+        return b
     last = b
     for _ in range(60):
         c = b - fb * (b - a) / (fb - fa)

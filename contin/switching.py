@@ -98,6 +98,8 @@ def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: in
                 continue
             if hessian is None:
                 hessian = _hessian(system, x, phi, psi, matrix.kernel)
+            if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(matrix.g))):
+                break
             # one Newton step for F + beta psi = 0 and, through its gradient g, for grad beta = 0
             correction = matrix.factors.solve(np.concatenate([matrix.residual + beta * psi, [0.0, 0.0]]))
             drop, *_ = np.linalg.lstsq(hessian, matrix.g, rcond=1e-9)
