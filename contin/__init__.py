@@ -1,5 +1,17 @@
-"""contin: continuation of solutions of boundary value problems, with folds, branch points and branch switching."""
+"""contin: continuation of solutions of boundary value problems, with folds, branch points and branch switching.
 
+    import contin
+
+    problem = contin.BoundaryValueProblem(
+        rhs=lambda t, u, p: (u.v, -p.lam * math.exp(u.u)), boundary=lambda a, b, p: (a.u, b.u),
+        states=["u", "v"], parameters={"lam": 0.0},
+    )
+    branch = contin.trace(contin.solve(problem, [0, 0]), free=["lam"], limits={"lam": (0, 4)})
+
+The tutorial is docs/contin.md.
+"""
+
+from contin.algebraic import Algebraic, AlgebraicProblem
 from contin.arclength import Continuation, Settings, State, follow
 from contin.branch import Branch, Point, Stop
 from contin.collocation import Collocation
@@ -8,10 +20,11 @@ from contin.errors import ContinError, ConvergenceError, ProblemError
 from contin.events import Monitor
 from contin.mesh import MeshControl
 from contin.problem import BoundaryValueProblem
-from contin.switching import BranchPoint, locate_branch_point
+from contin.solving import point_of, solve, trace
+from contin.switching import BranchPoint, MultiplePoint, locate_branch_point
 
 __all__ = [
-    "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError", "Continuation", "ConvergenceError",
-    "MeshControl", "Monitor", "Newton", "Point", "ProblemError", "Settings", "State", "Stop", "correct", "follow",
-    "locate_branch_point",
+    "Algebraic", "AlgebraicProblem", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
+    "Continuation", "ConvergenceError", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "ProblemError",
+    "Settings", "State", "Stop", "correct", "follow", "locate_branch_point", "point_of", "solve", "trace",
 ]  # fmt: skip

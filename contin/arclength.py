@@ -11,6 +11,7 @@ refine the mesh. The loop knows of a system only its interface (residual, linear
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,8 +22,11 @@ from contin.branch import Branch, Point, Stop
 from contin.corrector import Newton, correct
 from contin.errors import ConvergenceError, ProblemError
 from contin.events import Monitor, Trial, find_zero, fold, limit, sign_changed, user_zero
-from contin.mesh import MeshControl, adapted_mesh
-from contin.switching import inner, locate_branch_point
+from contin.mesh import MeshControl
+from contin.switching import MultiplePoint, along, crossings, inner, locate_branch_point, smallest_directions
+
+#: A step is cut down to this fraction of itself to take several branch points one by one, before they count as one.
+_FINEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -152,10 +156,11 @@ class Continuation:
     def __init__(self, system, x, settings: Settings = Settings(), tangent=None, state: State | None = None, start=None):
         self.settings = settings
         self.stop: Stop | None = None
+        self._factors = None  # of the state's point, to compare the next ones with
         self._check(system)
         self.primary = settings.primary or system.free[0]
-        self._monitors = self._all_monitors()
         self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
+        self._monitors = self._all_monitors()
         self._resumed = state is not None
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
@@ -179,7 +184,7 @@ class Continuation:
         monitors = [fold(self.primary)] if settings.folds else []
         monitors += [user_zero(name, value) for name, values in settings.zeros.items() for value in values]
         monitors += [limit(name, value) for name, values in settings.limits.items() for value in values]
-        return [*monitors, *settings.monitors]
+        return [*monitors, *self.state.system.monitors(), *settings.monitors]
 
     # --- the first point -----------------------------------------------------------------------------------------
 
@@ -193,10 +198,10 @@ class Continuation:
         for _ in range(3):
             corrected = correct(system, x, row, row @ x, settings.newton)
             x = corrected.x
-            mesh = adapted_mesh(system, x, settings.mesh) if settings.mesh.every else None
-            if mesh is None:
+            adapted = system.adapted(x, settings.mesh)
+            if adapted is None:
                 break
-            system, carry = system.on_mesh(mesh)
+            system, carry = adapted
             x, row = carry(x), np.append(np.zeros(system.state_size), row[-len(system.free) :])
         tangent = self._tangent(system, x, row)
         tangent *= settings.direction * (np.sign(tangent[system.parameter_index(self.primary)]) or 1.0)
@@ -249,6 +254,7 @@ class Continuation:
                 self.stop = stop
                 return
         self.state = self._accept(state, trial, step, distance)
+        self._factors = (state.system, trial.factors)
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
         yield self._point("EP" if self.stop else "", "max points" if self.stop else "", trial, step, state)
@@ -258,6 +264,7 @@ class Continuation:
     def _step(self, state: State):
         """Predict and correct, halving the step until the corrected point can be believed."""
         step, settings = state.step, self.settings
+        finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
                 guess = self._predict(state, step)
@@ -268,13 +275,25 @@ class Continuation:
                 distance = np.sqrt(inner(state.system, gap, gap))
                 cosine = inner(state.system, trial.tangent, state.tangent)
                 if cosine >= np.cos(settings.angle) and distance <= 0.3 * step:
-                    return step, trial, distance
-                problem = ConvergenceError(f"tangents turn by {np.arccos(np.clip(cosine, -1, 1)):.2f} rad in one step")
+                    trial.passed = self._passed(state, trial)
+                    if step < 2 * finest or trial.passed < 2:
+                        return step, trial, distance
+                    problem = ConvergenceError("several branch points in one step")
+                else:
+                    problem = ConvergenceError(f"tangents turn by {np.arccos(np.clip(cosine, -1, 1)):.2f} rad in one step")
             except ConvergenceError as error:
                 problem = error
             step /= 2
             if step < settings.min_step:
                 raise problem
+
+    def _passed(self, state: State, trial: Trial) -> int:
+        """How many branch points the step passes, counted by singular values (the determinant sees the parity only)."""
+        if state.singular or not self.settings.branch_points:
+            return 0
+        if self._factors is None or self._factors[0] is not state.system:
+            self._factors = (state.system, state.system.linearize(state.x, (state.system.weights * state.tangent,))[1])
+        return crossings(self._factors[1], trial.factors, state.system.size)
 
     @staticmethod
     def _predict(state: State, step: float):
@@ -292,7 +311,7 @@ class Continuation:
         factors = system.linearize(done.x, (row,))[1] if exact else done.factors
         tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
         tangent /= np.sqrt(inner(system, tangent, tangent))
-        return Trial(system, done.x, tangent, factors.sign, done.iterations, done.error)
+        return Trial(system, done.x, tangent, factors.sign, done.iterations, done.error, factors)
 
     def _accept(self, state: State, trial: Trial, step: float, distance: float) -> State:
         """The next state, its step chosen so that the predictor's error is ``accuracy`` of it."""
@@ -314,10 +333,10 @@ class Continuation:
         control, state = self.settings.mesh, self.state
         if state.singular or not control.every or state.accepted % control.every:
             return
-        mesh = adapted_mesh(state.system, state.x, control)
-        if mesh is None:
+        adapted = state.system.adapted(state.x, control)
+        if adapted is None:
             return
-        system, carry = state.system.on_mesh(mesh)
+        system, carry = adapted
         tangent = carry(state.tangent)
         tangent /= np.sqrt(inner(system, tangent, tangent))
         previous = None if state.previous_tangent is None else carry(state.previous_tangent)
@@ -345,9 +364,13 @@ class Continuation:
                 found.append(home)
             elif self.settings.branch_points and sign_changed(state.sign, trial.sign):
                 found.append(self._branch_point(state, trial, step))
+            elif trial.passed > 1:
+                found.append(self._multiple_point(state, trial, step))
             for monitor in self._monitors:
                 if sign_changed(monitor.function(before), monitor.function(trial)):
                     event = self._locate(state, trial, step, monitor)
+                    if monitor.confirm is not None and not monitor.confirm(event.trial):
+                        continue
                     # where branches cross, a turn of the parameter is no fold of its own
                     if monitor.label != "LP" or all(np.max(np.abs(event.trial.x - f.trial.x)) > 1e-4 for f in found[:1]):
                         found.append(event)
@@ -383,7 +406,8 @@ class Continuation:
         stop = None
         if monitor.terminal:
             stop = Stop("limit", f"reached {monitor.name}") if monitor.label == "EP" else Stop("event", f"met {monitor.name}")
-        return _Event(at, monitor.label, name, there, stop)
+        details = None if monitor.describe is None else monitor.describe(there)
+        return _Event(at, monitor.label, name, there, stop, details)
 
     def _branch_point(self, state, trial, step):
         """The branch point inside a step, its bracket halved until the locator's answer lies inside it."""
@@ -394,6 +418,7 @@ class Continuation:
                 found = locate_branch_point(state.system, self._between(state, trial, step, middle), self.settings.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
                 off = found.x - self._between(state, trial, step, at)
+                found = along(state.system, found, trial.x - state.x)
                 if -1e-9 * step <= at <= step * (1 + 1e-9) and np.sqrt(inner(state.system, off, off)) < 0.1 * step:
                     there = Trial(state.system, found.x, np.full_like(found.x, np.nan), np.nan)
                     return _Event(at, "BP", "", there, details=found)
@@ -405,6 +430,32 @@ class Continuation:
                 break
             low, high = (middle, high) if sign == state.sign else (low, middle)
         return _Event(high, "BP", "possible", trial)
+
+    def _multiple_point(self, state, trial, step):
+        """Where two or more singular values pass zero together: the zero of their mean, with the kernel."""
+        system = state.system
+        right, left, _ = smallest_directions(trial.factors, system.size)
+
+        def mean(factors):
+            response = right.T @ np.array([factors.solve(w) for w in left.T]).T
+            values = np.linalg.eigvals(np.linalg.inv(response))
+            return float(np.sort_complex(values[np.argsort(np.abs(values))[:2]]).real.mean())
+
+        at, there = step, trial
+        with contextlib.suppress(ConvergenceError, np.linalg.LinAlgError):
+            ends = mean(self._factors[1]), mean(trial.factors)
+            if sign_changed(*ends):
+
+                def inside(s):
+                    return mean(self._at(state, trial, step, s).factors)
+
+                at = find_zero(inside, 0.0, ends[0], step, ends[1], 1e-9 * step)
+                there = self._at(state, trial, step, at)
+        right, _, response = smallest_directions(there.factors, system.size)
+        u, values, _ = np.linalg.svd(response)
+        dimension = max(2, int(np.count_nonzero(values > 1e-3 * values[0])))
+        kernel = (right @ u[:, :dimension]).T
+        return _Event(at, "BP", f"kernel of dimension {dimension}", there, details=MultiplePoint(dimension, kernel))
 
     def _returned(self, state, trial, step, before):
         """The end of a branch on the trivial one, where ``settings.trivial`` passes zero."""
@@ -427,7 +478,7 @@ class Continuation:
         if np.max(np.abs(p - q)) > 2 * step:
             return None
         if home is not state.system:
-            _, carry = home.on_mesh(state.system.mesh)
+            carry = home.carrier(state.system)
             x, tangent = carry(x), carry(tangent)
         gaps = [end - x for end in (state.x, trial.x)]
         passed = [inner(state.system, gap, tangent) for gap in gaps]
@@ -460,12 +511,17 @@ class Continuation:
         """
         errors = dict.fromkeys(trial.system.free, np.nan)
         for _ in range(4):
-            coarse = trial.system
-            system, carry = coarse.on_mesh(np.sort(np.append(coarse.mesh, (coarse.mesh[1:] + coarse.mesh[:-1]) / 2)))
+            coarse, refined = trial.system, trial.system.refined()
+            if refined is None:
+                return trial, dict.fromkeys(coarse.free, 0.0), details
+            system, carry = refined
             tangent = carry(trial.tangent)
             try:
+                if isinstance(details, MultiplePoint):
+                    return trial, errors, details
                 if label == "BP" or not np.all(np.isfinite(tangent)):
-                    details = locate_branch_point(system, carry(trial.x), self.settings.newton)
+                    found = locate_branch_point(system, carry(trial.x), self.settings.newton)
+                    details = along(system, found, carry(details.tangents[0])) if details and details.tangents else found
                     better = Trial(system, details.x, tangent, np.nan)
                 elif label == "LP":
                     better = self._fold_again(system, carry(trial.x), tangent)

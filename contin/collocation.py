@@ -15,6 +15,7 @@ from numba import njit
 
 from contin.condensation import Factorization
 from contin.errors import ProblemError
+from contin.mesh import MeshControl, adapted_mesh
 from contin.problem import BoundaryValueProblem
 
 DEGREES = range(2, 9)
@@ -244,15 +245,9 @@ class Collocation:
         boundary = self.problem.batch("boundary").values(_TIME, u[:1], u[-1:], p)
         return self._residual(x, u, field, boundary)
 
-    def linearize(self, x, rows=(), columns=()):
-        """Residual at x, and the factored matrix [[F_x, columns^T], [rows]].
-
-        ``rows`` (r, size + c) and ``columns`` (c, equations) make it square: size + c = equations + r. Equations of
-        the result are ordered [residual | rows], unknowns [x | multipliers of the columns].
-        """
+    def _blocks(self, x, rows, columns):
+        """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as :class:`Factorization` takes them."""
         problem, n, d, k = self.problem, self._n, self._d, len(self.free)
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
         p, u = self.all_parameters(x), self.states(x)
         points = self.at_gauss_points(x)
         field, jacobian = problem.batch("field").jacobian(self._times, points, _NONE(n), p, self._free)
@@ -267,8 +262,43 @@ class Collocation:
         bc = self.intervals * n * d
         at_boundary = columns[:, bc : bc + problem.boundary_size].T
         last = np.concatenate([ends[0, :, n:], at_boundary], axis=1)
-        factors = Factorization(local, border, corner, np.ascontiguousarray(ends[0, :, :n]), np.ascontiguousarray(last))
-        return self._residual(x, u, field, boundary), factors
+        first = np.ascontiguousarray(ends[0, :, :n])
+        return self._residual(x, u, field, boundary), (local, border, corner, first, np.ascontiguousarray(last))
+
+    def linearize(self, x, rows=(), columns=()):
+        """Residual at x, and the factored matrix [[F_x, columns^T], [rows]].
+
+        ``rows`` (r, size + c) and ``columns`` (c, equations) make it square: size + c = equations + r. Equations of
+        the result are ordered [residual | rows], unknowns [x | multipliers of the columns].
+        """
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        residual, blocks = self._blocks(x, rows, columns)
+        return residual, Factorization(*blocks)
+
+    def transposed_product(self, x, w):
+        """F_x^T w, shape (size,), for w (equations,)."""
+        n = self._n
+        _, (local, border, corner, first, last) = self._blocks(x, np.empty((0, self.size)), np.empty((0, self.equations)))
+        collocation = self.intervals * self._d * n
+        conditions = collocation + len(first)
+        inside = np.einsum("jr,jrc->jc", w[:collocation].reshape(self.intervals, -1), local)
+        inner = n * (self._d - 1)
+        inside[:, : inner + 2 * n] += np.einsum("q,jqc->jc", w[conditions:], border[:, :, : inner + 2 * n])
+        result = np.zeros(self.size)
+        states = result[: self.state_size]
+        by_interval = states[:-n].reshape(self.intervals, self._d * n)
+        by_interval[:, n:] = inside[:, :inner]
+        by_interval[:, :n] = inside[:, inner : inner + n]
+        states[n:].reshape(self.intervals, self._d * n)[:, -n:] += inside[:, inner + n : inner + 2 * n]
+        states[:n] += first.T @ w[collocation:conditions]
+        result[self.state_size - n :] += last.T @ w[collocation:conditions]
+        result[self.state_size :] += inside[:, inner + 2 * n :].sum(axis=0) + corner.T @ w[conditions:]
+        return result
+
+    def monitors(self):
+        """Events of this kind of problem beyond folds and branch points: none."""
+        return []
 
     def functionals(self, x):
         """Values of the problem's functionals, in their order, by the same quadrature."""
@@ -278,15 +308,33 @@ class Collocation:
         values = batch.values(self._times, self.at_gauss_points(x), _NONE(self._n), self.all_parameters(x))
         return (np.tile(self.basis.weights, self.intervals) * np.repeat(self._h, self._d)) @ values
 
-    def on_mesh(self, mesh):
-        """The same problem on another mesh, and a function that carries vectors of unknowns over to it."""
-        other = Collocation(self.problem, mesh, self.degree, self.free, dict(zip(self.problem.parameters, self.parameters)))
+    # --- meshes --------------------------------------------------------------------------------------------------
+
+    def carrier(self, other):
+        """The function that carries vectors of unknowns from this mesh to the mesh of another system."""
         nodes = other.nodes
+        return lambda x: np.concatenate([self.evaluate(x, nodes).ravel(), x[self.state_size :]])
 
-        def carry(x):
-            return np.concatenate([self.evaluate(x, nodes).ravel(), x[self.state_size :]])
+    def on_mesh(self, mesh):
+        """The same problem on another mesh, and the function that carries vectors of unknowns over to it."""
+        values = dict(zip(self.problem.parameters, self.parameters))
+        other = Collocation(self.problem, mesh, self.degree, self.free, values)
+        return other, self.carrier(other)
 
-        return other, carry
+    def refined(self):
+        """The same problem with every interval halved, and the carrier."""
+        return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
+
+    def adapted(self, x, control: MeshControl):
+        """The same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
+        mesh = adapted_mesh(self, x, control) if control.every else None
+        return None if mesh is None else self.on_mesh(mesh)
+
+    def with_free(self, free, x):
+        """The same problem with other free parameters (values from x), on the same mesh, and x for it."""
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        other = Collocation(self.problem, self.mesh, self.degree, free, values)
+        return other, other.pack(self.states(x), values)
 
 
 _TIME = np.zeros(1)

@@ -28,7 +28,11 @@ import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from contin._analytic import AnalyticCompiler
 from contin.errors import ProblemError
+
+#: Part of every fingerprint: changes when functions are compiled by other rules (the template has its own part).
+_RULES = 3
 
 _TEMPLATE = '''"""Generated; safe to delete."""
 from collections import namedtuple
@@ -131,7 +135,7 @@ class _Prepared:
                 globals_[name] = self._value(getattr(builtins, name), names)
         cells = [types.CellType(self._value(cell.cell_contents, names)) for cell in function.__closure__ or ()]
         copy = types.FunctionType(code, globals_, function.__name__, function.__defaults__, tuple(cells) or None)
-        self._done[function] = numba.njit(copy, error_model="numpy")
+        self._done[function] = numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler)
         return self._done[function]
 
     def _code(self, code: types.CodeType) -> set[str]:
@@ -246,14 +250,17 @@ class Batch:
         Number of values of each function; 0 stands for one number that is no tuple.
     states, parameters : tuple of str
         Names, in order.
+    times : bool
+        Whether the functions take t; ``f(u, p)`` without.
     """
 
-    def __init__(self, functions, counts, states, parameters, *, ends=False):
-        self.states, self.parameters, self.ends = tuple(states), tuple(parameters), ends
+    def __init__(self, functions, counts, states, parameters, *, ends=False, times=True):
+        self.states, self.parameters, self.ends, self.times = tuple(states), tuple(parameters), ends, times and not ends
         self.count = sum(max(count, 1) for count in counts)
-        fills = [argument_count(function) == 4 for function in functions]
+        expected = 2 + self.ends + self.times
+        fills = [argument_count(function) == expected + 1 for function in functions]
         prepared = _Prepared()
-        prepared.note(numba.__version__, np.__version__, sys.version)
+        prepared.note(_RULES, numba.__version__, np.__version__, sys.version)
         dispatchers = {f"function{i}": prepared.function(function) for i, function in enumerate(functions)}
         source = self._source(counts, fills)
         prepared.note(source)
@@ -273,7 +280,7 @@ class Batch:
             lines, row = [], 0
             for index, (count, fill) in enumerate(zip(counts, fills)):
                 wrap = (lambda name, text: f"np.array([{text}])") if fill else (lambda name, text: f"{name}({text})")
-                first = f"{wrap('U', u)}, {wrap('V', v)}" if self.ends else f"t[i], {wrap('U', u)}"
+                first = ("t[i], " if self.times else "") + wrap("U", u) + (f", {wrap('V', v)}" if self.ends else "")
                 if fill:
                     lines.append(f"r = np.zeros({count}, np.{dtype})")
                     lines.append(f"function{index}({first}, {wrap('P', p)}, r)")
@@ -338,7 +345,7 @@ def _explain(name: str, error: Exception) -> str:
     reason = next((line for line in lines if line.startswith(("No implementation", "Untyped", "Unknown", "Invalid"))), None)
     return (
         f"function {name!r} cannot be compiled for real and complex numbers: {reason or lines[0]} "
-        "(decide on the real part, `if u.x.real > 0:`; use numpy or math functions of numbers only)"
+        "(use arithmetic, comparisons, and functions of numbers from math or numpy)"
     )
 
 

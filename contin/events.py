@@ -24,18 +24,28 @@ class Monitor:
         ``function(trial) -> float``; a :class:`Trial` looks up parameters and functionals by name.
     terminal : bool
         Whether the run stops there.
+    confirm : callable, optional
+        ``confirm(trial) -> bool`` at the located point: False drops the event (a sign change of another cause).
+    describe : callable, optional
+        ``describe(trial)`` at the located point gives the ``details`` of the event.
     """
 
     label: str
     name: str
     function: Callable[[Trial], float]
     terminal: bool = False
+    confirm: Callable[[Trial], bool] | None = None
+    describe: Callable[[Trial], object] | None = None
 
 
 class Trial:
-    """A corrected point as monitors see it: ``trial["mu"]``, ``trial.tangent``, ``trial.sign`` (of the determinant)."""
+    """A corrected point as monitors see it: ``trial["mu"]``, ``trial.tangent``, ``trial.sign`` (of the determinant).
 
-    def __init__(self, system, x, tangent, sign, iterations=0, newton_error=0.0):
+    ``factors`` is the factorization that the tangent came from, ``passed`` the number of branch points since the last point.
+    """
+
+    def __init__(self, system, x, tangent, sign, iterations=0, newton_error=0.0, factors=None):
+        self.factors, self.passed = factors, 0
         self.system, self.x, self.tangent, self.sign = system, x, tangent, sign
         self.iterations, self.newton_error = iterations, newton_error
         self._functionals = None
@@ -69,6 +79,35 @@ def limit(name: str, value: float) -> Monitor:
 def fold(name: str) -> Monitor:
     """The event that a free parameter turns round (AUTO's limit point)."""
     return Monitor("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)])
+
+
+def hopf() -> Monitor:
+    """The event that a pair of complex eigenvalues of F_u crosses the imaginary axis (AUTO's HB), for u' = F.
+
+    The product of all sums of two eigenvalues changes sign there, and where two real ones are opposite (a neutral saddle, which
+    is not confirmed). Its details are the frequency of the pair.
+    """
+
+    def sums(trial):
+        values = trial.system.eigenvalues(trial.x)
+        i, j = np.triu_indices(len(values), 1)
+        return values, values[i] + values[j], i
+
+    def function(trial):
+        values, pairs, _ = sums(trial)
+        if not pairs.size:
+            return 1.0
+        negative = np.count_nonzero((pairs.imag == 0) & (pairs.real < 0))
+        return float((-1.0) ** negative * np.abs(pairs).min())
+
+    def frequency(trial):
+        values, pairs, i = sums(trial)
+        return float(abs(values[i[np.argmin(np.abs(pairs))]].imag))
+
+    def complex_pair(trial):
+        return frequency(trial) > 1e-8
+
+    return Monitor("HB", "Hopf", function, confirm=complex_pair, describe=lambda trial: {"frequency": frequency(trial)})
 
 
 def find_zero(function: Callable[[float], float], a, fa, b, fb, tolerance) -> float:

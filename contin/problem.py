@@ -17,7 +17,7 @@ class BoundaryValueProblem:
     """u' = rhs(t, u, p) on ``domain``, with conditions at both ends and under the integral.
 
     Every function is plain Python; ``u`` and ``p`` come as named tuples (``u.x``, ``p.mu``, ``x, y = u``). They are
-    compiled, and differentiated to round-off by the complex step: decide on real parts (``if u.x.real > 0``).
+    compiled, and differentiated to round-off by the complex step (comparisons then decide on real parts).
     A function with one argument more fills that array instead of returning a tuple, and gets arrays: the way for
     states too many to name. It then needs ``boundary_count`` or ``integral_count``.
 

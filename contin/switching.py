@@ -9,6 +9,7 @@ Hessian of beta is the algebraic bifurcation equation.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +75,68 @@ class _Bordered:
         unit[-1] = 1.0
         left = self.factors.solve_transposed(unit)[: system.equations]
         return left / np.linalg.norm(left)
+
+
+def along(system, found: BranchPoint, direction) -> BranchPoint:
+    """The same branch point, its tangents in order: first the one nearest to ``direction``, with its sense."""
+    cosines = [inner(system, tangent, direction) for tangent in found.tangents]
+    order = sorted(range(len(cosines)), key=lambda i: -abs(cosines[i]))
+    tangents = [found.tangents[i] * (np.sign(cosines[i]) or 1.0) for i in order]
+    return dataclasses.replace(found, tangents=tuple(tangents))
+
+
+@dataclass(frozen=True, eq=False)
+class MultiplePoint:
+    """A point where F_x loses rank by two or more at once: reported, its branches are not computed.
+
+    Attributes
+    ----------
+    dimension : int
+        Dimension of the kernel beyond the tangent of the branch.
+    kernel : ndarray, shape (dimension, size)
+        Unit vectors that span it.
+    """
+
+    dimension: int
+    kernel: np.ndarray
+
+
+#: Singular directions watched between two points.
+_WATCHED = 2
+
+
+def smallest_directions(factors, size, count: int = _WATCHED):
+    """Right and left singular vectors, as columns, of the smallest singular values: inverse iteration on a block.
+
+    Returns
+    -------
+    right, left : ndarray, shape (size, count)
+    response : ndarray, shape (count, count)
+        right^T J^-1 left: about the reciprocals of the singular values.
+    """
+    count = min(count, size)
+    right = np.random.default_rng(5).standard_normal((size, count))
+    for _ in range(2):
+        left = np.linalg.qr(np.array([factors.solve_transposed(v) for v in right.T]).T)[0]
+        solved = np.array([factors.solve(w) for w in left.T]).T
+        right = np.linalg.qr(solved)[0]
+    return right, left, right.T @ solved
+
+
+def crossings(before, after, size) -> int:
+    """How many singular values pass zero between two neighbouring matrices, from their factors.
+
+    In the directions in which ``after`` is nearest to singular, J^-1 of the two is compared: each passage turns one eigenvalue
+    of the quotient negative. A determinant sees the parity only; two modes that cross together, or two branch points in one
+    step, are seen here.
+    """
+    with np.errstate(all="ignore"):
+        right, left, response = smallest_directions(after, size)
+        earlier = right.T @ np.array([before.solve(w) for w in left.T]).T
+        if not (np.all(np.isfinite(response)) and np.all(np.isfinite(earlier))):
+            return 0
+        values = np.linalg.eigvals(np.linalg.lstsq(earlier, response, rcond=None)[0])
+    return int(np.count_nonzero((values.real < 0) & (np.abs(values.imag) < np.abs(values.real))))
 
 
 def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: int = 12) -> BranchPoint:

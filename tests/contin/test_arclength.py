@@ -117,9 +117,7 @@ def elastica():
 def test_branch_points_of_the_elastica_and_its_first_branch():
     """lam = (2 K(sin(a/2)))^2 on the first branch, a = theta(0) (Euler)."""
     system = Collocation(elastica(), np.linspace(0, 1, 13), 6, ["lam"], {})
-    trivial = follow(
-        system, system.pack(np.zeros((73, 2)), {"lam": 5.0}), Settings(limits={"lam": (1, 100)}, step=1, max_step=4)
-    )
+    trivial = follow(system, system.pack(np.zeros((73, 2)), {"lam": 5.0}), Settings(limits={"lam": (1, 100)}, step=1))
     points = trivial.labelled("BP")
     assert [point["lam"] for point in points] == pytest.approx([(k * math.pi) ** 2 for k in (1, 2, 3)], abs=1e-8)
     first = points[0].details

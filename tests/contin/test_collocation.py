@@ -127,3 +127,13 @@ def test_tables(degree):
 def test_bad_discretizations(mesh, degree, free, said):
     with pytest.raises(ProblemError, match=said):
         Collocation(oscillator(), mesh, degree, free, {})
+
+
+def test_transposed_product_is_that_of_the_linearization():
+    """w.(F_x v) = (F_x^T w).v, with F_x v from differences of the residual."""
+    system = Collocation(bordered(), [0, 0.2, 0.5, 1], 3, ["c", "a", "b"], {"fixed": 2.0})
+    random = np.random.default_rng(5)
+    x, v, w = random.standard_normal(system.size), random.standard_normal(system.size), random.standard_normal(system.equations)
+    h = 1e-4
+    slope = (system.residual(x + h * v) - system.residual(x - h * v)) / (2 * h)
+    assert system.transposed_product(x, w) @ v == pytest.approx(w @ slope, abs=1e-6)

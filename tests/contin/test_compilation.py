@@ -35,9 +35,7 @@ def test_jacobian_is_exact_to_round_off():
         return batch.values(t, u + du, none, p + dp)[0]
 
     h = 1e-3
-    for column, (du, dp) in enumerate(
-        [([1.0, 0], [0.0, 0]), ([0, 1.0], [0.0, 0]), ([0.0, 0], [0, 1.0]), ([0.0, 0], [1.0, 0])]
-    ):
+    for column, (du, dp) in enumerate([([1.0, 0], [0.0, 0]), ([0, 1.0], [0.0, 0]), ([0.0, 0], [0, 1.0]), ([0.0, 0], [1.0, 0])]):
         du, dp = h * np.array(du), h * np.array(dp)
         slope = (8 * (at(du, dp) - at(-du, -dp)) - (at(2 * du, 2 * dp) - at(-2 * du, -2 * dp))) / (12 * h)
         assert np.allclose(jacobian[0, :, column], slope, atol=2e-10)
@@ -55,7 +53,8 @@ def test_functions_of_both_ends_and_filled_arrays():
     _, jacobian = batch.jacobian(np.zeros(1), np.array([[1.0, 2.0]]), np.array([[3.0, 4.0]]), np.array([5.0]), np.array([0]))
     assert np.allclose(jacobian[0], [[1, 0, 0, -5, -4], [0, 0, 6, 0, 0]])
     batch = Batch([filled], [3], ("a", "b", "c"), ("k",))
-    values, jacobian = batch.jacobian(np.zeros(1), np.array([[1.0, 2.0, 3.0]]), np.empty((0, 3)), np.array([2.0]), np.array([0]))
+    u, p = np.array([[1.0, 2.0, 3.0]]), np.array([2.0])
+    values, jacobian = batch.jacobian(np.zeros(1), u, np.empty((0, 3)), p, np.array([0]))
     assert np.allclose(values, [[2, 8, 18]])
     assert np.allclose(jacobian[0], [[4, 0, 0, 1], [0, 8, 0, 4], [0, 0, 12, 9]])
 
@@ -117,9 +116,24 @@ def test_a_bad_statement_is_refused_in_one_sentence(changes, said):
     assert "\n" not in str(error.value)
 
 
+def test_powers_of_negative_numbers_and_comparisons():
+    """Derivatives of x^3, x^2, x^-2, x^5, x^(whole float) at x < 0, and of a function with a case distinction."""
+
+    def powers(t, u, p):
+        x = u.x
+        return x**3, x**2, x**-2, x**5, x**p.whole, (x * x if x > 0 else -3 * x), (1 - x) ** 0.5, x**0
+
+    batch = Batch([powers], [8], ("x",), ("whole",))
+    values, jacobian = batch.jacobian(np.zeros(1), np.array([[-1.5]]), np.empty((0, 1)), np.array([3.0]), np.empty(0, int))
+    x = -1.5
+    assert np.allclose(values[0], [x**3, x**2, x**-2, x**5, x**3, -3 * x, (1 - x) ** 0.5, 1], rtol=1e-15)
+    expected = [3 * x**2, 2 * x, -2 * x**-3, 5 * x**4, 3 * x**2, -3, -0.5 * (1 - x) ** -0.5, 0]
+    assert np.allclose(jacobian[0, :, 0], expected, rtol=1e-14)
+
+
 def test_what_cannot_be_compiled_says_so():
-    problem = BoundaryValueProblem(lambda t, u, p: (u.v, -1.0 if u.u > 0 else 1.0), boundary, ["u", "v"], {"k": 1.0})
-    with pytest.raises(ProblemError, match="decide on the real part"):
+    problem = BoundaryValueProblem(lambda t, u, p: (u.v, eval("1.0")), boundary, ["u", "v"], {"k": 1.0})
+    with pytest.raises(ProblemError, match="cannot be compiled"):
         problem.batch("field")
 
 

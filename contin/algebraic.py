@@ -1,0 +1,223 @@
+"""F(u, p) = 0 through the same loop: the statement, and the system that the continuation works on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from contin.compilation import Batch, argument_count, check_names, outputs
+from contin.errors import ProblemError
+from contin.events import hopf
+
+
+@dataclass(frozen=True, eq=False)
+class AlgebraicProblem:
+    """F(u, p) = 0, or the equilibria of u' = F(u, p).
+
+    Parameters
+    ----------
+    residual : callable
+        ``F(u, p)`` of two named tuples returns a tuple; compiled and differentiated like a right-hand side.
+        With a third argument it fills that array, gets arrays, and ``count`` says how many values.
+    states : sequence of str, or int
+    parameters : mapping of str to float
+        Names and default values.
+    functionals : mapping of str to callable
+        ``f(u, p)``: columns of every point.
+    dynamics : bool
+        Whether u' = F(u, p): Hopf points are then looked for. Needs as many equations as states.
+    count : int, optional
+        Number of equations of a residual that fills an array; as many as states by default.
+
+    Raises
+    ------
+    ProblemError
+    """
+
+    residual: Callable
+    states: Sequence[str] | int
+    parameters: Mapping[str, float]
+    functionals: Mapping[str, Callable] = field(default_factory=dict)
+    dynamics: bool = True
+    count: int | None = None
+
+    def __post_init__(self) -> None:
+        states = tuple(f"u{i}" for i in range(self.states)) if isinstance(self.states, int) else self.states
+        object.__setattr__(self, "states", check_names("states", states))
+        check_names("parameters", self.parameters)
+        check_names("functionals", [*self.functionals, *self.parameters])
+        for name, value in self.parameters.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)) or not math.isfinite(value):
+                raise ProblemError(f"parameters: {name} = {value!r} must be a finite number")
+        arguments = argument_count(self.residual)
+        if arguments not in (2, 3):
+            raise ProblemError(f"residual takes {arguments} arguments, must take 2 (or 3, to fill the last)")
+        shape = (self.count or len(self.states)) if arguments == 3 else outputs(self.residual, self._arguments, "residual")
+        object.__setattr__(self, "_shape", shape)
+        if self.dynamics and self.equation_size != len(self.states):
+            object.__setattr__(self, "dynamics", False)
+        object.__setattr__(self, "_batches", {})
+
+    @property
+    def _arguments(self):
+        return (self.states, tuple(self.parameters))
+
+    @property
+    def equation_size(self) -> int:
+        """Number of equations."""
+        return max(self._shape, 1)
+
+    @property
+    def free_size(self) -> int:
+        """Number of free parameters on a curve: equations - states + 1."""
+        return self.equation_size - len(self.states) + 1
+
+    def batch(self, name: str) -> Batch:
+        """The compiled ``"residual"`` or ``"functionals"``; made when first asked."""
+        if name not in self._batches:
+            functions = [self.residual] if name == "residual" else list(self.functionals.values())
+            if name != "residual" and any(outputs(f, self._arguments, "a functional") for f in functions):
+                raise ProblemError("functionals: each must be f(u, p) and return one number")
+            counts = [self._shape] if name == "residual" else [0] * len(functions)
+            self._batches[name] = Batch(functions, counts, *self._arguments, times=False)
+        return self._batches[name]
+
+
+class Algebraic:
+    """An algebraic problem with chosen free parameters, as the continuation sees it.
+
+    Unknowns ``x`` are the states, then the free parameters. The interface is that of
+    :class:`contin.collocation.Collocation`; there is no mesh to adapt.
+
+    Raises
+    ------
+    ProblemError
+        An unknown parameter.
+    """
+
+    intervals = 0
+    degree = 0
+
+    def __init__(self, problem: AlgebraicProblem, free, parameters: Mapping[str, float] | None = None):
+        parameters = parameters or {}
+        self.problem, self.free = problem, tuple(free)
+        names = tuple(problem.parameters)
+        for name in (*self.free, *parameters):
+            if name not in names:
+                raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}")
+        self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
+        self._free = np.array([names.index(name) for name in self.free], dtype=np.int64)
+        self.state_size = len(problem.states)
+        self.size = self.state_size + len(self.free)
+        self.equations = problem.equation_size
+        self.weights = np.ones(self.size)
+        self.nodes = np.zeros(1)
+
+    def pack(self, states, values: Mapping[str, float]):
+        """A vector of unknowns from states (n,) and the mapping of free parameters."""
+        return np.concatenate([np.asarray(states, dtype=float).ravel(), [float(values[name]) for name in self.free]])
+
+    def states(self, x):
+        """States, shape (1, n)."""
+        return x[: self.state_size].reshape(1, -1)
+
+    def all_parameters(self, x):
+        """Values of all parameters, the free ones from x."""
+        p = self.parameters.copy()
+        p[self._free] = x[self.state_size :]
+        return p
+
+    def parameter(self, x, name: str) -> float:
+        """The value of one parameter by name."""
+        return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
+
+    def parameter_index(self, name: str) -> int:
+        """Where the free parameter ``name`` stands in x."""
+        return self.state_size + self.free.index(name)
+
+    def residual(self, x):
+        """F at x, shape (equations,)."""
+        u, p = self.states(x), self.all_parameters(x)
+        return self.problem.batch("residual").values(_NO_TIME, u, _none(self.state_size), p)[0]
+
+    def _jacobian(self, x):
+        u, p = self.states(x), self.all_parameters(x)
+        values, jacobian = self.problem.batch("residual").jacobian(_NO_TIME, u, _none(self.state_size), p, self._free)
+        return values[0], jacobian[0]
+
+    def linearize(self, x, rows=(), columns=()):
+        """Residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
+        residual, jacobian = self._jacobian(x)
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        return residual, DenseFactors(np.vstack([np.hstack([jacobian, columns.T]), rows]))
+
+    def transposed_product(self, x, w):
+        """F_x^T w, shape (size,)."""
+        return self._jacobian(x)[1].T @ w
+
+    def eigenvalues(self, x):
+        """Eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
+        return np.linalg.eigvals(self._jacobian(x)[1][:, : self.state_size])
+
+    def monitors(self):
+        """Events of this kind of problem: Hopf points where u' = F."""
+        return [hopf()] if self.problem.dynamics else []
+
+    def functionals(self, x):
+        """Values of the problem's functionals, in their order."""
+        if not self.problem.functionals:
+            return np.empty(0)
+        batch = self.problem.batch("functionals")
+        return batch.values(_NO_TIME, self.states(x), _none(self.state_size), self.all_parameters(x))[0]
+
+    def carrier(self, other):
+        """The function that carries vectors of unknowns to another system of this problem: itself."""
+        return np.array
+
+    def refined(self):
+        """None: there is no mesh."""
+
+    def adapted(self, x, control):
+        """None: there is no mesh."""
+
+    def with_free(self, free, x):
+        """The same problem with other free parameters (values from x), and x for it."""
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        other = Algebraic(self.problem, free, values)
+        return other, other.pack(x[: self.state_size], values)
+
+
+class DenseFactors:
+    """LU of a dense matrix with the interface of :class:`contin.condensation.Factorization`."""
+
+    def __init__(self, matrix):
+        if matrix.shape[0] != matrix.shape[1]:
+            raise ValueError(f"a matrix of {matrix.shape[0]} rows and {matrix.shape[1]} columns is not square")
+        self._matrix = matrix
+        #: Sign of the determinant.
+        self.sign = np.linalg.slogdet(matrix)[0] if np.all(np.isfinite(matrix)) else np.nan
+
+    def _solve(self, matrix, b):
+        try:
+            return np.linalg.solve(matrix, b)
+        except np.linalg.LinAlgError:
+            return np.full(len(b), np.nan)
+
+    def solve(self, b):
+        """The x with J x = b; NaN where J is singular."""
+        return self._solve(self._matrix, b)
+
+    def solve_transposed(self, c):
+        """The y with J^T y = c."""
+        return self._solve(self._matrix.T, c)
+
+
+_NO_TIME = np.zeros(1)
+
+
+def _none(n):
+    return np.empty((0, n))

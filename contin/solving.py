@@ -1,0 +1,171 @@
+"""First solutions: from a function, arrays, numbers or a stored point; and others beside the known ones (deflation)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from contin.algebraic import Algebraic, AlgebraicProblem
+from contin.arclength import Settings, follow
+from contin.branch import Branch, Point
+from contin.collocation import Collocation
+from contin.corrector import Newton, correct
+from contin.errors import ConvergenceError, ProblemError
+from contin.events import Trial
+from contin.mesh import MeshControl
+from contin.problem import BoundaryValueProblem
+from contin.switching import BranchPoint, inner
+
+Guess = Callable | Point | Sequence[float] | tuple[np.ndarray, np.ndarray] | None
+
+
+def solve(
+    problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess = None, parameters: Mapping[str, float] | None = None, *,
+    free: Sequence[str] = (), intervals: int = 20, degree: int = 4, mesh: MeshControl | None = None, newton: Newton = Newton(),
+    others: Sequence[Point] = (),
+) -> Point:  # fmt: skip
+    """One solution near a guess, on a mesh adapted to it.
+
+    Parameters
+    ----------
+    problem : BoundaryValueProblem or AlgebraicProblem
+    guess : callable, pair of arrays, sequence of numbers, Point, or None
+        ``guess(t)`` returns the states at t; a pair is t (K,) and states (K, n); n numbers are constant states; a point is a
+        solution of a problem with the same states; None stands for zeros.
+    parameters : mapping of str to float
+        Values that differ from the defaults (of the problem, or of the guess if it is a point).
+    free : sequence of str
+        Parameters to be found along with the states, for problems with more conditions than states.
+    intervals, degree : int
+        First mesh (uniform, unless the guess has one) and degree of the collocation.
+    mesh : MeshControl, optional
+        How the mesh adapts; ``MeshControl(every=0)`` keeps the first one.
+    others : sequence of Point
+        Known solutions to stay away from (deflation, Farrell, Birkisson & Funke 2015).
+
+    Returns
+    -------
+    Point
+        With ``free`` as given: pass it to :func:`trace` with the free parameters of a curve.
+
+    Raises
+    ------
+    ConvergenceError, ProblemError
+    """
+    parameters, control = dict(parameters or {}), mesh or MeshControl()
+    if isinstance(guess, Point):
+        parameters = {**guess.parameters, **parameters}
+    needed = problem.free_size - 1
+    if len(free) != needed:
+        raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {max(needed, 0)} (conditions - states)")
+    system, x = _first(problem, guess, parameters, tuple(free), intervals, degree)
+    for _ in range(4):
+        done = _correct_away(system, x, others, newton) if others else correct(system, x, newton=newton)
+        adapted = system.adapted(done.x, control)
+        if adapted is None:
+            break
+        system, carry = adapted
+        x = carry(done.x)
+    return point_of(system, done.x, done.iterations, done.error)
+
+
+def _first(problem, guess, parameters, free, intervals, degree):
+    """System and first guess."""
+    if isinstance(problem, AlgebraicProblem):
+        system = Algebraic(problem, free, parameters)
+        states = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
+        states = np.zeros(system.state_size) if states is None else np.asarray(states, dtype=float).ravel()
+        if states.size != system.state_size:
+            raise ProblemError(f"guess: {states.size} numbers for the {system.state_size} states")
+        return system, system.pack(states, {**problem.parameters, **parameters})
+    a, b = problem.domain
+    points = np.linspace(a, b, intervals + 1)
+    if isinstance(guess, Point):
+        points, degree = guess.system.mesh, guess.system.degree
+    elif isinstance(guess, tuple) and len(guess) == 2 and np.ndim(guess[0]) == 1:
+        given = np.asarray(guess[0], dtype=float)
+        if np.any(np.diff(given) <= 0) or given[0] > a or given[-1] < b:
+            raise ProblemError(f"guess: its t must increase and cover the domain {a:g} ... {b:g}")
+    system = Collocation(problem, points, degree, free, parameters)
+    states = _sampled(guess, system.nodes)
+    if states.shape != (len(system.nodes), len(problem.states)):
+        raise ProblemError(f"guess: {states.shape[1:]} values at a point, must be the {len(problem.states)} states")
+    return system, system.pack(states, {**problem.parameters, **parameters})
+
+
+def _sampled(guess, nodes):
+    """The states (K, n) of a guess at the nodes."""
+    if isinstance(guess, Point):
+        return guess.system.evaluate(guess.x, nodes)
+    if callable(guess):
+        return np.array([np.asarray(guess(t), dtype=float).ravel() for t in nodes])
+    if isinstance(guess, tuple) and len(guess) == 2 and np.ndim(guess[0]) == 1:
+        t, values = np.asarray(guess[0], dtype=float), np.asarray(guess[1], dtype=float)
+        return np.stack([np.interp(nodes, t, column) for column in values.reshape(len(t), -1).T], axis=1)
+    if guess is None:
+        raise ProblemError("guess: a boundary value problem needs one (a function of t, arrays, or numbers)")
+    return np.tile(np.asarray(guess, dtype=float).ravel(), (len(nodes), 1))
+
+
+def point_of(system, x, iterations: int = 0, error: float = 0.0) -> Point:
+    """A Point of any solution x of a system."""
+    trial = Trial(system, x, np.full_like(x, np.nan), np.nan)
+    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+    return Point("", "", parameters, trial.functionals, x, trial.tangent, system, 0.0, iterations, error)
+
+
+def _correct_away(system, x, others, newton: Newton, max_iterations: int = 100):
+    """Newton on the deflated residual: a Newton step stretched so that known solutions repel."""
+    known = [point.system.carrier(system)(point.x)[: system.state_size] for point in others]
+    known = [np.append(states, x[system.state_size :]) for states in known]
+    for _ in range(max_iterations):
+        residual, factors = system.linearize(x)
+        step = -factors.solve(residual)
+        stretch = 0.0  # the derivative of log(prod (1 + 1 / |x - r|^2)) along the step
+        for root in known:
+            away = x - root
+            distance = max(inner(system, away, away), 1e-300)
+            stretch -= 2 * inner(system, away, step) / (distance * (1 + distance))
+        step = step / (1 - stretch)
+        size = np.max(np.abs(step) / (1 + np.abs(x)))
+        if not np.isfinite(size):
+            break
+        x = x + step * min(1.0, 3.0 / size)
+        if size < 1e-6:
+            return correct(system, x, newton=newton)
+    raise ConvergenceError("no further solution was found from this guess; another guess may lead to one")
+
+
+def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
+          **options) -> Branch:  # fmt: skip
+    """Follow the branch through a point, or away from a branch point, to its end.
+
+    Parameters
+    ----------
+    start : Point
+        Of :func:`solve`, of another branch, or read back.
+    settings : Settings, optional
+        Or any of its fields by name.
+    free : sequence of str, optional
+        Free parameters, if they shall differ from those of ``start``; the first is the primary one.
+    branch : int, optional
+        Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
+        the opposite way.
+
+    Raises
+    ------
+    ProblemError, ConvergenceError
+    """
+    settings = dataclasses.replace(settings or Settings(), **options)
+    system, x = start.system, start.x
+    if free is not None and tuple(free) != system.free:
+        system, x = system.with_free(free, x)
+    if branch is None:
+        return follow(system, x, settings)
+    if not isinstance(start.details, BranchPoint):
+        raise ProblemError("branch: the start is not a branch point")
+    if not 0 <= branch < len(start.details.tangents):
+        raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
+    return follow(system, x, settings, settings.direction * start.details.tangents[branch])
