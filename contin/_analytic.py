@@ -17,48 +17,70 @@ from numba.core.untyped_passes import IRProcessing
 from numba.extending import overload
 
 
+# Every implementation has a name of its own: numba tells compiled functions apart by name and types, and machine code of several
+# cached modules shares one space of names.
+
+
 def power(x, y):
     """x ** y."""
     return x**y
 
 
+def _one(x, y):
+    return 1.0 + 0.0 * x
+
+
+def _itself(x, y):
+    return x
+
+
+def _square(x, y):
+    return x * x
+
+
+def _cube(x, y):
+    return x * x * x
+
+
+def _fourth(x, y):
+    return (x * x) * (x * x)
+
+
+def _by_products(x, y):
+    result, factor, left = 1.0 + 0.0 * x, x, abs(y)
+    while left:
+        if left & 1:
+            result = result * factor
+        factor = factor * factor
+        left >>= 1
+    return result if y >= 0 else 1.0 / result
+
+
+def _by_products_if_whole(x, y):
+    if y.imag != 0 or y.real != int(y.real):
+        return x**y
+    result, factor, left = 1.0 + 0.0 * x, x, abs(int(y.real))
+    while left:
+        if left & 1:
+            result = result * factor
+        factor = factor * factor
+        left >>= 1
+    return result if y.real >= 0 else 1.0 / result
+
+
+def _plain_power(x, y):
+    return x**y
+
+
 @overload(power, prefer_literal=True)
-def _power(x, y):
+def _choose_power(x, y):
     if isinstance(y, types.IntegerLiteral) and 0 <= y.literal_value <= 4:
-        return (
-            lambda x, y: 1.0 + 0.0 * x,
-            lambda x, y: x,
-            lambda x, y: x * x,
-            lambda x, y: x * x * x,
-            lambda x, y: (x * x) * (x * x),
-        )[y.literal_value]
+        return (_one, _itself, _square, _cube, _fourth)[y.literal_value]
     if isinstance(y, types.Integer):
-
-        def integer(x, y):
-            result, factor, left = 1.0 + 0.0 * x, x, abs(y)
-            while left:
-                if left & 1:
-                    result = result * factor
-                factor = factor * factor
-                left >>= 1
-            return result if y >= 0 else 1.0 / result
-
-        return integer
+        return _by_products
     if isinstance(x, types.Complex) and isinstance(y, (types.Float, types.Complex)):
-
-        def whole_or_not(x, y):
-            if y.imag != 0 or y.real != int(y.real):
-                return x**y
-            result, factor, left = 1.0 + 0.0 * x, x, abs(int(y.real))
-            while left:
-                if left & 1:
-                    result = result * factor
-                factor = factor * factor
-                left >>= 1
-            return result if y.real >= 0 else 1.0 / result
-
-        return whole_or_not
-    return lambda x, y: x**y
+        return _by_products_if_whole
+    return _plain_power
 
 
 def greater(a, b):
@@ -81,21 +103,38 @@ def less_equal(a, b):
     return a.real <= b.real
 
 
-def _compare(function, compare):
+def _plain_greater(a, b):
+    return a > b
+
+
+def _plain_less(a, b):
+    return a < b
+
+
+def _plain_greater_equal(a, b):
+    return a >= b
+
+
+def _plain_less_equal(a, b):
+    return a <= b
+
+
+def _compare(function, plain):
     def choose(a, b):
-        if all(isinstance(kind, types.Number) for kind in (a, b)):
-            return function
-        return lambda a, b: compare(a, b)
+        return function if isinstance(a, types.Number) and isinstance(b, types.Number) else plain
 
     overload(function)(choose)
+    return function
 
 
-_STAND_INS = {operator.pow: power, operator.ipow: power}
-for _function, _plain in (
-    (greater, operator.gt), (less, operator.lt), (greater_equal, operator.ge), (less_equal, operator.le),
-):  # fmt: skip
-    _compare(_function, _plain)
-    _STAND_INS[_plain] = _function
+_STAND_INS = {
+    operator.pow: power,
+    operator.ipow: power,
+    operator.gt: _compare(greater, _plain_greater),
+    operator.lt: _compare(less, _plain_less),
+    operator.ge: _compare(greater_equal, _plain_greater_equal),
+    operator.le: _compare(less_equal, _plain_less_equal),
+}
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)

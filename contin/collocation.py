@@ -173,6 +173,9 @@ class Collocation:
         self._free = np.array([names.index(name) for name in self.free], dtype=np.int64)
         self._n, self._d, self.intervals = len(problem.states), degree, self._h.size
         self._times = (self.mesh[:-1, None] + self._h[:, None] * self.basis.points).ravel()
+        self._h_points = np.repeat(self._h, degree)[:, None]
+        self._quadrature = np.tile(self.basis.weights, self.intervals) * self._h_points[:, 0]
+        self._by_interval = degree * np.arange(self.intervals)[:, None] + np.arange(degree + 1)
         self.state_size = (self.intervals * degree + 1) * self._n
         self.size = self.state_size + len(self.free)
         self.equations = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
@@ -214,10 +217,8 @@ class Collocation:
         return self.state_size + self.free.index(name)
 
     def _local(self, states):
-        """States by interval, a strided view (N, d + 1, n)."""
-        row = states.strides[0]
-        shape = (self.intervals, self._d + 1, self._n)
-        return np.lib.stride_tricks.as_strided(states, shape, (self._d * row, row, states.strides[1]), writeable=False)
+        """States by interval, shape (N, d + 1, n)."""
+        return states[self._by_interval]
 
     def at_gauss_points(self, x):
         """States at the Gauss points, shape (N d, n)."""
@@ -232,11 +233,10 @@ class Collocation:
     # --- the discrete equations ----------------------------------------------------------------------------------
 
     def _residual(self, x, states, field, boundary):
-        n, d = self._n, self._d
+        n = self._n
         slope = np.matmul(self.basis.slope, self._local(states)).reshape(-1, n)
-        h = np.repeat(self._h, d)
-        integrals = (np.tile(self.basis.weights, self.intervals) * h) @ field[:, n:]
-        return np.concatenate([(slope - h[:, None] * field[:, :n]).ravel(), boundary[0], integrals])
+        collocation = slope - self._h_points * field[:, :n]
+        return np.concatenate([collocation.ravel(), boundary[0], self._quadrature @ field[:, n:]])
 
     def residual(self, x):
         """Residual of the discrete equations at x, shape (equations,)."""
@@ -306,7 +306,7 @@ class Collocation:
             return np.empty(0)
         batch = self.problem.batch("functionals")
         values = batch.values(self._times, self.at_gauss_points(x), _NONE(self._n), self.all_parameters(x))
-        return (np.tile(self.basis.weights, self.intervals) * np.repeat(self._h, self._d)) @ values
+        return self._quadrature @ values
 
     # --- meshes --------------------------------------------------------------------------------------------------
 

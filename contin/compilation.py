@@ -32,7 +32,7 @@ from contin._analytic import AnalyticCompiler
 from contin.errors import ProblemError
 
 #: Part of every fingerprint: changes when functions are compiled by other rules (the template has its own part).
-_RULES = 3
+_RULES = 4
 
 _TEMPLATE = '''"""Generated; safe to delete."""
 from collections import namedtuple
@@ -106,24 +106,38 @@ class _Prepared:
     """Users' functions made ready for numba: what they call compiled too, ``math`` made complex-aware, fingerprinted."""
 
     def __init__(self) -> None:
-        self._done: dict[object, Dispatcher] = {}
-        self._hash = hashlib.sha256()
+        self._done: dict[object, tuple[Dispatcher, str]] = {}
+        self._hashes = [hashlib.sha256()]  # of the whole, and of each function being looked at
 
     def fingerprint(self) -> str:
-        return self._hash.hexdigest()
+        return self._hashes[0].hexdigest()
 
     def note(self, *what: object) -> None:
         for item in what:
-            self._hash.update(repr(item).encode() + b"\0")
+            self._hashes[-1].update(repr(item).encode() + b"\0")
 
     def function(self, function: Callable) -> Dispatcher:
-        """Compile ``function`` and all plain Python functions that it refers to."""
+        """Compile ``function`` and all plain Python functions that it refers to.
+
+        The compiled function is named after its own fingerprint: numba tells machine code apart by names, and two functions
+        that share a name, cached by two processes, would be taken for one another in a third.
+        """
         function = getattr(function, "py_func", function)
         if not isinstance(function, types.FunctionType):
             raise ProblemError(f"{function!r} must be a plain Python function (def or lambda)")
-        if function in self._done:
-            self.note("again", function.__name__)
-            return self._done[function]
+        if function not in self._done:
+            self._hashes.append(hashlib.sha256())
+            copy = self._copy(function)
+            digest = self._hashes.pop().hexdigest()
+            copy.__name__ = copy.__qualname__ = f"user_{digest[:32]}"
+            compiled = numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler)
+            self._done[function] = compiled, digest
+        compiled, digest = self._done[function]
+        self.note(digest)
+        return compiled
+
+    def _copy(self, function: types.FunctionType) -> types.FunctionType:
+        """The function with everything that it refers to made ready, its fingerprint taken on the way."""
         code = function.__code__
         names = self._code(code)
         self.note(function.__defaults__)
@@ -134,9 +148,7 @@ class _Prepared:
             elif name in ("abs", "max", "min"):
                 globals_[name] = self._value(getattr(builtins, name), names)
         cells = [types.CellType(self._value(cell.cell_contents, names)) for cell in function.__closure__ or ()]
-        copy = types.FunctionType(code, globals_, function.__name__, function.__defaults__, tuple(cells) or None)
-        self._done[function] = numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler)
-        return self._done[function]
+        return types.FunctionType(code, globals_, function.__name__, function.__defaults__, tuple(cells) or None)
 
     def _code(self, code: types.CodeType) -> set[str]:
         """Take the fingerprint of a code object and of those inside it; the names that they use."""

@@ -117,9 +117,11 @@ def smallest_directions(factors, size, count: int = _WATCHED):
     count = min(count, size)
     right = np.random.default_rng(5).standard_normal((size, count))
     for _ in range(2):
-        left = np.linalg.qr(np.array([factors.solve_transposed(v) for v in right.T]).T)[0]
+        left = np.array([factors.solve_transposed(v) for v in right.T]).T
+        left = np.linalg.qr(left / np.abs(left).max(axis=0))[0]
         solved = np.array([factors.solve(w) for w in left.T]).T
-        right = np.linalg.qr(solved)[0]
+        right = solved / np.abs(solved).max(axis=0)
+    right = np.linalg.qr(right)[0]
     return right, left, right.T @ solved
 
 
@@ -160,7 +162,7 @@ def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: in
                 phi, psi = _orthonormal(system, matrix.kernel), matrix.left(system)
                 continue
             if hessian is None:
-                hessian = _hessian(system, x, phi, psi, matrix.kernel)
+                hessian, origin = _hessian(system, x, phi, psi, matrix.kernel), x
             if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(matrix.g))):
                 break
             # one Newton step for F + beta psi = 0 and, through its gradient g, for grad beta = 0
@@ -173,7 +175,10 @@ def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: in
             if not np.isfinite(size) or size > 10:
                 break
             if size <= newton.tolerance or (size < 1e-9 and size > 0.3 * last):
-                return _finish(system, x, phi, psi, beta)
+                if np.max(np.abs(x - origin)) > 1e-3:  # the tangents are wanted as they are right there
+                    matrix = _Bordered(system, x, phi, psi)
+                    hessian = _hessian(system, x, phi, psi, matrix.kernel)
+                return _finish(system, x, matrix, hessian, beta)
             if size > 0.05 * last:
                 hessian = None
             last = size
@@ -190,12 +195,15 @@ def _hessian(system, x, phi, psi, kernel, scale=1e-4):
     return (hessian + hessian.T) / 2
 
 
-def _finish(system, x, phi, psi, beta) -> BranchPoint:
-    matrix = _Bordered(system, x, phi, psi)
-    kernel, left = _orthonormal(system, matrix.kernel), matrix.left(system)
-    hessian = _hessian(system, x, kernel, left, kernel)
-    tangents = [a @ kernel for a in _null_directions(hessian)]
-    return BranchPoint(x, tuple(tangents), kernel, left, hessian, float(abs(beta)))
+def _finish(system, x, matrix: _Bordered, hessian, beta) -> BranchPoint:
+    """Tangents from the algebraic bifurcation equation; kernel made orthonormal, the Hessian along with it."""
+    tangents = [a @ matrix.kernel for a in _null_directions(hessian)]
+    tangents = [tangent / np.sqrt(inner(system, tangent, tangent)) for tangent in tangents]
+    kernel = _orthonormal(system, matrix.kernel)
+    change = np.array([[inner(system, new, old) for old in matrix.kernel] for new in kernel])
+    gram = np.array([[inner(system, a, b) for b in matrix.kernel] for a in matrix.kernel])
+    change = np.linalg.solve(gram, change.T).T  # new = change @ old
+    return BranchPoint(x, tuple(tangents), kernel, matrix.left(system), change @ hessian @ change.T, float(abs(beta)))
 
 
 def _null_directions(hessian):

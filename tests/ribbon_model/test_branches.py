@@ -57,8 +57,8 @@ def test_the_loop_closes_by_an_independent_integration(branch):
             moment = on_directors(*y[:4], p["M1"], p["M2"], 0.0)
             _, w1, w2, w3, _ = RIBBON.response(*moment, p["kappa_n"], p["nu"])
             a, b, c, d = y[:4]
-            spin = np.array([-b * w1 - c * w2 - d * w3, a * w1 + c * w3 - d * w2, a * w2 + d * w1 - b * w3, a * w3 + b * w2 - c * w1])
-            return np.concatenate([spin / 2, directors(*y[:4])[6:]])
+            turn = np.array([[0, -w1, -w2, -w3], [w1, 0, w3, -w2], [w2, -w3, 0, w1], [w3, w2, -w1, 0]])
+            return np.concatenate([turn @ [a, b, c, d] / 2, directors(*y[:4])[6:]])
 
         end = solve_ivp(rate, (0, 2 * np.pi), [1.0, 0, 0, 0, 0, 0, 0], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
         assert np.abs(end[1:]).max() < 1e-10
@@ -85,7 +85,8 @@ def test_the_half_loop_finds_every_wavenumber_and_follows_the_same_branch(branch
     system = domain.discretize(12, 6, {"nu": NU})
     settings = Settings(limits={"kappa_n": (0, 3.15)}, max_step=0.05)
     points = follow(system, domain.circle(system, 1, 2.0), settings).labelled("BP")
-    assert [point["kappa_n"] for point in points] == pytest.approx([thresholds(RIBBON, 1, n, NU)[0] for n in (2, 3, 4)], abs=1e-9)
+    expected = [thresholds(RIBBON, 1, n, NU)[0] for n in (2, 3, 4)]
+    assert [point["kappa_n"] for point in points] == pytest.approx(expected, abs=1e-9)
     system, x, tangent = half_loop_branch(RIBBON, 1, 2, NU, 16, 6)
     other = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, errors=True), tangent)
     assert other.labelled("LP")[0]["kappa_n"] == pytest.approx(branch.labelled("LP")[0]["kappa_n"], abs=1e-10)
