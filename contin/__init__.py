@@ -16,15 +16,19 @@ from contin.arclength import Continuation, Settings, State, follow
 from contin.branch import Branch, Point, Stop
 from contin.collocation import Collocation
 from contin.corrector import Newton, correct
+from contin.curves import curve
+from contin.diagram import Diagram, diagram
 from contin.errors import ContinError, ConvergenceError, ProblemError
 from contin.events import Monitor
 from contin.mesh import MeshControl
 from contin.problem import BoundaryValueProblem
+from contin.sensitivity import sensitivities
 from contin.solving import point_of, solve, trace
 from contin.switching import BranchPoint, MultiplePoint, locate_branch_point
 
 __all__ = [
     "Algebraic", "AlgebraicProblem", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
-    "Continuation", "ConvergenceError", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "ProblemError",
-    "Settings", "State", "Stop", "correct", "follow", "locate_branch_point", "point_of", "solve", "trace",
+    "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
+    "ProblemError", "Settings", "State", "Stop", "correct", "curve", "diagram", "follow", "locate_branch_point", "point_of",
+    "sensitivities", "solve", "trace",
 ]  # fmt: skip

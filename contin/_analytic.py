@@ -16,9 +16,8 @@ from numba.core.ir_utils import build_definitions
 from numba.core.untyped_passes import IRProcessing
 from numba.extending import overload
 
-
-# Every implementation has a name of its own: numba tells compiled functions apart by name and types, and machine code of several
-# cached modules shares one space of names.
+# Every implementation has a name of its own: numba tells compiled functions apart by name and types, and machine code of
+# several cached modules shares one space of names.
 
 
 def power(x, y):

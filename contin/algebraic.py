@@ -155,6 +155,12 @@ class Algebraic:
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
         return residual, DenseFactors(np.vstack([np.hstack([jacobian, columns.T]), rows]))
 
+    def parameter_columns(self, x, names):
+        """Derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+        which = np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
+        u, p, n = self.states(x), self.all_parameters(x), self.state_size
+        return self.problem.batch("residual").jacobian(_NO_TIME, u, _none(n), p, which)[1][0, :, n:]
+
     def transposed_product(self, x, w):
         """F_x^T w, shape (size,)."""
         return self._jacobian(x)[1].T @ w
@@ -183,6 +189,10 @@ class Algebraic:
 
     def adapted(self, x, control):
         """None: there is no mesh."""
+
+    def with_parameters(self, values):
+        """The same problem with other values of parameters that are not free."""
+        return Algebraic(self.problem, self.free, dict(zip(self.problem.parameters, self.parameters)) | dict(values))
 
     def with_free(self, free, x):
         """The same problem with other free parameters (values from x), and x for it."""

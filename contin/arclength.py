@@ -129,6 +129,12 @@ class _Event:
     details: object = None
 
 
+def _same_place(event: _Event, found: list[_Event]) -> bool:
+    """Whether a fold is no event of its own: the parameter also turns where branches cross, and at a cusp of folds."""
+    others = [other for other in found if other.label in ("BP", "CP") or other.name == "trivial branch"]
+    return event.label == "LP" and any(np.max(np.abs(event.trial.x - other.trial.x)) < 1e-4 for other in others)
+
+
 class Continuation:
     """One run along a branch; iterate over it for the points, then read ``stop``.
 
@@ -275,8 +281,8 @@ class Continuation:
                 distance = np.sqrt(inner(state.system, gap, gap))
                 cosine = inner(state.system, trial.tangent, state.tangent)
                 if cosine >= np.cos(settings.angle) and distance <= 0.3 * step:
-                    trial.passed = self._passed(state, trial)
-                    if step < 2 * finest or trial.passed < 2:
+                    trial.passed, clear = self._passed(state, trial)
+                    if step < 2 * finest or (trial.passed < 2 and clear):
                         return step, trial, distance
                     problem = ConvergenceError("several branch points in one step")
                 else:
@@ -287,10 +293,10 @@ class Continuation:
             if step < settings.min_step:
                 raise problem
 
-    def _passed(self, state: State, trial: Trial) -> int:
-        """How many branch points the step passes, counted by singular values (the determinant sees the parity only)."""
+    def _passed(self, state: State, trial: Trial) -> tuple[int, bool]:
+        """How many branch points the step passes, by :func:`crossings` (the determinant sees the parity only)."""
         if state.singular or not self.settings.branch_points:
-            return 0
+            return 0, True
         if self._factors is None or self._factors[0] is not state.system:
             self._factors = (state.system, state.system.linearize(state.x, (state.system.weights * state.tangent,))[1])
         return crossings(self._factors[1], trial.factors, state.system.size)
@@ -367,18 +373,24 @@ class Continuation:
             elif trial.passed > 1:
                 found.append(self._multiple_point(state, trial, step))
             for monitor in self._monitors:
-                if sign_changed(monitor.function(before), monitor.function(trial)):
+                if self._changes(monitor, state, before, trial, step):
                     event = self._locate(state, trial, step, monitor)
                     if monitor.confirm is not None and not monitor.confirm(event.trial):
                         continue
-                    # where branches cross, a turn of the parameter is no fold of its own
-                    if monitor.label != "LP" or all(np.max(np.abs(event.trial.x - f.trial.x)) > 1e-4 for f in found[:1]):
-                        found.append(event)
+                    found.append(event)
+            found = [event for event in found if not _same_place(event, found)]
         closed = self._closed(state, trial, step)
         if closed is not None:
             found.append(closed)
         for event in sorted(found, key=lambda event: event.at):
             yield self._point(event.label, event.name, event.trial, event.at, state, event.details), event.stop
+
+    def _changes(self, monitor, state, before, trial, step) -> bool:
+        """Whether a monitor passes zero in a step; one of the tangent is looked at again with the exact one."""
+        value = monitor.function(before)
+        if not sign_changed(value, monitor.function(trial)):
+            return False
+        return monitor.label != "LP" or sign_changed(value, monitor.function(self._trial(state, trial.x, step, exact=True)))
 
     def _between(self, state, trial, step, at):
         """A guess on the curve by the cubic through both ends and their tangents."""

@@ -276,6 +276,15 @@ class Collocation:
         residual, blocks = self._blocks(x, rows, columns)
         return residual, Factorization(*blocks)
 
+    def parameter_columns(self, x, names):
+        """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
+        n, p, u = self._n, self.all_parameters(x), self.states(x)
+        which = np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
+        field = self.problem.batch("field").jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, which)[1][:, :, n:]
+        ends = self.problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, which)[1][0, :, 2 * n :]
+        collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
+        return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self._quadrature, field[:, n:])])
+
     def transposed_product(self, x, w):
         """F_x^T w, shape (size,), for w (equations,)."""
         n = self._n
@@ -329,6 +338,11 @@ class Collocation:
         """The same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
         mesh = adapted_mesh(self, x, control) if control.every else None
         return None if mesh is None else self.on_mesh(mesh)
+
+    def with_parameters(self, values):
+        """The same problem with other values of parameters that are not free."""
+        names = dict(zip(self.problem.parameters, self.parameters)) | dict(values)
+        return Collocation(self.problem, self.mesh, self.degree, self.free, names)
 
     def with_free(self, free, x):
         """The same problem with other free parameters (values from x), on the same mesh, and x for it."""

@@ -107,6 +107,7 @@ class _Prepared:
 
     def __init__(self) -> None:
         self._done: dict[object, tuple[Dispatcher, str]] = {}
+        self._open: set[object] = set()
         self._hashes = [hashlib.sha256()]  # of the whole, and of each function being looked at
 
     def fingerprint(self) -> str:
@@ -125,13 +126,17 @@ class _Prepared:
         function = getattr(function, "py_func", function)
         if not isinstance(function, types.FunctionType):
             raise ProblemError(f"{function!r} must be a plain Python function (def or lambda)")
+        if function in self._open:
+            raise ProblemError(f"function {function.__name__!r} calls itself; write a loop instead")
         if function not in self._done:
+            self._open.add(function)
             self._hashes.append(hashlib.sha256())
             copy = self._copy(function)
             digest = self._hashes.pop().hexdigest()
             copy.__name__ = copy.__qualname__ = f"user_{digest[:32]}"
             compiled = numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler)
             self._done[function] = compiled, digest
+            self._open.discard(function)
         compiled, digest = self._done[function]
         self.note(digest)
         return compiled
@@ -140,7 +145,7 @@ class _Prepared:
         """The function with everything that it refers to made ready, its fingerprint taken on the way."""
         code = function.__code__
         names = self._code(code)
-        self.note(function.__defaults__)
+        self.note(function.__defaults__, function.__kwdefaults__)
         globals_ = {"__name__": function.__module__, "__builtins__": __builtins__}
         for name in sorted(names):
             if name in function.__globals__:
@@ -148,7 +153,9 @@ class _Prepared:
             elif name in ("abs", "max", "min"):
                 globals_[name] = self._value(getattr(builtins, name), names)
         cells = [types.CellType(self._value(cell.cell_contents, names)) for cell in function.__closure__ or ()]
-        return types.FunctionType(code, globals_, function.__name__, function.__defaults__, tuple(cells) or None)
+        copy = types.FunctionType(code, globals_, function.__name__, function.__defaults__, tuple(cells) or None)
+        copy.__kwdefaults__ = function.__kwdefaults__
+        return copy
 
     def _code(self, code: types.CodeType) -> set[str]:
         """Take the fingerprint of a code object and of those inside it; the names that they use."""

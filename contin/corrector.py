@@ -61,7 +61,7 @@ def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), fact
         Not converged, or not finite; the message holds the last updates.
     """
     rows = () if row is None else (row,)
-    x, history = np.array(guess, dtype=float), []
+    x, history, moved = np.array(guess, dtype=float), [], 1.0
     with np.errstate(all="ignore"):
         for _ in range(newton.max_iterations):
             if factors is None:
@@ -76,7 +76,8 @@ def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), fact
                 break
             history.append(size)
             x = x - update
-            rate = _rate(history, fresh)
+            moved = size if fresh else moved + size
+            rate = _rate(history, fresh, moved)
             if size * rate <= newton.tolerance or (size < _ROUND_OFF and len(history) > 1 and rate >= 0.5):
                 return Corrected(x, factors, len(history), size * rate)
             if len(history) > 2 and size > 2 * history[-2] > _ROUND_OFF:
@@ -87,8 +88,8 @@ def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), fact
     raise ConvergenceError(f"Newton did not converge (updates {updates})")
 
 
-def _rate(history, fresh) -> float:
-    """Estimated ratio of the error after the last update to its size."""
+def _rate(history, fresh, moved) -> float:
+    """Estimated ratio of the error after the last update to its size; ``moved``: distance from where the Jacobian was taken."""
     last = history[-1]
     if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
         ratio = last if len(history) < 2 else max(last, last / history[-2] * min(1.0, last / history[-2]))
@@ -96,4 +97,4 @@ def _rate(history, fresh) -> float:
     if len(history) < 2:
         return 1.0
     ratio = last / history[-2]
-    return ratio / (1 - ratio) if ratio < 0.5 else 1.0
+    return max(min(moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0

@@ -102,7 +102,7 @@ class MultiplePoint:
 
 
 #: Singular directions watched between two points.
-_WATCHED = 2
+_WATCHED = 3
 
 
 def smallest_directions(factors, size, count: int = _WATCHED):
@@ -125,20 +125,25 @@ def smallest_directions(factors, size, count: int = _WATCHED):
     return right, left, right.T @ solved
 
 
-def crossings(before, after, size) -> int:
-    """How many singular values pass zero between two neighbouring matrices, from their factors.
+#: Factor by which a watched singular value may shrink in one step without passing zero.
+_SHRINKS = 3.5
+
+
+def crossings(before, after, size) -> tuple[int, bool]:
+    """How many singular values pass zero between two neighbouring matrices, from their factors, and whether that is clear.
 
     In the directions in which ``after`` is nearest to singular, J^-1 of the two is compared: each passage turns one eigenvalue
     of the quotient negative. A determinant sees the parity only; two modes that cross together, or two branch points in one
-    step, are seen here.
+    step, are seen here. Where a watched value shrinks by a large factor, others may have passed behind it: that is not clear.
     """
     with np.errstate(all="ignore"):
         right, left, response = smallest_directions(after, size)
         earlier = right.T @ np.array([before.solve(w) for w in left.T]).T
         if not (np.all(np.isfinite(response)) and np.all(np.isfinite(earlier))):
-            return 0
+            return 0, True
         values = np.linalg.eigvals(np.linalg.lstsq(earlier, response, rcond=None)[0])
-    return int(np.count_nonzero((values.real < 0) & (np.abs(values.imag) < np.abs(values.real))))
+    passed = (values.real < 0) & (np.abs(values.imag) < np.abs(values.real))
+    return int(np.count_nonzero(passed)), not np.any(~passed & (np.abs(values) > _SHRINKS))
 
 
 def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: int = 12) -> BranchPoint:
@@ -168,6 +173,8 @@ def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: in
             # one Newton step for F + beta psi = 0 and, through its gradient g, for grad beta = 0
             correction = matrix.factors.solve(np.concatenate([matrix.residual + beta * psi, [0.0, 0.0]]))
             drop, *_ = np.linalg.lstsq(hessian, matrix.g, rcond=1e-9)
+            if np.abs(hessian @ drop - matrix.g).max() > 0.5 * np.abs(matrix.g).max():
+                break  # a gradient that does not change along the kernel: no branch point here
             update = correction[:-1] + drop @ matrix.kernel
             beta -= correction[-1]
             x = x - update

@@ -1,6 +1,9 @@
 """Compiled functions: values, exact derivatives, and a cache that notices every edit."""
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -140,3 +143,51 @@ def test_what_cannot_be_compiled_says_so():
 def test_outputs_counts_without_compiling():
     assert outputs(lambda t, u, p: (u.a, u.b, 1), (None, ("a", "b"), ()), "f") == 3
     assert outputs(lambda t, u, p: u.a, (None, ("a", "b"), ()), "f") == 0
+
+
+SAME_NAMES = """
+import sys
+from contin import BoundaryValueProblem, Collocation
+
+def problem(helper):
+    def rhs(t, u, p):
+        return (helper(u.x),)
+    return BoundaryValueProblem(rhs, lambda a, b, p: (a.x - 1,), ["x"], {"k": 1.0})
+
+def one():
+    def helper(x):
+        return 10 * x
+    return problem(helper)
+
+def two():
+    def helper(x):
+        return x + 20
+    return problem(helper)
+
+for name in sys.argv[1:]:
+    system = Collocation(globals()[name](), [0, 1], 2, ["k"], {})
+    print(system.residual(system.pack([[3.0]] * 3, {"k": 1.0}))[0])
+"""
+
+
+def test_functions_of_one_name_compiled_by_two_processes_stay_apart(tmp_path):
+    """Each compiled by a process of its own, both loaded by a third: -h f(3) is -30 and -23."""
+    script = tmp_path / "same_names.py"
+    script.write_text(SAME_NAMES)
+    environment = {**os.environ, "CONTIN_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+
+    def run(*names):
+        done = subprocess.run([sys.executable, script, *names], env=environment, capture_output=True, text=True, check=True)
+        return [float(line) for line in done.stdout.split()]
+
+    assert run("one") == pytest.approx([-30])
+    assert run("two") == pytest.approx([-23])
+    assert run("one", "two") == pytest.approx([-30, -23])
+
+
+def test_a_function_that_calls_itself_is_refused():
+    def rhs(t, u, p):
+        return rhs(t, u, p) if False else (u.v, u.u)
+
+    with pytest.raises(ProblemError, match="calls itself"):
+        BoundaryValueProblem(rhs, boundary, ["u", "v"], {"k": 1.0}).batch("field")
