@@ -74,7 +74,7 @@ class Settings:
     monitors: Sequence[Monitor] = ()
     folds: bool = True
     branch_points: bool = True
-    errors: bool = False
+    errors: bool = True
     angle: float = 0.35
     accuracy: float = 0.02
     newton: Newton = field(default_factory=Newton)
@@ -199,20 +199,32 @@ class Continuation:
         if tangent is not None:
             tangent = tangent / np.sqrt(inner(system, tangent, tangent))
             return State(system, x, tangent, None, 1.0, settings.step, np.nan, 0.0, 0, True)
-        row = np.zeros(system.size)
-        row[system.parameter_index(self.primary)] = 1.0
         for _ in range(3):
-            corrected = correct(system, x, row, row @ x, settings.newton)
-            x = corrected.x
+            x, row = self._first_correction(system, x)
             adapted = system.adapted(x, settings.mesh)
             if adapted is None:
                 break
             system, carry = adapted
-            x, row = carry(x), np.append(np.zeros(system.state_size), row[-len(system.free) :])
+            x = carry(x)
+        else:
+            x, row = self._first_correction(system, x)
         tangent = self._tangent(system, x, row)
         tangent *= settings.direction * (np.sign(tangent[system.parameter_index(self.primary)]) or 1.0)
         sign = system.linearize(x, (system.weights * tangent,))[1].sign
         return State(system, x, tangent, None, 1.0, settings.step, sign, 0.0, 0, False)
+
+    def _first_correction(self, system, x):
+        """x corrected at fixed primary parameter or, where that is singular (at a fold), across a random direction."""
+        fixed = np.zeros(system.size)
+        fixed[system.parameter_index(self.primary)] = 1.0
+        across = np.random.default_rng(3).standard_normal(system.size) * np.sqrt(system.weights)
+        try:
+            return correct(system, x, fixed, fixed @ x, self.settings.newton).x, fixed
+        except ConvergenceError as error:
+            try:
+                return correct(system, x, across, across @ x, self.settings.newton).x, across
+            except ConvergenceError:
+                raise error from None
 
     @staticmethod
     def _tangent(system, x, row):

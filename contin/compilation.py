@@ -32,7 +32,7 @@ from contin._analytic import AnalyticCompiler
 from contin.errors import ProblemError
 
 #: Part of every fingerprint: changes when functions are compiled by other rules (the template has its own part).
-_RULES = 4
+_RULES = 5
 
 _TEMPLATE = '''"""Generated; safe to delete."""
 from collections import namedtuple
@@ -146,7 +146,7 @@ class _Prepared:
         code = function.__code__
         names = self._code(code)
         self.note(function.__defaults__, function.__kwdefaults__)
-        globals_ = {"__name__": function.__module__, "__builtins__": __builtins__}
+        globals_ = {"__name__": __name__, "__builtins__": __builtins__}  # numba imports the module of that name
         for name in sorted(names):
             if name in function.__globals__:
                 globals_[name] = self._value(function.__globals__[name], names)

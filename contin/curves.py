@@ -16,7 +16,6 @@ import numpy as np
 
 from contin.arclength import Settings, follow
 from contin.branch import Branch, Point
-from contin.corrector import correct
 from contin.errors import ProblemError
 from contin.events import Monitor
 from contin.switching import BranchPoint, _Bordered, locate_branch_point
@@ -251,6 +250,4 @@ def curve(start: Point, second: str, settings: Settings | None = None, **options
         extended = FoldCurve(base, primary=system.free.index(start.name))
     else:
         raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} is neither a fold nor a branch point")
-    row = np.zeros(extended.size)
-    row[extended.parameter_index(second)] = 1.0
-    return follow(extended, correct(extended, x, row, row @ x, settings.newton).x, settings)
+    return follow(extended, x, settings)

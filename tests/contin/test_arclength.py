@@ -218,6 +218,17 @@ def test_unknown_names_are_refused(settings, said):
         Continuation(*bratu_start(), Settings(**settings))
 
 
+def test_a_run_can_start_right_at_a_fold():
+    """The fold of Bratu's problem, given to 12 digits: both halves of the branch leave from there."""
+    (fold,) = follow(*bratu_start(), Settings(limits={"mean": (-1, 3)}, errors=False)).labelled("LP")
+    means = []
+    for direction in (1, -1):
+        branch = follow(fold.system, fold.x, Settings(direction=direction, limits={"lam": (3, 4)}))
+        assert branch.points[-1]["lam"] == pytest.approx(3, abs=1e-10)
+        means.append(branch.points[-1]["mean"])
+    assert max(means) - min(means) > 0.5
+
+
 def test_the_number_of_free_parameters_is_counted():
     system = Collocation(bratu(), [0, 1], 4, [], {})
     with pytest.raises(ProblemError, match="needs 1"):
