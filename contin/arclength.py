@@ -27,6 +27,10 @@ from contin.switching import MultiplePoint, along, crossings, inner, locate_bran
 
 #: A step is cut down to this fraction of itself to take several branch points one by one, before they count as one.
 _FINEST = 1e-3
+#: A corrected point this many times further from its prediction than aimed at is not believed.
+_ASTRAY = 2.5
+#: Share of the states in a tangent below which their direction says nothing.
+_STILL = 0.01
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,8 @@ class Settings:
         changes them by less than the mesh tolerance: the last change is their error estimate.
     angle : float
         Largest angle between the tangents of consecutive points, radians.
+    change : float
+        Largest change of any free parameter p in one step, as a fraction of 1 + |p|.
     accuracy : float
         Distance between predicted and corrected point that the step aims at, as a fraction of the step.
     newton, mesh :
@@ -76,6 +82,7 @@ class Settings:
     branch_points: bool = True
     errors: bool = True
     angle: float = 0.35
+    change: float = 0.4
     accuracy: float = 0.02
     newton: Newton = field(default_factory=Newton)
     mesh: MeshControl = field(default_factory=MeshControl)
@@ -89,7 +96,7 @@ class Settings:
             )
         if self.max_points < 1:
             raise ProblemError(f"max_points: {self.max_points} must be at least 1")
-        for name in ("angle", "accuracy"):
+        for name in ("angle", "accuracy", "change"):
             if not 0 < getattr(self, name) < 1.5:
                 raise ProblemError(f"{name}: {getattr(self, name)} must lie between 0 and 1.5")
         for name, ends in self.limits.items():
@@ -132,7 +139,10 @@ class _Event:
 def _same_place(event: _Event, found: list[_Event]) -> bool:
     """Whether a fold is no event of its own: the parameter also turns where branches cross, and at a cusp of folds."""
     others = [other for other in found if other.label in ("BP", "CP") or other.name == "trivial branch"]
-    return event.label == "LP" and any(np.max(np.abs(event.trial.x - other.trial.x)) < 1e-4 for other in others)
+    if event.label != "LP" or not others:
+        return False
+    lost = event.name.startswith("possible")  # the equations are singular at the crossing: nothing else was found
+    return lost or any(np.max(np.abs(event.trial.x - other.trial.x)) < 1e-4 for other in others)
 
 
 class Continuation:
@@ -258,7 +268,7 @@ class Continuation:
         self._refine()
         state = self.state
         try:
-            step, trial, distance = self._step(state)
+            state, step, trial, distance = self._step(state)
         except ConvergenceError as error:
             self.stop = Stop(
                 "no convergence", f"the step became smaller than min_step = {self.settings.min_step:g} ({error})",
@@ -280,8 +290,11 @@ class Continuation:
     # --- one step ------------------------------------------------------------------------------------------------
 
     def _step(self, state: State):
-        """Predict and correct, halving the step until the corrected point can be believed."""
-        step, settings = state.step, self.settings
+        """Predict and correct, halving the step until the corrected point can be believed.
+
+        Returns the state as well: at the first failure its tangent is taken anew, right at its point.
+        """
+        step, settings, exact = state.step, self.settings, False
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
@@ -291,19 +304,29 @@ class Continuation:
                     raise ConvergenceError("the equations are not finite at the corrected point")
                 gap = guess - trial.x
                 distance = np.sqrt(inner(state.system, gap, gap))
-                cosine = inner(state.system, trial.tangent, state.tangent)
-                if cosine >= np.cos(settings.angle) and distance <= 0.3 * step:
+                turn = self._turn(state, trial)
+                if turn <= settings.angle and distance <= _ASTRAY * settings.accuracy * step:
                     trial.passed, clear = self._passed(state, trial)
                     if step < 2 * finest or (trial.passed < 2 and clear):
-                        return step, trial, distance
+                        return state, step, trial, distance
                     problem = ConvergenceError("several branch points in one step")
                 else:
-                    problem = ConvergenceError(f"tangents turn by {np.arccos(np.clip(cosine, -1, 1)):.2f} rad in one step")
+                    problem = ConvergenceError(
+                        f"tangents turn by {turn:.2f} rad in one step, the prediction is off by {distance / step:.2f} of it"
+                    )
             except ConvergenceError as error:
                 problem = error
+            if not exact and not state.singular:
+                state, exact = dataclasses.replace(state, tangent=self._exact_tangent(state)), True
             step /= 2
             if step < settings.min_step:
                 raise problem
+
+    def _exact_tangent(self, state: State):
+        """The tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""
+        row = state.system.weights * state.tangent
+        tangent = self._tangent(state.system, state.x, row)
+        return tangent if np.all(np.isfinite(tangent)) else state.tangent
 
     def _passed(self, state: State, trial: Trial) -> tuple[int, bool]:
         """How many branch points the step passes, by :func:`crossings` (the determinant sees the parity only)."""
@@ -312,6 +335,20 @@ class Continuation:
         if self._factors is None or self._factors[0] is not state.system:
             self._factors = (state.system, state.system.linearize(state.x, (state.system.weights * state.tangent,))[1])
         return crossings(self._factors[1], trial.factors, state.system.size)
+
+    @staticmethod
+    def _turn(state: State, trial: Trial) -> float:
+        """The angle between the tangents at both ends: of the whole and, at half weight, of the states alone.
+
+        Where parameters are large they dominate the norm, and two branches can look parallel that are not.
+        """
+        system = state.system
+        whole = inner(system, trial.tangent, state.tangent)
+        weights = system.weights[: system.state_size]
+        a, b = trial.tangent[: system.state_size], state.tangent[: system.state_size]
+        sizes = np.sqrt((weights * a) @ a), np.sqrt((weights * b) @ b)
+        part = (weights * a) @ b / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
+        return float(max(np.arccos(np.clip(whole, -1, 1)), np.arccos(np.clip(part, -1, 1)) / 2))
 
     @staticmethod
     def _predict(state: State, step: float):
@@ -337,9 +374,11 @@ class Continuation:
         order = 2 if state.previous_tangent is None else 3
         aim = settings.accuracy * step
         factor = 2.0 if distance == 0 else (aim / distance) ** (1 / order)
-        turn = np.arccos(np.clip(inner(state.system, trial.tangent, state.tangent), -1, 1))
+        turn = self._turn(state, trial)
         factor = min(factor, 0.8 * settings.angle / max(turn, 1e-12))
-        following = float(np.clip(step * np.clip(factor, 0.3, 2.0), settings.min_step, settings.max_step))
+        p, rate = trial.x[state.system.state_size :], trial.tangent[state.system.state_size :]
+        longest = min(settings.max_step, settings.change * float(np.min((1 + np.abs(p)) / (np.abs(rate) + 1e-300))))
+        following = float(np.clip(step * np.clip(factor, 0.3, 2.0), settings.min_step, max(longest, settings.min_step)))
         gone = trial.x - state.x
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
