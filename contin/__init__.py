@@ -24,11 +24,12 @@ from contin.mesh import MeshControl
 from contin.problem import BoundaryValueProblem
 from contin.sensitivity import sensitivities
 from contin.solving import point_of, solve, trace
+from contin.storage import load, save
 from contin.switching import BranchPoint, MultiplePoint, locate_branch_point
 
 __all__ = [
     "Algebraic", "AlgebraicProblem", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
-    "ProblemError", "Settings", "State", "Stop", "correct", "curve", "diagram", "follow", "locate_branch_point", "point_of",
-    "sensitivities", "solve", "trace",
+    "ProblemError", "Settings", "State", "Stop", "correct", "curve", "diagram", "follow", "load", "locate_branch_point",
+    "point_of", "save", "sensitivities", "solve", "trace",
 ]  # fmt: skip

@@ -1,0 +1,112 @@
+"""Branches in files: one ``.npz`` without pickles, from which every point can start another run."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from contin.algebraic import Algebraic, AlgebraicProblem
+from contin.branch import Branch, Point, Stop
+from contin.collocation import Collocation
+from contin.errors import ProblemError
+from contin.switching import BranchPoint
+
+_FORMAT = "contin branch 1"
+_OF_BRANCH_POINT = ("kernel", "left", "hessian")
+
+
+def save(branch: Branch, path: str | Path) -> None:
+    """Write a branch: all its points, with their solutions.
+
+    The problem itself is code and is not stored: :func:`load` takes it again. Details of branch points are kept, those of other
+    events are not.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; the one that was there is left as it was.
+    ProblemError
+        Points of an extended system (:func:`contin.curve`), which cannot start other runs.
+    """
+    systems: list = []
+    rows, arrays = [], {}
+    for number, point in enumerate(branch.points):
+        if not isinstance(point.system, (Collocation, Algebraic)):
+            raise ProblemError("points of a curve in two parameters are not stored; keep their columns")
+        at = next((i for i, system in enumerate(systems) if system is point.system), len(systems))
+        if at == len(systems):
+            systems.append(point.system)
+            arrays[f"parameters{at}"] = point.system.parameters
+            if isinstance(point.system, Collocation):
+                arrays[f"mesh{at}"] = point.system.mesh
+        arrays[f"x{number}"], arrays[f"tangent{number}"] = point.x, point.tangent
+        if isinstance(point.details, BranchPoint):
+            for name in _OF_BRANCH_POINT:
+                arrays[f"{name}{number}"] = getattr(point.details, name)
+            arrays[f"tangents{number}"] = np.array(point.details.tangents)
+        rows.append({
+            "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
+            "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
+            "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
+        })  # fmt: skip
+    first = branch.points[0].system
+    stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
+    head = {
+        "format": _FORMAT, "points": rows, "stop": stop, "free": first.free, "degrees": [s.degree for s in systems],
+        "states": first.problem.states, "names": list(first.problem.parameters),
+    }  # fmt: skip
+    path = Path(path)
+    temporary = path.with_name(path.name + ".part")
+    try:
+        with open(temporary, "wb") as file:
+            np.savez_compressed(file, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def load(problem, path: str | Path) -> Branch:
+    """Read a branch back, as points of ``problem``.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    ProblemError
+        It is no branch, or one of a problem with other states or parameters.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            head = json.loads(file["head"].tobytes())
+            if head["format"] != _FORMAT:
+                raise KeyError("format")
+            arrays = {name: file[name] for name in file.files}
+    except (KeyError, ValueError, EOFError) as error:
+        raise ProblemError(f"{str(path)!r} is no branch stored by contin") from error
+    if tuple(head["states"]) != tuple(problem.states) or head["names"] != list(problem.parameters):
+        raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
+    systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
+    points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
+    return Branch(points, Stop(*head["stop"]) if head["stop"] else None)
+
+
+def _system(problem, head, arrays, i):
+    values = dict(zip(head["names"], arrays[f"parameters{i}"]))
+    if isinstance(problem, AlgebraicProblem):
+        return Algebraic(problem, head["free"], values)
+    return Collocation(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values)
+
+
+def _point(row, system, arrays, number) -> Point:
+    x, details = arrays[f"x{number}"], None
+    if row["imperfection"] is not None:
+        kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}
+        details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)
+    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+    return Point(
+        row["label"], row["name"], parameters, row["functionals"], x, arrays[f"tangent{number}"], system, row["arclength"],
+        row["iterations"], row["newton_error"], row["errors"], details,
+    )  # fmt: skip
