@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 
 class ConfigError(Exception):
@@ -21,7 +25,7 @@ class MeshConfig(_Strict):
     """How finely a branch is resolved."""
 
     degree: int = Field(7, ge=2, le=8, description="polynomial degree of the collocation")
-    intervals: int = Field(10, ge=1, le=2000, description="intervals of the first mesh")
+    intervals: int = Field(8, ge=1, le=2000, description="intervals of the first mesh")
     max_intervals: int = Field(2000, ge=1, le=2000)
     tolerance: float = Field(1e-12, ge=1e-14, le=1e-2, description="wanted error; the number of intervals adapts to it")
     adapt_every: int = Field(3, ge=0, description="steps between looks at the mesh, 0 for a fixed one")
@@ -36,7 +40,7 @@ class MeshConfig(_Strict):
 class StepConfig(_Strict):
     """How a branch is stepped along."""
 
-    first: float = Field(0.05, ge=1e-6, le=10, description="first step of arclength")
+    first: float | None = Field(None, ge=1e-6, le=10, description="first step of arclength; 0.05 where the bounds allow it")
     smallest: float = Field(1e-6, gt=0, le=1)
     largest: float = Field(10.0, gt=0, description="largest step of arclength")
     max_points: int = Field(2000, ge=1, le=1_000_000)
@@ -44,20 +48,28 @@ class StepConfig(_Strict):
 
     @model_validator(mode="after")
     def _order(self):
-        if not self.smallest <= self.first <= self.largest:
+        if self.smallest > self.largest:
+            raise ValueError(f"smallest = {self.smallest:g} must not exceed largest = {self.largest:g}")
+        if self.first is not None and not self.smallest <= self.first <= self.largest:
             raise ValueError(
                 f"first = {self.first:g} must lie between smallest = {self.smallest:g} and largest = {self.largest:g}"
             )
         return self
 
+    @property
+    def first_step(self) -> float:
+        """The first step of arclength, chosen where ``first`` is not given."""
+        return min(max(0.05, self.smallest), self.largest) if self.first is None else self.first
 
-def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
-    if not ends[0] < ends[1]:
-        raise ValueError(f"the first number must be the smaller, not {ends[0]:g}, {ends[1]:g}")
-    return ends
+
+def _two_ordered_numbers(ends: Any) -> Any:
+    numbers = isinstance(ends, (list, tuple)) and all(type(end) in (int, float) and math.isfinite(end) for end in ends)
+    if not (numbers and len(ends) == 2 and ends[0] < ends[1]):
+        raise ValueError(f"must be two finite numbers, the smaller first, as in [-100, 100], not {_show(ends)}")
+    return tuple(ends)
 
 
-Interval = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ordered)]
+Interval = Annotated[tuple[float, float], BeforeValidator(_two_ordered_numbers)]
 Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]
 
 
@@ -71,24 +83,121 @@ class Config(_Strict):
     n: int = Field(ge=1, le=1000, description="wavenumber of the mode")
     domain: Literal["cell", "half loop"] = "cell"
     limits: dict[Column, Interval] = Field(default_factory=lambda: {"kappa_n": (-100.0, 100.0)})
-    zeros: dict[Column, list[float]] = Field(default_factory=dict, description="values to label UZ")
+    zeros: dict[Column, Annotated[list[float], Field(max_length=100)]] = Field(
+        default_factory=dict, description="values to label UZ"
+    )
     mesh: MeshConfig = MeshConfig()
     steps: StepConfig = StepConfig()
     stride: int = Field(1, ge=1, description="the full solution is kept at every stride-th point and at labelled ones")
 
     @model_validator(mode="after")
     def _bifurcation_exists(self):
+        if self.domain == "cell" and self.m % (2 * self.n) == 0:
+            raise ValueError(f"m = {self.m}, n = {self.n}: m / n must not be even on the cell, where the loop would stay open")
+        start = self.at_bifurcation()
+        for name, (low, high) in self.limits.items():
+            if not low < start[name] < high:
+                raise ValueError(
+                    f"limits: {name}: {low:g}, {high:g} must contain the start of the branch, {name} = {start[name]:.6g}"
+                )
+        return self
+
+    def at_bifurcation(self) -> dict[Column, float]:
+        """What the columns are on the circle where the branch starts (there the strain is omega = (m, 0, 0)).
+
+        Raises
+        ------
+        ValueError
+            The mode has no bifurcation; see :func:`ribbon_model.linear.thresholds`.
+        """
         from ribbon_model.laws import LAWS
         from ribbon_model.linear import thresholds
 
-        kappa_n = thresholds(LAWS[self.law], self.m, self.n, self.nu)[0]
-        for name, (low, high) in self.limits.items():
-            if name == "kappa_n" and not low < kappa_n < high:
-                raise ValueError(f"limits: kappa_n: {low:g}, {high:g} must contain the bifurcation at {kappa_n:.6g}")
-        return self
+        m, kappa_n = self.m, thresholds(LAWS[self.law], self.m, self.n, self.nu)[0]
+        return {"kappa_n": kappa_n, "kappa_star": m, "energy": m * m / 2 - m * kappa_n, "M1": m - kappa_n, "M2": 0.0}
 
 
-def load(path: str | Path, settings: list[str] = ()) -> Config:
+@dataclass(frozen=True)
+class DiagramConfig:
+    """A scene of many branches: lists in place of ``law``, ``nu``, ``m`` or ``n``, or ``pairs`` of (m, n).
+
+    Attributes
+    ----------
+    title : str
+    values : dict
+        The scene as it was written.
+    branches : tuple of Config
+        Every combination, n = m (a rigid rotation) and, on the cell, even m / n (a loop that stays open) left out.
+    absent : dict
+        Combinations that cannot be run, by name, with the reason: no such bifurcation, or one outside the limits.
+    """
+
+    title: str
+    values: dict
+    branches: tuple[Config, ...]
+    absent: dict[str, str]
+
+
+#: Fields that may hold a list; a scene that has one, or ``pairs``, is a diagram.
+_SWEPT = ("law", "nu", "m", "n")
+#: More branches than anybody wants in one scene.
+_MOST_BRANCHES = 10_000
+
+
+def _is_diagram(values: dict) -> bool:
+    return "pairs" in values or any(isinstance(values.get(name), list) for name in _SWEPT)
+
+
+def _diagram(values: dict, name: str, settings: list[str]) -> DiagramConfig:
+    """The scene of many branches that these values state."""
+    lists = {key: values[key] if isinstance(values.get(key), list) else [values[key]] for key in _SWEPT if key in values}
+    for key, entries in lists.items():
+        if not entries:
+            raise ConfigError(f"{name}: {key}: the list is empty")
+    pairs = _pairs(values, lists, name)
+    families = list(itertools.product(lists.get("law", ["ribbon"]), lists.get("nu", [0.3])))
+    if len(families) * len(pairs) > _MOST_BRANCHES:
+        raise ConfigError(f"{name}: {len(families) * len(pairs)} branches are more than {_MOST_BRANCHES}")
+    shared = {key: value for key, value in values.items() if key not in (*_SWEPT, "pairs", "title")}
+    found, absent = [], {}
+    for (law, nu), (m, n) in itertools.product(families, pairs):
+        whole = type(m) is int and type(n) is int and m > 0 and n > 0
+        if whole and (m == n or (shared.get("domain", "cell") == "cell" and m % (2 * n) == 0)):
+            continue
+        try:
+            found.append(Config.model_validate({**shared, "law": law, "nu": nu, "m": m, "n": n}))
+        except ValidationError as error:
+            if error.errors()[0]["loc"]:  # a field is wrong in itself, whatever the combination
+                raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
+            absent[f"{law}, nu = {nu:g}, ({m}, {n})"] = _sentence(error)
+    if not found:
+        reason = next(iter(absent.values()), "n = m is a rigid rotation")
+        raise ConfigError(f"{name}: none of its branches can be run ({reason})")
+    if len(set(found_keys := [(c.law, c.nu, c.m, c.n) for c in found])) < len(found_keys):
+        raise ConfigError(f"{name}: a branch stands twice in the lists")
+    return DiagramConfig(str(values.get("title", "")), values, tuple(found), absent)
+
+
+def _pairs(values: dict, lists: dict, name: str) -> list[tuple]:
+    """All (m, n) of a diagram."""
+    if "pairs" not in values:
+        for key in ("m", "n"):
+            if key not in lists:
+                raise ConfigError(f"{name}: the field {key!r} is missing")
+        return list(itertools.product(lists["m"], lists["n"]))
+    if "m" in values or "n" in values:
+        raise ConfigError(f"{name}: pairs: stands beside m or n; give either pairs or lists of m and n")
+    pairs = values["pairs"]
+    if not (isinstance(pairs, list) and pairs and all(isinstance(pair, list) and len(pair) == 2 for pair in pairs)):
+        raise ConfigError(f"{name}: pairs: must be a list of [m, n], not {_show(pairs)}")
+    return [tuple(pair) for pair in pairs]
+
+
+#: A scene is a few lines; what is larger is some other file (or a device that never ends).
+_MOST_BYTES = 1_000_000
+
+
+def load(path: str | Path, settings: list[str] = ()) -> Config | DiagramConfig:
     """The scene of a YAML file, with ``key=value`` settings (dotted keys, YAML values) put over it.
 
     Raises
@@ -97,65 +206,137 @@ def load(path: str | Path, settings: list[str] = ()) -> Config:
         A file that cannot be read, or a field that is unknown, of the wrong type or impossible.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        with open(path, "rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+        text = data.decode("utf-8")
     except OSError as error:
         raise ConfigError(f"cannot read the config {str(path)!r}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"cannot read the config {str(path)!r}: it is not UTF-8 text") from error
+    if len(data) > _MOST_BYTES:
+        raise ConfigError(f"cannot read the config {str(path)!r}: it is larger than a megabyte, which no scene is")
     return parse(text, str(path), settings)
 
 
-def parse(text: str, name: str, settings: list[str] = ()) -> Config:
+def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramConfig:
     """The scene of a YAML text; ``name`` says in messages where it came from."""
     values = _yaml(text, name)
     if not isinstance(values, dict):
-        raise ConfigError(f"{name}: must hold `key: value` lines, not {_show(values)}")
+        found = "it is empty" if values is None else f"not {_show(values)}"
+        raise ConfigError(f"{name}: must hold `key: value` lines; {found}")
     for setting in settings:
         key, equals, value = setting.partition("=")
-        if not equals or not key:
-            raise ConfigError(f"--set {setting!r}: must be key=value")
-        _put(values, key, _yaml(value, f"--set {key}"))
+        parts = key.strip().split(".")
+        if not equals or "" in parts:
+            raise ConfigError(f"--set {setting!r}: must be key=value, as in nu=0.2 or mesh.degree=5")
+        _put(values, parts, _yaml(value, f"--set {key}"))
+    if _is_diagram(values):
+        return _diagram(values, name, settings)
     try:
         return Config.model_validate(values)
     except ValidationError as error:
-        raise ConfigError(f"{name}: {_sentence(error)}") from error
+        raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
+
+
+# --- YAML ---------------------------------------------------------------------------------------------------------
+
+
+class _Loader(yaml.SafeLoader):
+    """The YAML that a scene needs: no aliases (which can expand without bound), no tags, no key twice.
+
+    Plain words are read as in YAML 1.2: 1e-12 is a number, while 1:30, 010 and yes are text.
+    """
+
+    yaml_implicit_resolvers: dict = {}
+
+    def compose_node(self, parent, index):
+        event = self.peek_event()
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None):
+            raise yaml.MarkedYAMLError(problem="a scene has no aliases and no tags", problem_mark=event.start_mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node, deep=False):
+        seen = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode) and key.value in seen:
+                raise yaml.MarkedYAMLError(problem=f"the key {key.value!r} stands twice", problem_mark=key.start_mark)
+            seen.add(key.value if isinstance(key, yaml.ScalarNode) else None)
+        return super().construct_mapping(node, deep)
+
+
+for _kind, _pattern, _first in (
+    ("null", r"~|null|", ["~", "n", ""]),
+    ("bool", r"true|false", list("tf")),
+    ("int", r"[-+]?(0|[1-9][0-9]{0,30})", list("-+0123456789")),
+    ("float", r"[-+]?((\.[0-9]+|[0-9]+\.[0-9]*)([eE][-+]?[0-9]+)?|[0-9]+[eE][-+]?[0-9]+|\.inf)|\.nan", list("-+.0123456789")),
+):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(f"^(?:{_pattern})$"), _first)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes what ``_Loader`` would not read as text."""
+
+    yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
+
+
+def dump(config: Config | DiagramConfig) -> str:
+    """The YAML text of a scene, fields at their defaults left out; :func:`parse` reads it back."""
+    values = config.values if isinstance(config, DiagramConfig) else config.model_dump(mode="json", exclude_defaults=True)
+    return yaml.dump(values, Dumper=_Dumper, sort_keys=False)
 
 
 def _yaml(text: str, name: str) -> Any:
     try:
-        return yaml.safe_load(text)
+        return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f" in line {mark.line + 1}" if mark else ""
-        raise ConfigError(f"{name}: not YAML{where}: {getattr(error, 'problem', None) or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{name}: not usable YAML: {type(error).__name__}") from error
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        raise ConfigError(f"{name}: not usable YAML{where}: {problem}") from error
+    except RecursionError as error:
+        raise ConfigError(f"{name}: not usable YAML: nested too deeply") from error
 
 
-def _put(values: dict, key: str, value: Any) -> None:
-    *path, last = key.split(".")
-    for part in path:
+def _put(values: dict, path: list[str], value: Any) -> None:
+    for part in path[:-1]:
         values = values.setdefault(part, {})
         if not isinstance(values, dict):
-            raise ConfigError(f"--set {key}: {part!r} has no fields")
-    values[last] = value
+            raise ConfigError(f"--set {'.'.join(path)}: {part!r} has no fields")
+    values[path[-1]] = value
+
+
+# --- messages -----------------------------------------------------------------------------------------------------
+
+
+def _where(complaint) -> str:
+    return ".".join(str(part) for part in complaint["loc"] if part != "[key]")
+
+
+def _origin(error: ValidationError, name: str, settings: list[str]) -> str:
+    """The setting that the first complaint is about, else the file."""
+    where = _where(error.errors()[0])
+    for setting in reversed(settings):
+        key = setting.partition("=")[0].strip()
+        if f"{where}.".startswith(f"{key}.") or f"{key}.".startswith(f"{where}."):
+            return f"--set {setting}"
+    return name
 
 
 def _sentence(error: ValidationError) -> str:
     """The first complaint as `field: value ... what is allowed`, and how many more there are."""
     errors = error.errors()
     first = errors[0]
-    where = ".".join(str(part) for part in first["loc"])
-    kind, message = first["type"], first["msg"].removeprefix("Value error, ")
+    where, kind, message = _where(first), first["type"], first["msg"].removeprefix("Value error, ")
     if kind == "extra_forbidden":
         text = f"unknown field {where!r}; the fields are {', '.join(_fields(first['loc']))}"
     elif kind == "missing":
         text = f"the field {where!r} is missing"
-    elif kind == "value_error" and not where:
-        text = message
     elif kind == "value_error":
-        text = f"{where}: {message}"
+        text = f"{where}: {message}" if where else message
+    elif kind in ("model_type", "dict_type"):
+        text = f"{where}: must hold `key: value` fields, not {_show(first['input'])}"
     else:
+        message = message.replace("Input should be", "must be")
         text = f"{where}: {message[0].lower()}{message[1:]}, not {_show(first['input'])}"
     return text + (f" (and {len(errors) - 1} more)" if len(errors) > 1 else "")
 

@@ -2,38 +2,71 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
+import shlex
 import shutil
 import sys
 import time
+from typing import TYPE_CHECKING
 
-from contin import Branch, Point
+if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this module before it knows what to do
+    from contin import Point
 
 _HEADER = "   PT  TY  LAB         kappa_n      kappa_star          energy      step   N  it"
 #: Every that many regular points one is printed between the labelled ones.
 _EVERY = 5
-_KINDS = {"LP": "fold", "BP": "branch point", "UZ": "user value"}
+_KINDS = {b"LP": "fold", b"BP": "branch point", b"UZ": "user value"}
+
+
+def survive_any_encoding() -> None:
+    """Let standard output escape what its encoding lacks (± in ASCII, an odd file name) instead of failing."""
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def complain(text: str) -> None:
+    """One line to standard error; where that fails too (a closed terminal), the exit code is all that is left to say it."""
+    with contextlib.suppress(OSError):
+        print(text, file=sys.stderr, flush=True)
+
+
+def write_output(text: str = "") -> None:
+    """Write to standard output at once; nobody reading it any more (``| head``) is no error, the run goes on without."""
+    if sys.stdout is None:  # closed from the start
+        return
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except OSError as error:
+        if not isinstance(error, BrokenPipeError):
+            complain(f"error: cannot write to standard output: {error.strerror}")
+        # what is still buffered must go somewhere, or Python complains about it at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class Display:
     """Prints points and a summary to standard output, and a moving line to a terminal on standard error."""
 
-    def __init__(self, quiet: bool = False):
-        self._quiet = quiet
-        self._moving = not quiet and sys.stderr.isatty()
-        self._label = 0
+    def __init__(self, quiet: bool = False, silent: bool = False):
+        self._quiet, quiet = quiet or silent, quiet or silent
+        self._silent = silent
+        self._moving = not quiet and sys.stderr is not None and sys.stderr.isatty()
+        self._label = self._first = 0
         self._began = self._shown = time.monotonic()
 
     def note(self, text: str) -> None:
-        """One line."""
-        print(text)
+        """One line, or several."""
+        if not self._silent:
+            write_output(text + "\n")
 
-    def begin(self, config, run, count: int) -> None:
-        """Say what is about to be computed."""
+    def begin(self, config, count: int, labels: int) -> None:
+        """Say what is about to be computed, after ``count`` points, ``labels`` of them labelled, of a run resumed."""
+        self._first, self._label = count, labels
         if not self._quiet:
             resumed = f", resumed after {count} points" if count else ""
-            print(f"{name_of(config)} on the {config.domain}{resumed}")
-            print(_HEADER)
+            self.note(f"{name_of(config)} on the {config.domain}{resumed}\n{_HEADER}")
 
     def point(self, point: Point, number: int, step: float) -> None:
         """Show a point, in the table or in the moving line."""
@@ -43,35 +76,63 @@ class Display:
             self.clear()
             self._label += bool(point.label)
             label = f"{self._label:3d}" if point.label else "   "
-            print(
+            self.note(
                 f"{number:5d}  {point.label:2s}  {label}  {point['kappa_n']:14.8f}  {point['kappa_star']:14.8f}"
                 f"  {point['energy']:14.8f}  {step:8.1e} {point.system.intervals:3d} {point.iterations:3d}"
             )
         now = time.monotonic()
         if self._moving and now - self._shown > 0.1:
             self._shown = now
-            rate = number / max(now - self._began, 1e-9)
-            line = f"point {number}: kappa_n = {point['kappa_n']:.4f}, step {step:.1e}, {rate:.0f} points/s"
-            print("\r" + line[: shutil.get_terminal_size().columns - 1].ljust(60), end="", file=sys.stderr, flush=True)
+            rate = (number - self._first) / max(now - self._began, 1e-9)
+            self._line(f"point {number}: kappa_n = {point['kappa_n']:.4f}, step {step:.1e}, {rate:.0f} points/s")
 
     def clear(self) -> None:
         """Take the moving line away."""
-        if self._moving:
-            print("\r" + " " * (shutil.get_terminal_size().columns - 1) + "\r", end="", file=sys.stderr, flush=True)
+        self._line("")
 
-    def summary(self, config, branch: Branch, count: int, seconds: float, path, outcome: str) -> None:
-        """What came out, in lines to quote."""
+    def _line(self, text: str) -> None:
+        """Write over the moving line, never wider than the terminal."""
+        if self._moving:
+            width = shutil.get_terminal_size().columns - 1
+            try:
+                print("\r" + text[:width].ljust(width) + "\r" + text[:width], end="", file=sys.stderr, flush=True)
+            except OSError:
+                self._moving = False  # the terminal is gone; the run is not
+
+    def summary(self, config, events, count: int, seconds: float, path, outcome: str, stop) -> None:
+        """What came out, in lines to quote; ``events`` are rows of the result's table of labelled points."""
         self.clear()
-        if not self._quiet:
-            print()
-        print(f"{name_of(config)}: {count} points in {seconds:.2f} s")
-        for point in branch.points:
-            print(f"  {_describe(config, point)}")
+        lines = [] if self._quiet else [""]
+        lines.append(f"{name_of(config)}: {count} points in {seconds:.2f} s")
+        lines += [f"  {_describe(config, event)}" for event in events]
         if outcome == "interrupted":
-            print(f"  interrupted; go on with --resume --out {path}")
-        elif branch.stop is not None and branch.stop.reason != "trivial branch":
-            print(f"  stopped: {branch.stop}")
-        print(f"  written to {path}")
+            lines.append(f"  interrupted; go on with --resume --out {shlex.quote(str(path))}")
+        elif stop is not None and stop.reason != "trivial branch":
+            lines.append(f"  stopped: {stop}")
+        self.note("\n".join([*lines, f"  written to {path}"]))
+
+    # --- diagrams ------------------------------------------------------------------------------------------------
+
+    def begin_diagram(self, config, total: int, kept: int) -> None:
+        """Say how many branches a diagram has, and how many of them are there already."""
+        self._total, self._done = total, kept
+        if not self._quiet:
+            there = f", {kept} of them computed before" if kept else ""
+            self.note(f"{config.title or 'diagram'}: {total} branches{there}")
+
+    def branch_done(self, config, problem: str, course: str) -> None:
+        """One branch more: where it went, or what went wrong with it."""
+        self._done += 1
+        if not self._quiet:
+            self.clear()
+            self.note(f"  {name_of(config)}: {'FAILED: ' + problem if problem else course}")
+        rate = (time.monotonic() - self._began) / self._done
+        self._line(f"{self._done} of {self._total} branches, {rate * (self._total - self._done):.0f} s to go")
+
+    def diagram_summary(self, summary: list[str]) -> None:
+        """What came out."""
+        self.clear()
+        self.note("\n".join(summary if self._quiet else ["", *summary]))
 
 
 def name_of(config) -> str:
@@ -79,16 +140,15 @@ def name_of(config) -> str:
     return f"{config.law}, (m, n) = ({config.m}, {config.n}), nu = {config.nu:g}"
 
 
-def _describe(config, point: Point) -> str:
-    place = f"kappa_n L/2pi = {point['kappa_n']:.10f}"
-    held = point.label == "UZ" or (point.label == "EP" and point.name != "trivial branch")  # kappa_n was given, not found
-    error = point.errors.get("kappa_n", math.nan)
+def _describe(config, event) -> str:
+    label, name = event["label"], event["name"].decode()
+    place = f"kappa_n L/2pi = {event['kappa_n']:.10f}"
+    held = label == b"UZ" or (label == b"EP" and name != "trivial branch")  # kappa_n was given, not found
+    error = event["error_kappa_n"]
     certain = "" if held or math.isnan(error) else f" (± {error:.0e})"
-    star = f"kappa* = {point['kappa_star']:.10f}"
-    if point.name == "start":
+    if name == "start":
         return f"leaves the {config.m}-covered circle at {place}{certain}"
-    if point.name == "trivial branch":
-        return f"ends on the {round(abs(point['kappa_star']))}-covered circle at {place}{certain}"
-    kind = _KINDS.get(point.label, "end")
-    what = f" ({point.name})" if point.name and point.label != "LP" else ""
-    return f"{kind}{what} at {place}{certain}, {star}"
+    if name == "trivial branch":
+        return f"ends on the {round(abs(event['kappa_star']))}-covered circle at {place}{certain}"
+    what = f" ({name})" if name and label != b"LP" else ""
+    return f"{_KINDS.get(label, 'end')}{what} at {place}{certain}, kappa* = {event['kappa_star']:.10f}"

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import time
 from pathlib import Path
 
-import yaml
-
-from branches.config import Config, ConfigError, parse
-from branches.store import BranchWriter, StoreError, open_branch, read_state
-from contin import Branch, Continuation, MeshControl, Settings
+from branches.config import Config, ConfigError, dump, parse
+from branches.store import BranchWriter, StoreError, open_branch, prepare, read_state
+from contin import Continuation, ConvergenceError, MeshControl, Settings
 from ribbon_model.laws import LAWS
 from ribbon_model.seeds import half_loop_branch, primary_branch
 
@@ -22,16 +21,33 @@ def settings_of(config: Config) -> Settings:
     """The engine's settings for a scene."""
     mesh, steps = config.mesh, config.steps
     return Settings(
-        primary="kappa_n", step=steps.first, min_step=steps.smallest, max_step=steps.largest, max_points=steps.max_points,
-        angle=steps.angle, limits=config.limits, zeros=config.zeros, trivial="M2", errors=True,
+        primary="kappa_n", step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
+        max_points=steps.max_points, angle=steps.angle, limits=config.limits, zeros=config.zeros, trivial="M2", errors=True,
         mesh=MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every),
     )  # fmt: skip
 
 
 def seed(config: Config):
-    """System, first point and tangent of a scene's branch."""
+    """System, first point and tangent of a scene's branch.
+
+    Raises
+    ------
+    ConfigError
+        The first mesh is too coarse to see the mode, or sees another one in its place.
+    """
     start = primary_branch if config.domain == "cell" else half_loop_branch
-    return start(LAWS[config.law], config.m, config.n, config.nu, config.mesh.intervals, config.mesh.degree)
+    coarse = ConfigError(
+        f"mesh: {config.mesh.intervals} intervals of degree {config.mesh.degree} do not resolve the mode "
+        f"(m, n) = ({config.m}, {config.n}) on the {config.domain}; take more intervals"
+    )
+    try:
+        system, x, tangent = start(LAWS[config.law], config.m, config.n, config.nu, config.mesh.intervals, config.mesh.degree)
+    except (ConvergenceError, ValueError) as error:
+        raise coarse from error
+    expected = config.at_bifurcation()["kappa_n"]
+    if abs(x[system.parameter_index("kappa_n")] - expected) > 1e-4 * (1 + abs(expected)):
+        raise coarse
+    return system, x, tangent
 
 
 def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=False) -> str:
@@ -47,38 +63,68 @@ def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=F
     StoreError, ConfigError
         A result file that cannot be written, or that is not this scene's.
     """
-    began = time.perf_counter()
-    text = yaml.safe_dump(config.model_dump(mode="json", exclude_defaults=True), sort_keys=False)
+    began, path = time.perf_counter(), Path(path)
     done = _look_at(path, config, resume, overwrite)
     if done is not None:
         display.note(f"{path} is complete already ({done}); nothing to do")
         return "complete"
+    prepare(path)
+    run, image = _resumed(config, path) if resume else (_begun(config), None)
+    system = run.state.system
+    writer = BranchWriter(path, dump(config), system.problem, system.free, config.stride, image)
+    with contextlib.closing(writer):
+        display.begin(config, writer.count, len(writer.events()))
+        outcome = _follow(run, writer, display)
+        seconds = time.perf_counter() - began
+        display.summary(config, writer.events(), writer.count, seconds, path, outcome, run.stop)
+    return outcome
+
+
+def compute_branch(config: Config, display) -> tuple[bytes, str]:
+    """The branch of ``config`` as the image of its file, and how it ended; nothing touches a disk here."""
+    run = _begun(config)
+    system = run.state.system
+    with contextlib.closing(BranchWriter(None, dump(config), system.problem, system.free, config.stride)) as writer:
+        outcome = _follow(run, writer, display)
+        return writer.image(), outcome
+
+
+def _begun(config: Config) -> Continuation:
     system, x, tangent = seed(config)
-    image = None
-    run = Continuation(system, x, settings_of(config), tangent)
-    if resume:
-        state, start, image = read_state(path, system.problem, system.free)
-        run = Continuation(state.system, state.x, settings_of(config), state=state, start=start)
-    writer = BranchWriter(path, text, system.problem, system.free, config.stride, image)
-    display.begin(config, run, writer.count)
-    branch, interrupted = Branch(), False
+    return Continuation(system, x, settings_of(config), tangent)
+
+
+def _resumed(config: Config, path: Path) -> tuple[Continuation, bytes]:
+    """The run that goes on where the file ends, and the image of the file."""
+    system, _, _ = seed(config)
+    state, start, last, image = read_state(path, system.problem, system.free)
+    if state.accepted >= config.steps.max_points:
+        raise ConfigError(f"steps.max_points: {config.steps.max_points} must exceed the {state.accepted} points taken already")
+    for name, (low, high) in config.limits.items():
+        if state.accepted and not low < last[name] < high:
+            raise ConfigError(
+                f"limits: {name}: {low:g}, {high:g} must contain the place to go on from, {name} = {last[name]:.6g}"
+            )
+    return Continuation(state.system, state.x, settings_of(config), state=state, start=start), image
+
+
+def _follow(run: Continuation, writer: BranchWriter, display) -> str:
+    """Take all points of a run to the file; how it ended."""
     with _Interruption() as interruption:
         for point in run:
             number = writer.count
             writer.append(point)
             display.point(point, number, run.state.step)
-            if point.label:
-                branch.points.append(point)
-            if not point.label and (interruption.asked or writer.due()):
-                writer.checkpoint(run.state, run.start)
-            if not point.label and interruption.asked:
-                interrupted = True
-                break
-        outcome = "interrupted" if interrupted else ("lost" if run.stop.reason == "no convergence" else "complete")
-        writer.checkpoint(run.state, run.start, run.stop, outcome)
-    writer.close()
-    branch.stop = run.stop
-    display.summary(config, branch, writer.count, time.perf_counter() - began, path, outcome)
+            if point.label and point.name != "start":
+                continue  # inside a step: the run could not go on from here
+            writer.mark(run.state)
+            if interruption.asked:
+                writer.checkpoint(run.start, "interrupted")
+                return "interrupted"
+            if writer.due():
+                writer.checkpoint(run.start, "running")
+        outcome = "lost" if run.stop.reason == "no convergence" else "complete"
+        writer.checkpoint(run.start, outcome, run.stop)
     return outcome
 
 
@@ -92,19 +138,18 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
         return None
     try:
         with open_branch(path) as file:
-            status, stop, text = file.attrs["status"], file.attrs["stop"], file.attrs["config"]
-            reason = file.attrs["stop_reason"]
-    except StoreError as error:
+            status, stop, reason, text = (file.attrs[name] for name in ("status", "stop", "stop_reason", "config"))
+        stored = parse(text, str(path))
+    except (StoreError, ConfigError) as error:
         if resume:
             raise
-        raise StoreError(f"{str(path)!r} exists and is no result of this program; --overwrite replaces it") from error
-    stored = parse(text, str(path))
+        raise StoreError(f"{str(path)!r} exists and is no readable result of this program; --overwrite replaces it") from error
     different = _different(stored, config, resume)
     if different:
         advice = "resume with the same config" if resume else "--overwrite replaces it, --out writes elsewhere"
         raise StoreError(f"{str(path)!r} holds another scene ({different}); {advice}")
     if not resume:
-        if status != "complete":
+        if status in ("running", "interrupted"):
             raise StoreError(f"{str(path)!r} holds an unfinished run of this scene; --resume goes on, --overwrite starts again")
         return None
     goes_on = reason in ("limit", "max points") and stored != config
@@ -123,14 +168,18 @@ def _different(stored: Config, config: Config, resume: bool) -> str:
 
 
 class _Interruption:
-    """Ctrl-C and SIGTERM ask the run to stop after the current point; a second one stops it at once."""
+    """Ctrl-C, SIGTERM or a closed terminal ask the run to stop after the current point; a second time, at once."""
+
+    _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
     def __init__(self):
         self.asked = False
         self._before = {}
 
     def __enter__(self):
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in self._SIGNALS:
+            if signal.getsignal(number) is signal.SIG_IGN:  # nohup, or a job in the background: to be left alone
+                continue
             try:
                 self._before[number] = signal.signal(number, self._ask)
             except ValueError:  # not in the main thread: nothing to catch there
@@ -145,6 +194,3 @@ class _Interruption:
     def __exit__(self, *exception):
         for number, handler in self._before.items():
             signal.signal(number, handler)
-
-
-__all__ = ["ConfigError", "run_branch", "seed", "settings_of"]

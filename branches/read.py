@@ -7,18 +7,23 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.store import open_branch
+from branches.config import ConfigError, parse
+from branches.store import StoreError, open_branch
 from ribbon_model.laws import LAWS
 from ribbon_model.shape import Shape, closed_strip
 
 
 @dataclass(frozen=True)
 class StoredBranch:
-    """A branch file in memory: the scene, the tables of points and events (structured arrays), the kept solutions."""
+    """A branch file in memory: the scene, the tables of points and events (structured arrays), the kept solutions.
+
+    ``stop`` says in words why the run ended, ``reason`` in one or two ("trivial branch", "limit", ...).
+    """
 
     config: dict
     status: str
     stop: str
+    reason: str
     points: np.ndarray
     events: np.ndarray
     index: np.ndarray
@@ -30,14 +35,23 @@ class StoredBranch:
         return self.index["point"]
 
     def solution(self, point: int) -> tuple[np.ndarray, np.ndarray, int, dict[str, float]]:
-        """Nodes t (K,), states (K, n), degree and parameters of a kept point."""
-        row = self.index[np.flatnonzero(self.index["point"] == point)[0]]
+        """Nodes t (K,), states (K, n), degree and parameters of a kept point.
+
+        Raises
+        ------
+        StoreError
+            The solution of this point is not kept.
+        """
+        found = np.flatnonzero(self.index["point"] == point)
+        if not found.size:
+            raise StoreError(f"the solution of point {point} is not kept; a smaller stride keeps more")
+        row = self.index[found[0]]
         here = slice(row["start"], row["start"] + row["count"])
         names = [name for name in self.points.dtype.names if self.points.dtype[name].kind == "f"]
         return self.t[here], self.states[here], int(row["degree"]), {name: float(self.points[point][name]) for name in names}
 
     def shape(self, point: int) -> Shape:
-        """The closed strip at a kept point."""
+        """The closed strip at a kept point; see :meth:`solution`."""
         t, states, degree, parameters = self.solution(point)
         return closed_strip(LAWS[self.config["law"]], t, states, degree, parameters)
 
@@ -48,14 +62,15 @@ def read_branch(path: str | Path) -> StoredBranch:
     Raises
     ------
     StoreError
-        See :func:`branches.store.open_branch`.
+        See :func:`branches.store.open_branch`; or its scene is none that this version knows.
     """
-    from branches.config import parse
-
     with open_branch(Path(path)) as file:
-        solutions = file["solutions"]
-        config = parse(file.attrs["config"], str(path)).model_dump()
+        solutions, attributes = file["solutions"], file.attrs
+        try:
+            config = parse(attributes["config"], str(path)).model_dump()
+        except ConfigError as error:
+            raise StoreError(f"cannot read {str(path)!r}: its scene is unknown ({error})") from error
         return StoredBranch(
-            config, file.attrs["status"], file.attrs["stop"], file["points"][:], file["events"][:],
-            solutions["index"][:], solutions["t"][:], solutions["states"][:],
+            config, attributes["status"], attributes["stop"], attributes["stop_reason"], file["points"][:],
+            file["events"][:], solutions["index"][:], solutions["t"][:], solutions["states"][:],
         )  # fmt: skip

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
+import os
+import signal
 import sys
 
 # Nothing heavy is imported here: `--help` and mistakes in the command line answer at once.
@@ -10,10 +11,13 @@ import sys
 EXIT_BAD_INPUT, EXIT_STOPPED_SHORT, EXIT_INTERRUPTED = 2, 1, 130
 
 
-def arguments(argv=None) -> argparse.Namespace:
+def arguments(argv=None):
     """The command line, parsed."""
+    import argparse
+
     parser = argparse.ArgumentParser(
         prog="python -m branches.run",
+        allow_abbrev=False,
         description="Follow one branch of buckled equilibria of a closed elastic strip and write it to an HDF5 file.",
         epilog="Exit code: 0 done, 1 the branch was lost on the way (the file holds what there is), 2 bad input, "
         "130 interrupted.",
@@ -23,26 +27,42 @@ def arguments(argv=None) -> argparse.Namespace:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field, as in --set nu=0.2 --set mesh.degree=5"
     )
+    parser.add_argument("--workers", type=int, metavar="N", help="processes for a scene of many branches (default: one a core)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="run a scene of many branches on a Dask cluster instead")
     parser.add_argument("--quiet", action="store_true", help="print the summary only")
-    parser.add_argument("--resume", action="store_true", help="go on with an unfinished result file")
-    parser.add_argument("--overwrite", action="store_true", help="replace a result file of another scene")
+    existing = parser.add_mutually_exclusive_group()
+    existing.add_argument("--resume", action="store_true", help="go on with an unfinished result file")
+    existing.add_argument("--overwrite", action="store_true", help="replace a result file of another scene")
     return parser.parse_args(argv)
 
 
 def main(argv=None) -> int:
     """Run the command; the exit code."""
-    options = arguments(argv)
-    from branches.config import ConfigError, load
+    from branches.display import complain, survive_any_encoding, write_output
+
+    survive_any_encoding()
+    try:
+        return _run(arguments(argv))
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return EXIT_INTERRUPTED
+    finally:
+        write_output()
+
+
+def _run(options) -> int:
+    from branches.config import ConfigError, DiagramConfig, load
 
     try:
         config = load(options.config, options.set)
+        if isinstance(config, DiagramConfig):
+            return _run_diagram(config, options)
         path = output_path(options)
-        from branches.job import run_branch
-        from branches.store import StoreError
     except ConfigError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return _refuse(error)
     from branches.display import Display
+    from branches.job import run_branch
+    from branches.store import StoreError
     from contin.errors import ContinError
 
     display = Display(quiet=options.quiet)
@@ -50,40 +70,83 @@ def main(argv=None) -> int:
         outcome = run_branch(config, path, display, resume=options.resume, overwrite=options.overwrite)
     except (ConfigError, StoreError, ContinError) as error:
         display.clear()
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_BAD_INPUT
-    if outcome == "interrupted":
-        return EXIT_INTERRUPTED
+        return _refuse(error)
+    return {"complete": 0, "interrupted": EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
+
+
+def _run_diagram(config, options) -> int:
+    """A scene of many branches, into a folder."""
+    from pathlib import Path
+
+    from branches.config import ConfigError
+    from branches.diagram import run_diagram
+    from branches.display import Display
+    from branches.executor import ExecutorError
+    from branches.store import StoreError
+    from contin.errors import ContinError
+
+    if options.resume:
+        raise ConfigError("--resume: a scene of many branches needs none; run it again and it computes what is missing")
+    if options.workers is not None and options.workers < 1:
+        raise ConfigError(f"--workers {options.workers}: must be at least 1")
+    folder = Path(options.out or Path(options.config).stem)
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
+    display = Display(quiet=options.quiet)
+    try:
+        outcome = run_diagram(
+            config, folder, display, scheduler=options.scheduler, workers=options.workers, overwrite=options.overwrite
+        )
+    except (StoreError, ExecutorError, ContinError) as error:
+        display.clear()
+        return _refuse(error)
     return 0 if outcome == "complete" else EXIT_STOPPED_SHORT
 
 
+def _refuse(error: Exception) -> int:
+    from branches.display import complain
+
+    complain(f"error: {error}")
+    return EXIT_BAD_INPUT
+
+
 def output_path(options):
-    """The result file; its folder is made if need be.
+    """The result file that the command line asks for.
 
     Raises
     ------
     ConfigError
-        It cannot be written to.
+        There is something in its place that no result can replace.
     """
-    import os
     from pathlib import Path
 
     from branches.config import ConfigError
 
+    if options.out == "":
+        raise ConfigError("--out '': must name a file or a folder")
     name = Path(options.config).stem + ".h5"
-    path = Path(options.out) if options.out else Path(name)
-    if path.is_dir() or (options.out and options.out.endswith(("/", os.sep))):
-        path = path / name
+    path = Path(options.out or name)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_dir() or (options.out or "").endswith(("/", os.sep)):
+            path = path / name
+        if path.is_dir():
+            raise ConfigError(f"--out {str(path)!r}: is a folder; name a file, or another folder")
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"--out {str(path)!r}: is neither a file nor a folder")
+        if path.exists() and path.samefile(options.config):
+            raise ConfigError(f"--out {str(path)!r}: is the config itself; name another file")
     except OSError as error:
-        raise ConfigError(f"--out {str(path)!r}: cannot make the folder: {error.strerror}") from error
-    if not os.access(path.parent, os.W_OK):
-        raise ConfigError(f"--out {str(path)!r}: the folder cannot be written to")
-    if path.is_dir():
-        raise ConfigError(f"--out {str(path)!r}: is a folder")
+        raise ConfigError(f"--out {str(path)!r}: cannot be looked at: {error.strerror}") from error
     return path
 
 
+def _leave(number, frame):
+    """Ctrl-C before the first point: nothing is lost, and an exception amid a compilation would end in noise."""
+    os.write(2, b"interrupted\n")
+    os._exit(EXIT_INTERRUPTED)
+
+
 if __name__ == "__main__":
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave)
     sys.exit(main())

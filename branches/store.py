@@ -7,10 +7,12 @@ and renames it, so a killed run, a full disk or a power cut leave the last check
 from __future__ import annotations
 
 import contextlib
+import glob
 import json
 import os
 import platform
-import tempfile
+import secrets
+import shutil
 import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -22,6 +24,9 @@ from contin import Collocation, Point, State, Stop
 
 FORMAT = "ribbon continuation branch"
 FORMAT_VERSION = 1
+
+#: Bytes that the smallest result takes, for a look at the disk before anything is computed.
+_SMALLEST = 64 * 1024
 
 #: Columns of /points and /events that are not parameters or functionals: name, type, meaning.
 _BOOKKEEPING = (
@@ -63,52 +68,60 @@ def versions() -> dict[str, str]:
     return result
 
 
+def _columns(problem, free) -> dict[str, tuple]:
+    """Name, type and meaning of the columns of both tables."""
+    values = [(name, "f8", MEANINGS.get(name, name)) for name in (*problem.parameters, *problem.functionals)]
+    errors = [(f"error_{name}", "f8", f"estimated discretization error of {name}") for name in free]
+    named = [("name", "S64", "what the label refers to")]
+    return {"points": (*_BOOKKEEPING, *values), "events": (*_BOOKKEEPING, *named, *values, *errors)}
+
+
+def _kind(columns) -> np.dtype:
+    return np.dtype([(name, kind) for name, kind, _ in columns])
+
+
 class BranchWriter:
     """One branch on its way to disk.
 
     Parameters
     ----------
-    path : Path
-        The final name. It is replaced at every checkpoint.
+    path : Path or None
+        The final name. It is replaced at every checkpoint. None keeps the file in memory, for :meth:`image`.
     config_text : str
-        The scene, as text.
+        The scene, as text; also of a run resumed, which may stop elsewhere.
     problem : BoundaryValueProblem
         Gives the names of columns.
     free : sequence of str
         Free parameters.
-    resume : bytes, optional
-        The image of an unfinished file to go on with.
+    stride : int
+        The full solution is kept of every stride-th point, and of labelled ones.
+    image : bytes, optional
+        An unfinished file to go on with.
     """
 
     #: Seconds between checkpoints while a run goes.
     INTERVAL = 0.5
 
-    def __init__(self, path: Path, config_text: str, problem, free, stride: int, resume: bytes | None = None):
-        self.path, self._stride, self._free = Path(path), stride, tuple(free)
+    def __init__(self, path: Path | None, config_text: str, problem, free, stride: int, image: bytes | None = None):
+        self.path, self._stride, self._free = path and Path(path), stride, tuple(free)
         self._buffer: list[tuple[Point, int]] = []
-        self._file = h5py.File.in_memory(resume)
-        if resume is None:
-            self._create(config_text, problem)
-            self.count = 0
-        else:
-            self.count = self._rewind()
+        self._mark: tuple[State, int] | None = None
+        with _damage_told(path):
+            self._file = h5py.File.in_memory(image)
+            self.count = self._create(problem) if image is None else self._rewind(problem)
+        self._file.attrs["config"] = config_text
         self._saved = time.monotonic()
         self._spent = 0.0
 
-    def _create(self, config_text, problem):
+    def _create(self, problem) -> int:
         file, free = self._file, self._free
         file.attrs.update({
-            "format": FORMAT, "format_version": FORMAT_VERSION, "config": config_text, "status": "running", "stop": "",
-            "stop_reason": "", "units": "bending modulus B = 1, length L = 2 pi", "platform": platform.platform(),
+            "format": FORMAT, "format_version": FORMAT_VERSION, "status": "running", "stop": "", "stop_reason": "",
+            "units": "bending modulus B = 1, length L = 2 pi", "platform": platform.platform(),
             "versions": json.dumps(versions()), "states": list(problem.states), "free_parameters": list(free),
         })  # fmt: skip
-        values = [(name, "f8", MEANINGS.get(name, name)) for name in (*problem.parameters, *problem.functionals)]
-        errors = [(f"error_{name}", "f8", f"estimated discretization error of {name}") for name in free]
-        named = [("name", "S32", "what the label refers to")]
-        self._columns = {"points": (*_BOOKKEEPING, *values), "events": (*_BOOKKEEPING, *named, *values, *errors)}
-        for table, columns in self._columns.items():
-            kind = np.dtype([(name, kind) for name, kind, _ in columns])
-            data = file.create_dataset(table, (0,), kind, maxshape=(None,), chunks=(256,))
+        for table, columns in _columns(problem, free).items():
+            data = file.create_dataset(table, (0,), _kind(columns), maxshape=(None,), chunks=(256,))
             for name, _, meaning in columns:
                 data.attrs[name] = meaning
         group = file.create_group("solutions")
@@ -121,6 +134,7 @@ class BranchWriter:
         states = group.create_dataset("states", (0, n), "f8", maxshape=(None, n), chunks=(1024, n))
         states.attrs["meaning"] = "unit quaternion of the directors (q0 scalar), then the centreline where it is a state"
         states.attrs["columns"] = list(problem.states)
+        return 0
 
     # --- while the run goes --------------------------------------------------------------------------------------
 
@@ -129,12 +143,25 @@ class BranchWriter:
         self._buffer.append((point, self.count))
         self.count += 1
 
+    def mark(self, state: State) -> None:
+        """Say that the run can go on from ``state``, which follows the point appended last."""
+        self._mark = (state, self.count)
+
     def due(self) -> bool:
-        """Whether it is time for a checkpoint: every half second, and never more than a tenth of the run's time."""
+        """Whether a checkpoint is due: they take no more than a tenth of the run's time."""
         return time.monotonic() - self._saved > max(self.INTERVAL, 10 * self._spent)
 
-    def checkpoint(self, state: State | None, start, stop: Stop | None = None, status: str = "running") -> None:
+    def checkpoint(self, start, status: str, stop: Stop | None = None) -> None:
         """Write everything so far, and what a resumed run starts from.
+
+        Parameters
+        ----------
+        start : tuple (system, x, tangent)
+            Where the run began.
+        status : str
+            "running", "complete", "interrupted" or "lost".
+        stop : Stop, optional
+            Why it ended.
 
         Raises
         ------
@@ -146,12 +173,21 @@ class BranchWriter:
         self._file.attrs["status"] = status
         self._file.attrs["stop"] = str(stop or "")
         self._file.attrs["stop_reason"] = stop.reason if stop else ""
-        if state is not None:
-            self._write_state(state, start)
+        if self._mark is not None:
+            self._write_state(*self._mark, start)
         self._file.flush()
-        _replace(self.path, self._file.id.get_file_image())
+        if self.path is not None:
+            write_bytes(self.path, self.image())
         self._saved = time.monotonic()
         self._spent = self._saved - began
+
+    def image(self) -> bytes:
+        """The file as of the last checkpoint."""
+        return self._file.id.get_file_image()
+
+    def events(self) -> np.ndarray:
+        """The rows of labelled points written so far."""
+        return self._file["events"][:]
 
     def _flush(self):
         points = [self._row("points", point, number) for point, number in self._buffer]
@@ -182,28 +218,36 @@ class BranchWriter:
 
     # --- what a resumed run needs --------------------------------------------------------------------------------
 
-    def _write_state(self, state: State, start):
+    def _write_state(self, state: State, points: int, start):
         if "resume" in self._file:
             del self._file["resume"]
         group = self._file.create_group("resume")
-        group.attrs["meaning"] = "the state of the run after its last regular point, for --resume"
+        group.attrs["meaning"] = "the state of the run after its first `points` points, for --resume"
+        group.attrs["points"] = points
         for name in ("previous_step", "step", "sign", "arclength", "accepted", "singular"):
             group.attrs[name] = getattr(state, name)
-        counts = {"points": len(self._file["points"]), "events": len(self._file["events"])}
-        counts |= {name: len(self._file["solutions"][name]) for name in ("index", "t")}
-        group.attrs["rows"] = json.dumps(counts)
         here = {"x": state.x, "tangent": state.tangent, "previous": state.previous_tangent}
         _write_vectors(group.create_group("here"), state.system, **here)
         _write_vectors(group.create_group("start"), start[0], x=start[1], tangent=start[2])
 
-    def _rewind(self) -> int:
-        """Cut the tables back to the rows that the saved state follows; the number of points kept."""
-        rows = json.loads(self._file["resume"].attrs["rows"])
-        for table in ("points", "events"):
-            self._file[table].resize(rows[table], axis=0)
-        for table, name in (("index", "index"), ("t", "t"), ("states", "t")):
-            self._file["solutions"][table].resize(rows[name], axis=0)
-        return rows["points"]
+    def _rewind(self, problem) -> int:
+        """Cut the tables back to the points that the saved state follows; how many.
+
+        What came after them is computed again: a limit that ended the run, say, need not end the one resumed.
+        """
+        for table, columns in _columns(problem, self._free).items():
+            if self._file[table].dtype != _kind(columns):
+                raise StoreError(f"cannot go on with {str(self.path)!r}: its columns are not those of this version")
+        points, solutions = int(self._file["resume"].attrs["points"]), self._file["solutions"]
+        index = solutions["index"][:]
+        index = index[index["point"] < points]
+        nodes = int(index["start"][-1] + index["count"][-1])
+        events = int(np.count_nonzero(self.events()["point"] < points))
+        self._file["points"].resize(points, axis=0)
+        self._file["events"].resize(events, axis=0)
+        for name, rows in (("index", len(index)), ("t", nodes), ("states", nodes)):
+            solutions[name].resize(rows, axis=0)
+        return points
 
     def close(self) -> None:
         """Release the memory."""
@@ -232,28 +276,65 @@ def _extend(dataset, rows):
         dataset[start:] = rows if isinstance(rows, np.ndarray) else np.array(rows, dtype=dataset.dtype)
 
 
-def _replace(path: Path, image: bytes) -> None:
-    """Put a whole file in place of ``path``, or leave it untouched."""
-    temporary = None
+def _temporary(path: Path) -> Path:
+    """A hidden name of its own beside ``path``, no longer than names may be."""
+    return path.with_name(f".{path.name[:50]}.{secrets.token_hex(4)}.part")
+
+
+def _write(path: Path, data: bytes) -> None:
+    with open(path, "xb") as file:  # its mode is what the umask says
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Put a whole file in place of ``path`` (of what it links to), with its mode, or leave everything as it was.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    path = Path(os.path.realpath(path))
+    temporary = _temporary(path)
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            file.write(image)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        try:
+            _write(temporary, data)
+            if path.exists():
+                shutil.copymode(path, temporary)
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
     except OSError as error:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                os.unlink(temporary)
         raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
 
 
-def _umask() -> int:
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask
+def prepare(path: Path) -> None:
+    """Make the folder of ``path``, see that a result can be written, and remove what killed runs left behind.
+
+    Raises
+    ------
+    StoreError
+        Nothing can be written there.
+    """
+    path = Path(os.path.realpath(path))
+    try:
+        if path.parent.exists() and not path.parent.is_dir():
+            raise StoreError(f"cannot write {str(path)!r}: {str(path.parent)!r} is not a folder")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and not os.access(path, os.W_OK):
+            raise StoreError(f"cannot write {str(path)!r}: the file is read-only")
+        probe = _temporary(path)
+        try:
+            _write(probe, bytes(_SMALLEST))
+        finally:
+            probe.unlink(missing_ok=True)
+        for left in path.parent.glob(f".{glob.escape(path.name[:50])}.????????.part"):
+            if time.time() - left.stat().st_mtime > 60:  # not of a run that is writing right now
+                left.unlink()
+    except OSError as error:
+        raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
 
 
 @contextlib.contextmanager
@@ -270,16 +351,26 @@ def open_branch(path: Path):
     except OSError as error:
         reason = "there is no such file" if not Path(path).exists() else "it is not a readable HDF5 file"
         raise StoreError(f"cannot read {str(path)!r}: {reason}") from error
-    with file:
-        if file.attrs.get("format") != FORMAT or "points" not in file:
+    with file, _damage_told(path):
+        if file.attrs.get("format") != FORMAT:
             raise StoreError(f"cannot read {str(path)!r}: it is not a branch written by this program")
-        if file.attrs["format_version"] != FORMAT_VERSION:
-            raise StoreError(f"cannot read {str(path)!r}: its format is {file.attrs['format_version']}, not {FORMAT_VERSION}")
+        found = file.attrs["format_version"]
+        if found != FORMAT_VERSION:
+            raise StoreError(f"cannot read {str(path)!r}: its format version is {found}, not {FORMAT_VERSION}")
         yield file
 
 
+@contextlib.contextmanager
+def _damage_told(path: Path):
+    """What h5py raises for parts of a file that are missing or garbled, as a sentence."""
+    try:
+        yield
+    except (KeyError, OSError, RuntimeError) as error:
+        raise StoreError(f"cannot read {str(path)!r}: the file is damaged") from error
+
+
 def read_state(path: Path, problem, free):
-    """The saved state of a run, its first point (system, x, tangent), and the file's image.
+    """The saved state of a run, its first point (system, x, tangent), the row before the state, and the file's image.
 
     Raises
     ------
@@ -292,9 +383,9 @@ def read_state(path: Path, problem, free):
         group = file["resume"]
         system, here = _read_vectors(group["here"], problem, free)
         first, start = _read_vectors(group["start"], problem, free)
-        a = group.attrs
+        a, last = group.attrs, file["points"][int(group.attrs["points"]) - 1]
         state = State(
             system, here["x"], here["tangent"], here.get("previous"), float(a["previous_step"]), float(a["step"]),
             float(a["sign"]), float(a["arclength"]), int(a["accepted"]), bool(a["singular"]),
         )  # fmt: skip
-    return state, (first, start["x"], start["tangent"]), Path(path).read_bytes()
+    return state, (first, start["x"], start["tangent"]), last, Path(path).read_bytes()

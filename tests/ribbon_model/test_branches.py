@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from contin import Settings, correct, follow
+from contin import Settings, correct, follow, trace
 from ribbon_model import exact
 from ribbon_model.equilibrium import directors, half_loop, on_directors
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
@@ -131,3 +131,21 @@ def test_rods_leave_the_circle_downwards_and_have_no_fold(law):
 def test_what_does_not_close_is_refused():
     with pytest.raises(ValueError, match="m / n even"):
         primary_branch(RIBBON, 2, 1, NU)
+
+
+def test_a_secondary_branch_on_the_half_loop():
+    """(3, 1) for nu = .3 loses a mode of the half loop twice on its way to -infinity; the branch between has R != 0.
+
+    The two values come from runs of their own: branch points of the primary branch, and places where the secondary one,
+    followed from the first, has R = 0 again. (That an index changes near -22 is known from a Fourier computation.)
+    """
+    system, x, tangent = half_loop_branch(RIBBON, 3, 1, NU, 16, 6)
+    primary = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-200, 100)}), tangent)
+    first, second = primary.labelled("BP")[1:]
+    assert first["kappa_n"] == pytest.approx(-21.6, abs=0.5)
+    loop_around = trace(first, branch=1, limits={"kappa_n": (-300, 100)})
+    assert loop_around.stop.reason == "closed"
+    assert np.abs(loop_around.column("R3")).max() > 1
+    (meeting,) = loop_around.labelled("BP")[1:]
+    assert meeting["kappa_n"] == pytest.approx(second["kappa_n"], abs=1e-7)
+    assert abs(meeting["R3"]) < 1e-8

@@ -1,0 +1,158 @@
+"""A scene of many branches: run concurrently, each to a file of its own, assembled as a graph."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from pathlib import Path
+
+from branches import graph as diagram_graph
+from branches.config import Config, DiagramConfig, dump
+from branches.executor import WAIT, executor, run_jobs
+from branches.store import StoreError, prepare, write_bytes
+
+
+def compute(text: str) -> tuple[bytes, str]:
+    """One branch from the text of its scene: the image of its file, and how it ended. Runs anywhere."""
+    from branches.config import parse
+    from branches.display import Display
+    from branches.job import compute_branch
+
+    return compute_branch(parse(text, "scene"), Display(silent=True))
+
+
+def file_name(config: Config) -> str:
+    """The file of a branch inside the folder of its diagram."""
+    law = config.law.replace(" ", "_")
+    return f"{law}_nu{config.nu:g}_m{config.m}_n{config.n}.h5"
+
+
+class _Plan:
+    """Which branch to compute next: none twice, from its other end.
+
+    A branch (m, n) may arrive at the (2n - m)-covered circle, where it is the branch (2n - m, n). Of such a pair the second one
+    waits for the first, and is left out if that came to its start.
+    """
+
+    def __init__(self, configs: list[Config], graph):
+        self._graph = graph
+        keys = {self._key(config): config for config in configs}
+        self._later = {key: other for key in keys if (other := self._partner(key)) in keys and other[2] < key[2]}
+        self._open = sorted(configs, key=lambda config: (self._key(config) in self._later, config.n * config.m))
+        self.left_out: list[Config] = []
+
+    @staticmethod
+    def _key(config):
+        return config.law, config.nu, config.m, config.n
+
+    @staticmethod
+    def _partner(key):
+        law, nu, m, n = key
+        return law, nu, 2 * n - m, n
+
+    def next(self, running):
+        """The next branch, :data:`WAIT`, or None."""
+        busy = {self._key(config) for config in running}
+        for config in list(self._open):
+            other = self._later.get(self._key(config))
+            if other in busy:
+                continue
+            self._open.remove(config)
+            if other and diagram_graph.holds_circle(self._graph, config.law, config.nu, config.m, config.n):
+                self.left_out.append(config)
+                continue
+            return config
+        return WAIT if self._open else None
+
+
+def run_diagram(config: DiagramConfig, folder: Path, display, *, scheduler=None, workers=None, overwrite=False) -> str:
+    """Compute the branches of a scene that ``folder`` does not hold yet, and the graph of all.
+
+    Returns
+    -------
+    str
+        "complete", or "lost" if a branch failed or was lost on the way (the others are there).
+
+    Raises
+    ------
+    StoreError
+        The folder cannot be written to, or holds another scene's result.
+    ExecutorError
+        The scheduler cannot be used.
+    """
+    began, folder, graph = time.perf_counter(), Path(folder), diagram_graph.new_graph(config.title)
+    prepare(folder / "diagram.json")
+    configs = config.branches
+    fresh = [one for one in configs if overwrite or not _stored(folder, one, graph)]
+    plan, failed = _Plan(fresh, graph), {}
+    display.begin_diagram(config, len(configs), len(configs) - len(fresh))
+    if fresh:
+        _load_kernels(fresh)
+        with executor(scheduler, workers) as (pool, limit):
+            for one, result in run_jobs(plan.next, _compute_one, pool, limit):
+                problem = _take(folder, one, result, graph)
+                if problem:
+                    failed[file_name(one)] = problem
+                place = "" if problem else diagram_graph.describe(graph, one.m, one.n, one.law, one.nu)
+                display.branch_done(one, problem, place)
+    graph.graph.update({"config": dump(config), "failed": json.dumps(failed), "absent": json.dumps(config.absent)})
+    diagram_graph.save(graph, folder)
+    display.diagram_summary(_summary(config, graph, failed, plan.left_out, time.perf_counter() - began, folder))
+    return "lost" if failed else "complete"
+
+
+def _summary(config, graph, failed, left_out, seconds, folder) -> list[str]:
+    """What came out, in lines to quote."""
+    nodes = [data["kind"] for _, data in graph.nodes(data=True)]
+    lines = [
+        f"{config.title or 'diagram'}: {len(diagram_graph.families(graph))} branches in {seconds:.2f} s",
+        f"  {nodes.count('circle')} bifurcations of circles, {nodes.count('fold')} folds, "
+        f"{nodes.count('leaves')} branches that leave through a limit",
+    ]
+    if left_out:
+        lines.append(f"  {len(left_out)} more are the same branches from their other ends")
+    lines += [f"  not there: {name}: {reason}" for name, reason in config.absent.items()]
+    lines += [f"  failed: {name}: {reason}" for name, reason in failed.items()]
+    return [*lines, f"  written to {folder} (diagram.json, diagram.graphml, one file a branch)"]
+
+
+def _compute_one(config: Config):
+    return compute(dump(config))
+
+
+def _load_kernels(configs):
+    """Load (the first time: compile) what the branches need, once, before processes are forked."""
+    from branches.job import seed
+
+    for law in {config.law: config for config in configs}.values():
+        system, x, _ = seed(law)
+        system.functionals(x)
+
+
+def _stored(folder: Path, config: Config, graph) -> bool:
+    """Whether the folder holds this very branch, complete; it is then put into the graph."""
+    from branches.config import parse
+    from branches.read import read_branch
+
+    path = folder / file_name(config)
+    with contextlib.suppress(StoreError):
+        branch = read_branch(path)
+        if branch.status == "complete" and parse(dump(config), "scene").model_dump() == branch.config:
+            diagram_graph.add_branch(graph, branch, path.name)
+            return True
+    return False
+
+
+def _take(folder: Path, config: Config, result, graph) -> str:
+    """Keep a finished branch; what went wrong with it, if anything."""
+    from branches.read import read_branch
+
+    if isinstance(result, BaseException):
+        return f"{type(result).__name__}: {result}"
+    image, outcome = result
+    path = folder / file_name(config)
+    write_bytes(path, image)
+    branch = read_branch(path)
+    diagram_graph.add_branch(graph, branch, path.name)
+    return "" if outcome == "complete" else branch.stop

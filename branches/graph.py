@@ -1,0 +1,280 @@
+"""The bifurcation diagram as a graph: where branches start, turn and end, and the pieces between; and questions put to it.
+
+Nodes are circle bifurcations, folds, branch points and other ends; edges are the pieces of branches between them and carry
+their columns. ``python -m branches.graph DIR`` answers from the command line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+#: Columns of a branch that an edge carries.
+COLUMNS = ("arclength", "kappa_n", "kappa_star", "energy")
+_TOLERANCE = 1e-7
+
+
+def new_graph(title: str = ""):
+    """An empty diagram."""
+    import networkx
+
+    return networkx.MultiGraph(title=title, format="ribbon bifurcation diagram", format_version=1)
+
+
+def add_branch(graph, branch, name: str) -> bool:
+    """Add a stored branch to the diagram.
+
+    Parameters
+    ----------
+    graph : networkx.MultiGraph
+    branch : branches.read.StoredBranch
+    name : str
+        Its file, kept with every edge.
+
+    Returns
+    -------
+    bool
+        False if it is in the diagram already, computed from its other end.
+    """
+    config = branch.config
+    family = {"law": config["law"], "nu": config["nu"], "m": config["m"], "n": config["n"]}
+    special = [event for event in branch.events if event["label"] in (b"LP", b"BP", b"EP", b"MX")]
+    nodes = [_node(event, family, branch.reason) for event in special]
+    if _circle(family, family["m"]) in graph and nodes[-1][1]["kind"] == "circle" and nodes[-1][0] in graph:
+        return False
+    for node, attributes in nodes:
+        graph.add_node(node, **attributes)
+    for (a, _), (b, _), first, last in zip(nodes, nodes[1:], special, special[1:]):
+        rows = branch.points[first["point"] : last["point"] + 1]
+        columns = {column: rows[column].tolist() for column in COLUMNS}
+        graph.add_edge(a, b, **family, file=name, **columns)
+    return True
+
+
+def holds_circle(graph, law: str, nu: float, covering: int, mode: int) -> bool:
+    """Whether some branch of the diagram leaves or reaches the circle of this covering index with this wavenumber."""
+    return _circle({"law": law, "nu": nu, "n": mode}, covering) in graph
+
+
+def _circle(family, covering: int) -> str:
+    return f"{family['law']} nu={family['nu']:g} circle {covering} mode {family['n']}"
+
+
+def _node(event, family, reason):
+    """Identifier and attributes of the node of a labelled point."""
+    attributes = {name: family[name] for name in ("law", "nu")}
+    attributes |= {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
+    attributes["error"] = float(event["error_kappa_n"])
+    label, place = event["label"], event["name"].decode()
+    if place in ("start", "trivial branch"):
+        covering = round(abs(attributes["kappa_star"]))
+        return _circle(family, covering), attributes | {"kind": "circle", "covering": covering, "mode": family["n"]}
+    kind = {b"LP": "fold", b"BP": "branch point", b"MX": "lost"}.get(label, "end")
+    if kind == "end" and reason == "limit":
+        kind = "leaves"
+    identifier = f"{family['law']} nu={family['nu']:g} ({family['m']},{family['n']}) {kind} {event['point']}"
+    return identifier, attributes | {"kind": kind, "what": place}
+
+
+# --- questions ----------------------------------------------------------------------------------------------------
+
+
+def families(graph) -> list[tuple]:
+    """The (law, nu, m, n) of all branches, in order; each is known by the end it was followed from."""
+    found = {(data["law"], data["nu"], data["m"], data["n"]) for _, _, data in graph.edges(data=True)}
+    return sorted(found)
+
+
+def course(graph, m: int, n: int, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """The special points along the branch (m, n), in order from the m-covered circle; for every law and nu asked for.
+
+    Raises
+    ------
+    KeyError
+        The diagram has no such branch.
+    """
+    result = []
+    for law_, nu_, m_, n_ in families(graph):
+        if n_ != n or law not in (None, law_) or nu not in (None, nu_):
+            continue
+        edges = [(a, b, data) for a, b, data in graph.edges(data=True) if _family(data) == (law_, nu_, m_, n_)]
+        edges.sort(key=lambda edge: edge[2]["arclength"][0])
+        nodes = _in_order(graph, edges)
+        if nodes[-1].get("covering") == m:
+            nodes.reverse()
+        if nodes[0].get("covering") == m:
+            result.append({"law": law_, "nu": nu_, "nodes": nodes})
+    if not result:
+        raise KeyError(f"the diagram has no branch (m, n) = ({m}, {n})")
+    return result
+
+
+def _family(data) -> tuple:
+    return data["law"], data["nu"], data["m"], data["n"]
+
+
+def _in_order(graph, edges) -> list[dict]:
+    """The nodes along consecutive edges (whose ends networkx may give either way round)."""
+    nodes = []
+    for a, b, data in edges:
+        ends = sorted((a, b), key=lambda node: abs(graph.nodes[node]["kappa_star"] - data["kappa_star"][0]))
+        nodes = nodes or [graph.nodes[ends[0]]]
+        nodes.append(graph.nodes[ends[1]])
+    return nodes
+
+
+def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """All equilibria of the diagram at a natural curvature: planar circles and points on branches, by energy.
+
+    Values between computed points come from a cubic spline over arclength.
+    """
+    found = []
+    for law_, nu_ in sorted({family[:2] for family in families(graph)}):
+        if law not in (None, law_) or nu not in (None, nu_):
+            continue
+        coverings = {
+            d["covering"] for _, d in graph.nodes(data=True) if d["kind"] == "circle" and (d["law"], d["nu"]) == (law_, nu_)
+        }
+        for m in sorted(coverings):
+            found.append({"law": law_, "nu": nu_, "circle": m, "kappa_star": float(m), "energy": m * m / 2 - m * kappa_n})
+    for _, _, data in graph.edges(data=True):
+        if law in (None, data["law"]) and nu in (None, data["nu"]):
+            for place in _crossings(data, kappa_n):
+                found.append({"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **place})
+    return sorted(found, key=lambda state: (state["law"], state["nu"], state["energy"]))
+
+
+def _crossings(data, kappa_n):
+    """Places on one piece of a branch where kappa_n takes a value."""
+    import numpy as np
+    from scipy.interpolate import CubicSpline
+
+    s, keep = np.unique(data["arclength"], return_index=True)
+    columns = {name: np.asarray(data[name])[keep] for name in COLUMNS[1:]}
+    if len(s) < 4:
+        inside = (columns["kappa_n"][:-1] - kappa_n) * (columns["kappa_n"][1:] - kappa_n) < 0
+        places = [float(np.interp(0, *zip(*sorted(zip(columns["kappa_n"][i : i + 2] - kappa_n, s[i : i + 2])))))
+                  for i in np.flatnonzero(inside)]  # fmt: skip
+    else:
+        places = CubicSpline(s, columns["kappa_n"] - kappa_n).roots(extrapolate=False)
+    for place in places:
+        values = {n: float(CubicSpline(s, columns[n])(place) if len(s) > 3 else np.interp(place, s, columns[n]))
+                  for n in COLUMNS[2:]}  # fmt: skip
+        yield values
+
+
+def folds(graph, low: float, high: float, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """The folds with low <= kappa_n <= high, in order of kappa_n."""
+    nodes = [dict(data) for _, data in graph.nodes(data=True) if data["kind"] == "fold" and low <= data["kappa_n"] <= high]
+    nodes = [data for data in nodes if law in (None, data["law"]) and nu in (None, data["nu"])]
+    return sorted(nodes, key=lambda data: data["kappa_n"])
+
+
+# --- files --------------------------------------------------------------------------------------------------------
+
+
+def save(graph, folder: Path) -> tuple[Path, Path]:
+    """Write ``diagram.json`` (networkx node-link form, columns as lists) and ``diagram.graphml`` (columns as JSON text)."""
+    import networkx
+
+    from branches.store import write_bytes
+
+    folder = Path(folder)
+    text = json.dumps(networkx.node_link_data(graph, edges="edges"), indent=1)
+    plain = networkx.MultiGraph(**graph.graph)
+    plain.add_nodes_from(graph.nodes(data=True))
+    for a, b, data in graph.edges(data=True):
+        plain.add_edge(a, b, **{k: json.dumps(v) if isinstance(v, list) else v for k, v in data.items()})
+    paths = folder / "diagram.json", folder / "diagram.graphml"
+    write_bytes(paths[0], text.encode())
+    write_bytes(paths[1], "\n".join(networkx.generate_graphml(plain)).encode())
+    return paths
+
+
+def read(folder: str | Path):
+    """The diagram in a folder (or in a ``diagram.json``).
+
+    Raises
+    ------
+    StoreError
+        There is none.
+    """
+    import networkx
+
+    from branches.store import StoreError
+
+    path = Path(folder)
+    path = path / "diagram.json" if path.is_dir() else path
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        if data["graph"]["format"] != "ribbon bifurcation diagram":
+            raise KeyError("format")
+        return networkx.node_link_graph(data, edges="edges")
+    except OSError as error:
+        raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise StoreError(f"cannot read {str(path)!r}: it is no diagram written by this program") from error
+
+
+# --- command line -------------------------------------------------------------------------------------------------
+
+
+def main(argv=None) -> int:
+    """Answer questions; the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m branches.graph", description="Ask a bifurcation diagram.")
+    parser.add_argument("folder", help="folder of a diagram scene, or its diagram.json")
+    parser.add_argument("--where", nargs=2, type=int, metavar=("M", "N"), help="where does the branch (M, N) go")
+    parser.add_argument("--at", type=float, metavar="KAPPA_N", help="which states exist at this natural curvature")
+    parser.add_argument("--folds", nargs=2, type=float, metavar=("LOW", "HIGH"), help="which folds lie in this window")
+    options = parser.parse_args(argv)
+    from branches.store import StoreError
+
+    try:
+        lines = list(_answers(read(options.folder), options))
+    except StoreError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyError as error:
+        print(f"error: {error.args[0]}", file=sys.stderr)
+        return 2
+    print("\n".join(lines))
+    return 0
+
+
+def _answers(graph, options) -> Iterable[str]:
+    if options.where:
+        for branch in course(graph, *options.where):
+            yield f"{branch['law']}, nu = {branch['nu']:g}: " + " -> ".join(map(_describe, branch["nodes"]))
+    if options.at is not None:
+        for state in states_at(graph, options.at):
+            what = f"{state['circle']}-covered circle" if "circle" in state else f"branch {state['branch']}"
+            values = f"kappa* = {state['kappa_star']:.8f}, energy = {state['energy']:.8f}"
+            yield f"{state['law']}, nu = {state['nu']:g}: {what}, {values}"
+    if options.folds:
+        for data in folds(graph, *options.folds):
+            place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
+            yield f"{data['law']}, nu = {data['nu']:g}: fold at {place}"
+    if not options.where and options.at is None and not options.folds:
+        yield f"{len(families(graph))} branches, {graph.number_of_nodes()} special points"
+        for law, nu, m, n in families(graph):
+            yield f"  {law}, nu = {nu:g}, ({m}, {n}): {describe(graph, m, n, law, nu)}"
+
+
+def describe(graph, m: int, n: int, law: str, nu: float) -> str:
+    """Where one branch goes, in a line."""
+    return " -> ".join(map(_describe, course(graph, m, n, law, nu)[0]["nodes"]))
+
+
+def _describe(node) -> str:
+    if node["kind"] == "circle":
+        return f"circle {node['covering']} at {node['kappa_n']:.6f}"
+    if node["kind"] == "leaves":
+        return f"leaves at {node['kappa_n']:g}"
+    return f"{node['kind']} at {node['kappa_n']:.6f}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
