@@ -1,0 +1,145 @@
+"""Scenes of many branches: the graph, the questions, the executor."""
+
+import json
+
+import networkx
+import numpy as np
+import pytest
+
+from branches import graph as diagram
+from branches.config import ConfigError, parse
+from branches.diagram import file_name, run_diagram
+from branches.display import Display
+from branches.executor import ExecutorError, executor
+from branches.read import read_branch
+from ribbon_model import exact
+
+#: Fig. 12a of Audoly & Seffen (2015), a part of it: all ends of m = 1 and 3 up to n = 4.
+SCENE = "{law: ribbon, nu: 0.3, m: [1, 3, 5], n: [1, 2, 3, 4], limits: {kappa_n: [-60, 100]}, stride: 20}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("diagram")
+    assert run_diagram(parse(SCENE, "scene"), folder, Display(silent=True)) == "complete"
+    return folder
+
+
+def test_every_branch_once(folder):
+    """Of 10 pairs (m, n) three are another one from its other end: (3, 2), (5, 3) and (5, 4)."""
+    graph = diagram.read(folder)
+    assert [family[2:] for family in diagram.families(graph)] == [(1, 2), (1, 3), (1, 4), (3, 1), (3, 4), (5, 1), (5, 2)]
+
+
+def test_folds_and_ends_are_those_of_the_quadrature(folder):
+    graph = diagram.read(folder)
+    for law, nu, m, n in diagram.families(graph):
+        (branch,) = diagram.course(graph, m, n, law, nu)
+        found = [node["kappa_n"] for node in branch["nodes"] if node["kind"] == "fold"]
+        expected = [point.kappa_n for point in exact.folds(m, n, nu, kappa_limits=(-60.0, 100.0))]
+        assert found == pytest.approx(expected, abs=1e-9)
+        assert branch["nodes"][0]["kappa_n"] == pytest.approx(exact.bifurcation(m, n, nu), abs=1e-9)
+        last, end = branch["nodes"][-1], exact.end(m, n, nu)
+        if end is None:
+            assert last["kind"] == "leaves" and last["kappa_n"] == pytest.approx(-60, abs=1e-9)
+        else:
+            assert (last["covering"], last["kappa_n"]) == (end[0], pytest.approx(end[1], abs=1e-8))
+
+
+def test_where_does_a_branch_go_from_either_end(folder):
+    graph = diagram.read(folder)
+    (there,), (back,) = diagram.course(graph, 1, 3), diagram.course(graph, 5, 3)
+    kinds = [node["kind"] for node in there["nodes"]]
+    assert kinds == ["circle", "fold", "fold", "circle"]
+    assert [node["kappa_n"] for node in back["nodes"]] == [node["kappa_n"] for node in reversed(there["nodes"])]
+    with pytest.raises(KeyError, match=r"\(9, 9\)"):
+        diagram.course(graph, 9, 9)
+
+
+def test_states_at_a_curvature_against_the_quadrature(folder):
+    """At kappa_n = 3.2 the branch (1, 2) has two states; kappa* from the exact curve, the circles' energy m^2/2 - m kappa_n."""
+    states = diagram.states_at(diagram.read(folder), 3.2)
+    found = sorted(state["kappa_star"] for state in states if state.get("branch") == (1, 2))
+    expected = [exact.solve(1, 2, 0.3, guess, kappa_n=3.2).kappa_star for guess in _guesses(1, 2, 3.2)]
+    assert found == pytest.approx(sorted(expected), abs=1e-5)
+    circles = {state["circle"]: state["energy"] for state in states if "circle" in state}
+    assert circles[1] == pytest.approx(0.5 - 3.2) and set(circles) == {1, 3, 5, 7}
+    assert [state["energy"] for state in states] == sorted(state["energy"] for state in states)
+
+
+def _guesses(m, n, kappa_n):
+    """Points of the exact curve next to where it passes kappa_n."""
+    points = exact.curve(m, n, 0.3)
+    values = np.array([point.kappa_n for point in points]) - kappa_n
+    return [points[i] for i in np.flatnonzero(values[:-1] * values[1:] < 0)]
+
+
+def test_folds_in_a_window(folder):
+    found = diagram.folds(diagram.read(folder), -8, 14)
+    expected = [p.kappa_n for m, n in ((1, 2), (1, 3), (3, 4)) for p in exact.folds(m, n, 0.3)]
+    assert [node["kappa_n"] for node in found] == pytest.approx(sorted(k for k in expected if -8 < k < 14), abs=1e-9)
+
+
+def test_exports(folder):
+    graph = diagram.read(folder)
+    other = networkx.read_graphml(folder / "diagram.graphml", force_multigraph=True)
+    assert set(other) == set(graph) and other.number_of_edges() == graph.number_of_edges()
+    _, _, data = next(iter(other.edges(data=True)))
+    assert json.loads(data["kappa_n"])[0] == pytest.approx(json.loads(data["kappa_n"])[0])
+    assert graph.graph["failed"] == "{}"
+
+
+def test_a_second_run_computes_what_is_missing_only(folder, capsys):
+    scene = parse(SCENE, "scene")
+    gone = folder / file_name(scene.branches[1])
+    before = {path: path.stat().st_mtime_ns for path in folder.glob("*.h5") if path != gone}
+    image = read_branch(gone).points
+    gone.unlink()
+    run_diagram(scene, folder, Display())
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    assert np.array_equal(read_branch(gone).points, image)
+    assert "computed before" in capsys.readouterr().out
+
+
+def test_where_it_runs_makes_no_difference(tmp_path):
+    """One process, several, and a Dask cluster: the same bits."""
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    scene = parse("{m: [3], n: [4, 5], stride: 20}", "scene")
+    run_diagram(scene, tmp_path / "one", Display(silent=True), workers=1)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        run_diagram(scene, tmp_path / "dask", Display(silent=True), scheduler=cluster.scheduler_address)
+    for config in scene.branches:
+        a, b = (read_branch(tmp_path / place / file_name(config)).points for place in ("one", "dask"))
+        assert np.array_equal(a, b)
+
+
+def test_a_scheduler_that_is_not_there():
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    with pytest.raises(ExecutorError, match="no Dask scheduler answers"), executor("nowhere://x"):
+        pass
+
+
+def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
+    scene = parse("{law: [ribbon, flat rod], nu: [0.3, -0.9], pairs: [[1, 2], [3, 4]]}", "scene")
+    assert len(scene.branches) == 6
+    assert list(scene.absent) == ["ribbon, nu = -0.9, (1, 2)", "ribbon, nu = -0.9, (3, 4)"]
+    assert "twisting modulus" in scene.absent["ribbon, nu = -0.9, (1, 2)"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{m: [1, 2.5], n: 2}", "m: "),
+        ("{m: [1], n: [1]}", "none of its branches"),
+        ("{m: [], n: [1]}", "m: the list is empty"),
+        ("{m: [1, 1], n: [2]}", "stands twice"),
+        ("{pairs: [[1, 2]], m: 3}", "pairs"),
+        ("{pairs: [[1, 2, 3]]}", "pairs: must be a list of"),
+        ("{m: [1], n: [2], colour: red}", "unknown field 'colour'"),
+        ("{m: [1]}", "'n' is missing"),
+        ("{m: [1], n: [2], nu: [0.7]}", "nu"),
+    ],
+)
+def test_bad_scenes(text, said):
+    with pytest.raises(ConfigError, match=said):
+        parse(text, "scene")
