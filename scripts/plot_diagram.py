@@ -149,7 +149,7 @@ def disentangled(edges, nodes):
         sigma = (np.asarray(data["arclength"]) - first) / (last - first)
         start, end = ends[key]
         reaches = abs(end - round(end)) < 1e-6 and round(end) != data["m"]
-        goal = round(end) if reaches else start - 0.8
+        goal = round(end) if reaches else start + 0.7 * np.sign(end - start)  # one that leaves fades away from its circle
         bend = 0.22 * (data["n"] - data["m"]) / max(data["n"], data["m"])
         return start + (goal - start) * sigma**1.5 + bend * np.sin(np.pi * sigma) * (1 if reaches else 0)
 
