@@ -1,0 +1,83 @@
+"""The command line as a user runs it: a process of its own, in a folder of its own."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLES = ("points", "events", "solutions/index", "solutions/t", "solutions/states")
+
+
+class Silent:
+    """A display that shows nothing; ``at`` maps the number of a point to what is to happen when it is shown."""
+
+    def __init__(self, at=None):
+        self.at, self.notes = at or {}, []
+
+    def note(self, text):
+        self.notes.append(text)
+
+    def begin(self, *arguments):
+        pass
+
+    def point(self, point, number, step):
+        if number in self.at:
+            self.at[number]()
+
+    def summary(self, *arguments):
+        pass
+
+
+class Command:
+    """``python -m branches.run`` in a folder; with ``program`` given, something else in its place."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def start(self, *arguments, program=("-m", "branches.run"), env=(), **more):
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8", **dict(env)}
+        options = {"cwd": self.folder, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "encoding": "utf-8", **more}
+        words = [sys.executable, *program, *map(str, arguments)]
+        return subprocess.Popen(words, env=environment, preexec_fn=_default_signals, **options)
+
+    def __call__(self, *arguments, **more):
+        process = self.start(*arguments, **more)
+        process.out, process.err = process.communicate(timeout=300)
+        return process
+
+
+def _default_signals():
+    # a shell that starts pytest in the background has it ignore Ctrl-C, and so would everything below it
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def tables_of(path) -> dict[str, bytes]:
+    """All columns of a result, bit by bit."""
+    with h5py.File(path) as file:
+        return {name: file[name][:].tobytes() for name in TABLES}
+
+
+@pytest.fixture
+def command(tmp_path):
+    return Command(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def silent():
+    return Silent
+
+
+@pytest.fixture(scope="session")
+def tables():
+    return tables_of
+
+
+@pytest.fixture(scope="session")
+def root():
+    return ROOT

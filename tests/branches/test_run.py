@@ -1,0 +1,413 @@
+"""The command: its numbers against the exact solution, its answers to mistakes, and that an interrupted run loses nothing."""
+
+import os
+import random
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+
+from branches.config import Config, ConfigError, load
+from branches.job import run_branch
+from branches.run import main
+from branches.store import StoreError
+from ribbon_model import exact
+
+#: A run of a second or two, so that there is time to interrupt it.
+LONG = {"steps": {"largest": 0.008, "max_points": 100_000}}
+LONG_SETTINGS = ("--set", "steps.largest=0.008", "--set", "steps.max_points=100000")
+
+
+def scene_of(**fields):
+    return Config(**{"m": 1, "n": 2, "zeros": {"kappa_n": [3.0, 1.0]}, "stride": 3, **fields})
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "scene.yaml"
+    path.write_text("m: 1\nn: 2\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory, silent, tables):
+    """The columns of runs that nothing interrupts, by scene."""
+    folder, known = tmp_path_factory.mktemp("undisturbed"), {}
+
+    def columns(config):
+        key = repr(config)
+        if key not in known:
+            path = folder / f"{len(known)}.h5"
+            run_branch(config, path, silent())
+            known[key] = tables(path)
+        return known[key]
+
+    return columns
+
+
+def rows(path):
+    with h5py.File(path) as file:
+        return file["points"][:]
+
+
+# --- the main job ---------------------------------------------------------------------------------------------------
+
+
+def test_main_job(command, root):
+    """From an unrelated folder, with a result whose name has a space and letters beyond ASCII."""
+    done = command(root / "configs" / "m1_n2.yaml", "--out", "a folder/résultat 1.h5")
+    assert (done.returncode, done.err) == (0, "")
+    with h5py.File(command.folder / "a folder" / "résultat 1.h5") as file:
+        events = pd.DataFrame(file["events"][:])
+    assert events["label"].tolist() == [b"BP", b"LP", b"EP"]
+    start, fold, end = events["kappa_n"]
+    assert abs(start - 2.5) < 1e-10  # equation (27) with (m, n) = (1, 2) at nu = 0.3
+    # the exact quadrature of the same equilibrium, ribbon_model.exact.folds(1, 2, 0.3); 4.08 in Audoly & Seffen, section 6.3
+    assert abs(fold - 4.07566753526546525) < 1e-10
+    assert round(fold, 2) == 4.08
+    assert abs(end + 0.5) < 1e-8  # equation (27) with (m, n) = (3, 2): the triple loop
+    assert abs(events["kappa_star"].iloc[-1] - 3) < 1e-8
+    assert (events["error_kappa_n"] < 1e-10).all()
+    for line in (
+        "leaves the 1-covered circle at kappa_n L/2pi = 2.5000000000",
+        "fold at kappa_n L/2pi = 4.0756675353",
+        "ends on the 3-covered circle at kappa_n L/2pi = -0.5000000000",
+        "written to a folder/résultat 1.h5",
+    ):
+        assert line in done.out
+
+
+def test_every_scene_against_the_exact_solution(tmp_path, root, silent):
+    """Labelled points of all scenes of one branch, in order, against the quadrature of ribbon_model.exact."""
+    scenes = [scene for path in sorted((root / "configs").glob("*.yaml")) if isinstance(scene := load(path), Config)]
+    assert len(scenes) >= 6
+    for config in scenes:
+        path, mode = tmp_path / f"m{config.m}_n{config.n}.h5", (config.m, config.n, config.nu)
+        assert run_branch(config, path, silent()) == "complete"
+        with h5py.File(path) as file:
+            events = file["events"][:]
+        limits = config.limits["kappa_n"]
+        known = [point for point in exact.curve(*mode, limits) if point.label]
+        assert events["label"].tolist() == [b"BP", *(b"LP" for _ in known[1:-1]), b"EP"], mode
+        assert np.abs(events["kappa_n"] - [point.kappa_n for point in known]).max() < 1e-9
+        assert np.abs(events["kappa_star"] - [point.kappa_star for point in known]).max() < 1e-9
+        folds, end = exact.folds(*mode, limits), exact.end(*mode)
+        assert np.abs(events["kappa_n"][1:-1] - [fold.kappa_n for fold in folds]).max(initial=0) < 1e-9
+        assert (events["name"][-1] == b"trivial branch") == (end is not None)
+        if end is not None:  # (covering index, kappa_n) of the circle, equation (27)
+            assert abs(events["kappa_star"][-1] - end[0]) < 1e-9 and abs(events["kappa_n"][-1] - end[1]) < 1e-9
+
+
+def test_help_imports_nothing_heavy(command):
+    code = (
+        "import sys; from branches.run import main\n"
+        "try: main(['--help'])\nexcept SystemExit as stop: print('code', stop.code)\n"
+        "print(sorted({'numpy', 'numba', 'h5py', 'pydantic', 'yaml', 'contin', 'ribbon_model'} & set(sys.modules)))"
+    )
+    done = command(program=("-c", code))
+    assert "--resume" in done.out and done.out.endswith("code 0\n[]\n") and done.err == ""
+
+
+# --- mistakes: one sentence, exit code 2, nothing written -------------------------------------------------------------
+
+HALF_LOOP = ["scene.yaml", "--set", "domain=half loop", "--set", "mesh.intervals=8"]
+MISTAKES = {
+    "no such config": (["none.yaml"], "cannot read the config 'none.yaml': No such file"),
+    "a folder as config": (["."], "cannot read the config '.': Is a directory"),
+    "a device as config": (["/dev/zero"], "megabyte"),
+    "unknown field": (["scene.yaml", "--set", "foo=1"], "unknown field 'foo'"),
+    "impossible value": (["scene.yaml", "--set", "nu=0.7"], "--set nu=0.7: nu: must be less than or equal to 0.5, not 0.7"),
+    "n = m": (["scene.yaml", "--set", "n=1"], "n = m = 1 is a rigid rotation"),
+    "m / n even": (["scene.yaml", "--set", "m=4"], "m = 4, n = 2: m / n must not be even"),
+    "no threshold": (["scene.yaml", "--set", "nu=-0.5"], "nu = -0.5: no threshold"),
+    # a few intervals for tens of half waves: the discrete equations have no bifurcation there, or another one
+    "mesh too coarse": ([*HALF_LOOP, "--set", "n=51"], "do not resolve the mode (m, n) = (1, 51) on the half loop; take more"),
+    "mesh that shows another mode": (
+        [*HALF_LOOP, "--set", "m=3", "--set", "n=41", "--set", "nu=0.1"],
+        "do not resolve the mode",
+    ),
+    "result is a folder": (["scene.yaml", "--out", "results"], "--out 'results/scene.h5': is a folder"),
+    "result is a device": (["scene.yaml", "--out", "/dev/null", "--overwrite"], "is neither a file nor a folder"),
+    "result is the config": (["scene.yaml", "--out", "scene.yaml", "--overwrite"], "is the config itself"),
+    "result without a name": (["scene.yaml", "--out", ""], "--out '': must name"),
+    "name too long": (["scene.yaml", "--out", "x" * 300], "too long"),
+    "folder is a file": (["scene.yaml", "--out", "scene.yaml/x.h5"], "scene.yaml' is not a folder"),
+    "folder cannot be made": (["scene.yaml", "--out", "/proc/none/x.h5"], "cannot write '/proc/none/x.h5'"),
+    "foreign file": (["scene.yaml", "--out", "foreign.h5"], "exists and is no readable result of this program"),
+    "foreign file to resume": (["scene.yaml", "--out", "foreign.h5", "--resume"], "not a readable HDF5 file"),
+    "nothing to resume": (["scene.yaml", "--out", "none/x.h5", "--resume"], "--resume: there is no file 'none/x.h5'"),
+    "another scene": (["scene.yaml", "--out", "other.h5"], "another scene (n = 3 there, 2 here); --overwrite"),
+    "another scene to resume": (["scene.yaml", "--out", "other.h5", "--resume"], "another scene (n = 3 there, 2 here); resume"),
+}
+
+
+@pytest.mark.parametrize("arguments, said", MISTAKES.values(), ids=MISTAKES.keys())
+def test_a_mistake_gets_one_sentence_and_changes_nothing(scene, arguments, said, monkeypatch, capsys, silent):
+    folder = scene.parent
+    monkeypatch.chdir(folder)
+    (folder / "results" / "scene.h5").mkdir(parents=True)
+    (folder / "foreign.h5").write_bytes(b"precious\n")
+    run_branch(Config(m=1, n=3, steps={"max_points": 2}), folder / "other.h5", silent())
+    before = {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")}
+    assert main([*arguments, "--quiet"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == "" and printed.err.startswith("error: ") and printed.err.count("\n") == 1
+    assert said in printed.err and "Traceback" not in printed.err
+    assert before == {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")}
+
+
+@pytest.mark.parametrize("arguments", [[], ["a", "b"], ["a", "--resume", "--overwrite"], ["a", "--res"], ["a", "--out"]])
+def test_a_mistake_in_the_command_line_itself(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2 and "error: " in capsys.readouterr().err
+
+
+def test_an_unfinished_result_is_not_replaced_unasked(tmp_path, silent, undisturbed, tables):
+    path, config = tmp_path / "x.h5", scene_of()
+    stop = silent({9: lambda: os.kill(os.getpid(), signal.SIGINT)})
+    assert run_branch(config, path, stop) == "interrupted"
+    with pytest.raises(StoreError, match="unfinished run of this scene; --resume goes on"):
+        run_branch(config, path, silent())
+    assert run_branch(config, path, silent(), overwrite=True) == "complete"
+    assert tables(path) == undisturbed(config)
+    assert run_branch(config, path, silent()) == "complete"  # a finished one of the same scene may be computed again
+
+
+@pytest.fixture
+def disk(tmp_path):
+    """A function that mounts a small disk; it is skipped where that is not permitted."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+
+    def mount(options):
+        done = subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder], capture_output=True, text=True)
+        if done.returncode:
+            pytest.skip(f"no small disk can be mounted: {done.stderr.strip()}")
+        return folder
+
+    yield mount
+    subprocess.run(["umount", folder], capture_output=True)
+
+
+def test_a_disk_full_from_the_start(command, scene, disk):
+    folder = disk("size=64k")
+    done = command(scene, "--out", folder / "x.h5", "--quiet")
+    assert (done.returncode, done.out) == (2, "") and list(folder.iterdir()) == []
+    assert done.err == f"error: cannot write '{folder}/x.h5': No space left on device\n"
+
+
+def test_a_disk_that_fills_up(command, scene, disk, tables):
+    """Room for a first result, not for the second one that is to take its place, until there is."""
+    folder = disk("size=1m")
+    path = folder / "x.h5"
+    assert command(scene, "--out", path, "--quiet").returncode == 0
+    before = path.read_bytes()
+    (folder / "ballast").write_bytes(bytes(2**20 - len(before) - 100_000))
+    done = command(scene, "--out", path, "--overwrite", "--quiet", *LONG_SETTINGS)
+    assert (done.returncode, done.err) == (2, f"error: cannot write '{path}': No space left on device\n")
+    assert path.read_bytes() == before and sorted(os.listdir(folder)) == ["ballast", "x.h5"]
+
+
+def test_a_disk_that_is_read_only(command, scene, disk):
+    folder = disk("size=64k,ro")
+    done = command(scene, "--out", folder / "new" / "x.h5", "--quiet")
+    assert (done.returncode, done.err) == (2, f"error: cannot write '{folder}/new/x.h5': Read-only file system\n")
+
+
+# --- interrupted, and gone on with ------------------------------------------------------------------------------------
+
+
+def test_a_run_stopped_at_every_single_point(tmp_path, silent, undisturbed, tables):
+    """Ctrl-C after each point in turn, labelled ones too; the columns are in the end bit by bit those of one run."""
+    path, config, outcome, stops = tmp_path / "x.h5", scene_of(), "", 0
+    while outcome != "complete":
+        number = len(rows(path)) if path.exists() else 0
+        display = silent({number: lambda: os.kill(os.getpid(), signal.SIGINT)})
+        outcome = run_branch(config, path, display, resume=path.exists())
+        stops += outcome == "interrupted"
+        assert os.listdir(tmp_path) == ["x.h5"]
+    assert tables(path) == undisturbed(config)
+    assert stops > 25
+
+
+@pytest.mark.parametrize("number", [0, 7, 18])
+def test_sigterm_does_the_same(tmp_path, silent, undisturbed, tables, number):
+    path, config = tmp_path / "x.h5", scene_of()
+    assert run_branch(config, path, silent({number: lambda: os.kill(os.getpid(), signal.SIGTERM)})) == "interrupted"
+    assert len(rows(path)) > number
+    assert run_branch(config, path, silent(), resume=True) == "complete"
+    assert tables(path) == undisturbed(config)
+
+
+def test_a_second_ctrl_c_stops_at_once(tmp_path, silent):
+    path = tmp_path / "x.h5"
+    run_branch(scene_of(), path, silent())
+    before = path.read_bytes()
+
+    def twice():
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+
+    with pytest.raises(KeyboardInterrupt):
+        run_branch(scene_of(), path, silent({5: twice}))
+    assert path.read_bytes() == before and os.listdir(tmp_path) == ["x.h5"]
+
+
+def test_killed_again_and_again(command, scene, undisturbed, tables):
+    """SIGKILL, SIGINT and SIGTERM at random moments; after each the file opens with plain h5py and holds a piece of the run.
+
+    The slowest test of the folder: six processes, each of which loads the compiled kernels and computes for a while.
+    """
+    config = Config(m=1, n=2, **LONG)
+    whole = undisturbed(config)["points"]
+    path, chance = command.folder / "x.h5", random.Random(4)
+    arguments = (scene, "--out", path, "--quiet", *LONG_SETTINGS)
+    process = command.start(*arguments)
+    while not path.exists() and process.poll() is None:  # the first one as soon as there is anything to lose
+        time.sleep(0.01)
+    for number in (signal.SIGKILL, signal.SIGINT, signal.SIGKILL, signal.SIGTERM, signal.SIGKILL):
+        process.send_signal(number)
+        out, err = process.communicate()
+        assert err in ("", "interrupted\n") and process.returncode in (0, 130, -number)
+        if process.returncode == 130 and not err:
+            assert f"interrupted; go on with --resume --out {path}" in out
+        assert whole.startswith(rows(path).tobytes())
+        process = command.start(*arguments, "--resume")
+        time.sleep(chance.uniform(0.9, 1.6))
+    out, err = process.communicate()
+    assert (process.returncode, err) == (0, "")
+    assert tables(path) == undisturbed(config)
+
+
+def test_ctrl_c_before_the_first_point(command, scene, tmp_path_factory):
+    """While the kernels are being compiled: no traceback, no file."""
+    cache = tmp_path_factory.mktemp("cache")
+    process = command.start(scene, "--out", "x.h5", env={"CONTIN_CACHE_DIR": cache, "NUMBA_CACHE_DIR": cache})
+    time.sleep(1.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (130, "", "interrupted\n")
+    assert os.listdir(command.folder) == ["scene.yaml"]
+
+
+def test_resuming_a_complete_run_does_nothing(tmp_path, silent):
+    path, display = tmp_path / "x.h5", silent()
+    run_branch(scene_of(), path, silent())
+    before = path.read_bytes()
+    assert run_branch(scene_of(), path, display, resume=True) == "complete"
+    assert display.notes == [f"{path} is complete already (returned to the trivial branch (M2 = 0)); nothing to do"]
+    assert path.read_bytes() == before
+
+
+def test_a_run_that_is_lost(scene, capsys, monkeypatch):
+    """No step of 0.5 turns by less than 0.01 rad: exit code 1, what there is is kept, with the reason."""
+    monkeypatch.chdir(scene.parent)
+    arguments = ["scene.yaml", "--quiet", "--set", "steps.smallest=0.5", "--set", "steps.angle=0.01"]
+    for _ in range(2):  # there is nothing in the way of trying again
+        assert main(arguments) == 1
+        assert "stopped: the step became smaller than min_step = 0.5" in capsys.readouterr().out
+        with h5py.File("scene.h5") as file:
+            assert file.attrs["status"] == "lost" and file["events"]["label"].tolist() == [b"BP", b"MX"]
+    assert main([*arguments, "--resume"]) == 1
+    assert len(rows("scene.h5")) == 2
+
+
+EXTENSIONS = {
+    "more points": ({"steps": {"max_points": 10}}, {}),
+    "from the first point": ({"steps": {"max_points": 1}}, {}),
+    "limits moved": ({"limits": {"kappa_n": (-100, 3.5)}}, {}),
+    "limits moved behind a fold": ({"limits": {"kappa_star": (0, 2.0)}}, {}),
+    "limits and points": ({"limits": {"M2": (-1, 1.0)}}, {"steps": {"max_points": 25}}),
+}
+
+
+@pytest.mark.parametrize("first, then", EXTENSIONS.values(), ids=EXTENSIONS.keys())
+def test_a_run_extended_is_the_run_that_went_on(tmp_path, silent, undisturbed, tables, first, then):
+    path = tmp_path / "x.h5"
+    assert run_branch(scene_of(**first), path, silent()) == "complete"
+    fewer = len(rows(path))
+    assert run_branch(scene_of(**then), path, silent(), resume=True) == "complete"
+    assert tables(path) == undisturbed(scene_of(**then))
+    assert len(rows(path)) > fewer
+    with h5py.File(path) as file:  # the scene in the file is that of the last run
+        assert "max_points: 10" not in file.attrs["config"] and "3.5" not in file.attrs["config"]
+
+
+@pytest.mark.parametrize("first, then, said", [
+    ({"steps": {"max_points": 10}}, {"nu": 0.2, "steps": {"max_points": 20}}, "nu = 0.3 there, 0.2 here"),
+    ({"steps": {"max_points": 10}}, {"steps": {"max_points": 20, "largest": 0.1}}, "steps = "),
+    ({"steps": {"max_points": 10}}, {"steps": {"max_points": 5}}, "max_points: 5 must exceed the 9 points taken already"),
+    ({"steps": {"max_points": 20}}, {"limits": {"kappa_n": (0, 3)}}, "limits: kappa_n: 0, 3 must contain the place to go on"),
+])  # fmt: skip
+def test_a_run_that_cannot_be_extended_so(tmp_path, silent, first, then, said):
+    path = tmp_path / "x.h5"
+    run_branch(scene_of(**first), path, silent())
+    before = path.read_bytes()
+    with pytest.raises((StoreError, ConfigError), match=said):
+        run_branch(scene_of(**then), path, silent(), resume=True)
+    assert path.read_bytes() == before
+
+
+# --- standard output, terminals ---------------------------------------------------------------------------------------
+
+
+def test_nobody_reads_the_output_to_its_end(command, scene):
+    """As with ``| head -1``: the run goes on quietly, its product is the file."""
+    process = command.start(scene)
+    assert process.stdout.readline().startswith("ribbon, (m, n) = (1, 2)")
+    process.stdout.close()
+    assert process.stderr.read() == "" and process.wait() == 0
+    process.stderr.close()
+    with h5py.File(command.folder / "scene.h5") as file:
+        assert file.attrs["status"] == "complete"
+
+
+def test_output_that_cannot_be_written(command, scene):
+    with open("/dev/full", "w") as full:
+        done = command(scene, stdout=full)
+    assert done.returncode == 0 and (command.folder / "scene.h5").exists()
+    assert done.err == "error: cannot write to standard output: No space left on device\n"
+
+
+def test_an_encoding_without_the_letters(command, scene):
+    done = command(scene, "--out", "é.h5", "--quiet", env={"PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.err) == (0, "") and "written to \\xe9.h5" in done.out
+
+
+@pytest.mark.parametrize("columns", [1, 12, 80])
+def test_the_moving_line_fits_the_terminal(columns, tmp_path, silent, monkeypatch, capsys):
+    """Drawn on whatever standard error is, and told that this is a terminal of so many columns."""
+    from branches.display import Display
+
+    monkeypatch.setenv("COLUMNS", str(columns))
+    display = Display()
+    display._moving, display._shown = True, -1e9
+    run_branch(scene_of(steps={"max_points": 4}), tmp_path / "x.h5", display)
+    drawn = capsys.readouterr().err.split("\r")
+    assert max(map(len, drawn)) <= max(columns - 1, 0)
+    assert columns < 80 or any("points/s" in line for line in drawn)
+
+
+def test_on_a_terminal(command, scene):
+    pty = pytest.importorskip("pty")
+    ours, theirs = pty.openpty()
+    process = command.start(scene, stdout=theirs, stderr=theirs, env={"COLUMNS": "20"})
+    os.close(theirs)
+    shown = b""
+    while True:
+        try:
+            part = os.read(ours, 65536)
+        except OSError:  # how Linux says that the other end is closed
+            break
+        if not part:
+            break
+        shown += part
+    os.close(ours)
+    assert process.wait() == 0 and b"fold at kappa_n" in shown and b"Traceback" not in shown
