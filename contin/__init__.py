@@ -12,7 +12,7 @@ The tutorial is docs/contin.md.
 """
 
 from contin.algebraic import Algebraic, AlgebraicProblem
-from contin.arclength import Continuation, Settings, State, follow
+from contin.arclength import Continuation, follow
 from contin.branch import Branch, Point, Stop
 from contin.collocation import Collocation
 from contin.corrector import Newton, correct
@@ -23,7 +23,9 @@ from contin.events import Monitor
 from contin.mesh import MeshControl
 from contin.problem import BoundaryValueProblem
 from contin.sensitivity import sensitivities
+from contin.settings import Settings
 from contin.solving import point_of, solve, trace
+from contin.steps import State
 from contin.storage import load, save
 from contin.switching import BranchPoint, MultiplePoint, locate_branch_point
 

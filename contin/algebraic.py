@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from contin.compilation import Batch, argument_count, check_names, outputs
+from contin.compilation import Batch, argument_count, check_statement, outputs
 from contin.errors import ProblemError
 from contin.events import hopf
+from contin.system import System
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +45,7 @@ class AlgebraicProblem:
     count: int | None = None
 
     def __post_init__(self) -> None:
-        states = tuple(f"u{i}" for i in range(self.states)) if isinstance(self.states, int) else self.states
-        object.__setattr__(self, "states", check_names("states", states))
-        check_names("parameters", self.parameters)
-        check_names("functionals", [*self.functionals, *self.parameters])
-        for name, value in self.parameters.items():
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)) or not math.isfinite(value):
-                raise ProblemError(f"parameters: {name} = {value!r} must be a finite number")
+        object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
         arguments = argument_count(self.residual)
         if arguments not in (2, 3):
             raise ProblemError(f"residual takes {arguments} arguments, must take 2 (or 3, to fill the last)")
@@ -86,7 +80,7 @@ class AlgebraicProblem:
         return self._batches[name]
 
 
-class Algebraic:
+class Algebraic(System):
     """An algebraic problem with chosen free parameters, as the continuation sees it.
 
     Unknowns ``x`` are the states, then the free parameters. The interface is that of
@@ -102,41 +96,16 @@ class Algebraic:
     degree = 0
 
     def __init__(self, problem: AlgebraicProblem, free, parameters: Mapping[str, float] | None = None):
-        parameters = parameters or {}
-        self.problem, self.free = problem, tuple(free)
-        names = tuple(problem.parameters)
-        for name in (*self.free, *parameters):
-            if name not in names:
-                raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}")
-        self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
-        self._free = np.array([names.index(name) for name in self.free], dtype=np.int64)
+        super().__init__(problem, free, parameters or {})
         self.state_size = len(problem.states)
         self.size = self.state_size + len(self.free)
         self.equations = problem.equation_size
         self.weights = np.ones(self.size)
         self.nodes = np.zeros(1)
 
-    def pack(self, states, values: Mapping[str, float]):
-        """A vector of unknowns from states (n,) and the mapping of free parameters."""
-        return np.concatenate([np.asarray(states, dtype=float).ravel(), [float(values[name]) for name in self.free]])
-
     def states(self, x):
         """States, shape (1, n)."""
         return x[: self.state_size].reshape(1, -1)
-
-    def all_parameters(self, x):
-        """Values of all parameters, the free ones from x."""
-        p = self.parameters.copy()
-        p[self._free] = x[self.state_size :]
-        return p
-
-    def parameter(self, x, name: str) -> float:
-        """The value of one parameter by name."""
-        return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
-
-    def parameter_index(self, name: str) -> int:
-        """Where the free parameter ``name`` stands in x."""
-        return self.state_size + self.free.index(name)
 
     def residual(self, x):
         """F at x, shape (equations,)."""
@@ -157,7 +126,7 @@ class Algebraic:
 
     def parameter_columns(self, x, names):
         """Derivatives of F by any parameters, free or not, shape (equations, len(names))."""
-        which = np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
+        which = self._indices(names)
         u, p, n = self.states(x), self.all_parameters(x), self.state_size
         return self.problem.batch("residual").jacobian(_NO_TIME, u, _none(n), p, which)[1][0, :, n:]
 

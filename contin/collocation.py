@@ -17,6 +17,7 @@ from contin.condensation import Factorization
 from contin.errors import ProblemError
 from contin.mesh import MeshControl, adapted_mesh
 from contin.problem import BoundaryValueProblem
+from contin.system import System
 
 DEGREES = range(2, 9)
 
@@ -132,7 +133,7 @@ def assemble(value, slope, weights, h, jacobian, n, columns, rows, local, border
             corner[q, k + b] = columns[b, tail + q]
 
 
-class Collocation:
+class Collocation(System):
     """A problem discretized on a mesh: what the continuation loop works on.
 
     A vector ``x`` of unknowns, shape (size,), holds the states at the mesh's nodes in order, (N d + 1, n) flattened,
@@ -158,19 +159,14 @@ class Collocation:
     """
 
     def __init__(self, problem: BoundaryValueProblem, mesh, degree: int, free, parameters):
-        self.problem, self.degree, self.free = problem, degree, tuple(free)
-        names = tuple(problem.parameters)
-        for name in (*self.free, *parameters):
-            if name not in names:
-                raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}")
+        super().__init__(problem, free, parameters)
+        self.degree = degree
         self.basis = basis(degree)
         self.mesh = np.array(mesh, dtype=float)
         self._h = np.diff(self.mesh)
         a, b = problem.domain
         if self.mesh.ndim != 1 or self.mesh.size < 2 or not np.all(self._h > 0) or self.mesh[0] != a or self.mesh[-1] != b:
             raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
-        self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
-        self._free = np.array([names.index(name) for name in self.free], dtype=np.int64)
         self._n, self._d, self.intervals = len(problem.states), degree, self._h.size
         self._times = (self.mesh[:-1, None] + self._h[:, None] * self.basis.points).ravel()
         self._h_points = np.repeat(self._h, degree)[:, None]
@@ -194,27 +190,9 @@ class Collocation:
         inner = (self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel()
         return np.append(inner, self.mesh[-1])
 
-    def pack(self, states, values):
-        """A vector of unknowns from states (N d + 1, n) at the nodes and the mapping of free parameters."""
-        return np.concatenate([np.asarray(states, dtype=float).ravel(), [float(values[name]) for name in self.free]])
-
     def states(self, x):
         """States at the nodes, a view of shape (N d + 1, n)."""
         return x[: self.state_size].reshape(-1, self._n)
-
-    def all_parameters(self, x):
-        """Values of all parameters, shape (number of names,), the free ones from x."""
-        p = self.parameters.copy()
-        p[self._free] = x[self.state_size :]
-        return p
-
-    def parameter(self, x, name: str) -> float:
-        """The value of one parameter by name."""
-        return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
-
-    def parameter_index(self, name: str) -> int:
-        """Where the free parameter ``name`` stands in x."""
-        return self.state_size + self.free.index(name)
 
     def _local(self, states):
         """States by interval, shape (N, d + 1, n)."""
@@ -279,7 +257,7 @@ class Collocation:
     def parameter_columns(self, x, names):
         """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
         n, p, u = self._n, self.all_parameters(x), self.states(x)
-        which = np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
+        which = self._indices(names)
         field = self.problem.batch("field").jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, which)[1][:, :, n:]
         ends = self.problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, which)[1][0, :, 2 * n :]
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))

@@ -221,6 +221,19 @@ def check_names(kind: str, names: Sequence[str]) -> tuple[str, ...]:
     return names
 
 
+def check_statement(states, parameters, functionals) -> tuple[str, ...]:
+    """The names of states (u0, u1, ... for a number), after names and values of a problem were checked."""
+    names = check_names("states", [f"u{i}" for i in range(states)] if isinstance(states, int) else states)
+    if not names:
+        raise ProblemError("states: there must be at least one")
+    check_names("parameters", parameters)
+    check_names("functionals", [*functionals, *parameters])
+    for name, value in parameters.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)) or not math.isfinite(value):
+            raise ProblemError(f"parameters: {name} = {value!r} must be a finite number")
+    return names
+
+
 def outputs(function: Callable, arguments: Sequence[tuple[str, ...] | None], what: str) -> int:
     """How many values ``function`` returns (0: a single number), found by one call in Python with NaN everywhere."""
     plain = getattr(function, "py_func", function)

@@ -14,10 +14,11 @@ import dataclasses
 
 import numpy as np
 
-from contin.arclength import Settings, follow
+from contin.arclength import follow
 from contin.branch import Branch, Point
 from contin.errors import ProblemError
 from contin.events import Monitor
+from contin.settings import Settings
 from contin.switching import BranchPoint, _Bordered, locate_branch_point
 
 

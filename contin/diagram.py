@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contin.arclength import Continuation, Settings
+from contin.arclength import Continuation
 from contin.branch import Branch, Point, Stop
 from contin.errors import ConvergenceError
+from contin.settings import Settings
 from contin.switching import BranchPoint, inner
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]

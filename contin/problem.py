@@ -6,9 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from contin.compilation import Batch, argument_count, check_names, outputs
+from contin.compilation import Batch, argument_count, check_statement, outputs
 from contin.errors import ProblemError
 
 
@@ -59,18 +57,10 @@ class BoundaryValueProblem:
     integral_count: int | None = None
 
     def __post_init__(self) -> None:
-        states = tuple(f"u{i}" for i in range(self.states)) if isinstance(self.states, int) else self.states
-        object.__setattr__(self, "states", check_names("states", states))
-        check_names("parameters", self.parameters)
-        check_names("functionals", [*self.functionals, *self.parameters])
-        for name, value in self.parameters.items():
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)) or not math.isfinite(value):
-                raise ProblemError(f"parameters: {name} = {value!r} must be a finite number")
+        object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
         a, b = self.domain
         if not (math.isfinite(a) and math.isfinite(b) and a < b):
             raise ProblemError(f"domain: {self.domain} must be two finite numbers, the first the smaller")
-        if not self.states:
-            raise ProblemError("states: there must be at least one")
         p, u = tuple(self.parameters), self.states
         counts = {
             "rhs": self._count("rhs", self.rhs, (None, u, p), len(u)),

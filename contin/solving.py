@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from contin.algebraic import Algebraic, AlgebraicProblem
-from contin.arclength import Settings, follow
+from contin.arclength import follow
 from contin.branch import Branch, Point
 from contin.collocation import Collocation
 from contin.corrector import Newton, correct
@@ -16,6 +16,7 @@ from contin.errors import ConvergenceError, ProblemError
 from contin.events import Trial
 from contin.mesh import MeshControl
 from contin.problem import BoundaryValueProblem
+from contin.settings import Settings
 from contin.switching import BranchPoint, inner
 
 Guess = Callable | Point | Sequence[float] | tuple[np.ndarray, np.ndarray] | None

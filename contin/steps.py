@@ -1,0 +1,77 @@
+"""The parts of one step: the state of a run, predicting, correcting, judging."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contin.corrector import Newton, correct
+from contin.events import Trial
+from contin.switching import inner
+
+#: Share of the states in a tangent below which their direction says nothing.
+_STILL = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Everything that the next step depends on; with it a run continues as if never interrupted.
+
+    ``x``, ``tangent`` and ``previous_tangent`` live on ``system``; ``sign`` is that of the determinant on this mesh;
+    ``accepted`` counts the regular points; ``singular`` says that x is a branch point.
+    """
+
+    system: object
+    x: np.ndarray
+    tangent: np.ndarray
+    previous_tangent: np.ndarray | None
+    previous_step: float
+    step: float
+    sign: float
+    arclength: float
+    accepted: int
+    singular: bool
+
+
+def unit_tangent(system, factors):
+    """The unit vector along the curve, from factors of [F_x; row], with row.tangent > 0."""
+    tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
+    return tangent / np.sqrt(inner(system, tangent, tangent))
+
+
+def predict(state: State, step: float):
+    """Along the tangent, with the curvature known from the last step."""
+    guess = state.x + step * state.tangent
+    if state.previous_tangent is not None:
+        guess += (step**2 / (2 * state.previous_step)) * (state.tangent - state.previous_tangent)
+    return guess
+
+
+def corrected(state: State, guess, step: float, newton: Newton, exact: bool = False) -> Trial:
+    """The point of the curve at ``step`` along the state's tangent; ``exact``: with its own tangent taken right there.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    system = state.system
+    row = system.weights * state.tangent
+    done = correct(system, guess, row, row @ state.x + step, newton)
+    factors = system.linearize(done.x, (row,))[1] if exact else done.factors
+    tangent = unit_tangent(system, factors)
+    return Trial(system, done.x, tangent, factors.sign, done.iterations, done.error, factors)
+
+
+def turn(state: State, trial: Trial) -> float:
+    """The angle between the tangents at both ends: of the whole and, at half weight, of the states alone.
+
+    Where parameters are large they dominate the norm, and two branches can look parallel that are not.
+    """
+    system = state.system
+    whole = inner(system, trial.tangent, state.tangent)
+    weights = system.weights[: system.state_size]
+    a, b = trial.tangent[: system.state_size], state.tangent[: system.state_size]
+    sizes = np.sqrt((weights * a) @ a), np.sqrt((weights * b) @ b)
+    part = (weights * a) @ b / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
+    return float(max(np.arccos(np.clip(whole, -1, 1)), np.arccos(np.clip(part, -1, 1)) / 2))
