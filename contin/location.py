@@ -71,7 +71,7 @@ class Segment:
                     event = self._locate(monitor)
                     if monitor.confirm is None or monitor.confirm(event.trial):
                         found.append(event)
-            found = [event for event in found if not _same_place(event, found)]
+            found = [event for event in found if not _same_place(event, found, self.step)]
         closed = self._closed()
         if closed is not None:
             found.append(closed)
@@ -93,12 +93,13 @@ class Segment:
         return state.x + s * a + s**2 * (3 * ahead - 2 * a - b) + s**3 * (a + b - 2 * ahead)
 
     def _changes(self, monitor) -> bool:
-        """Whether a monitor passes zero in a step; one of the tangent is looked at again with the exact one."""
-        trial, step = self.trial, self.step
-        value = monitor.function(self.before)
-        if not sign_changed(value, monitor.function(trial)):
+        """Whether a monitor passes zero in the step; one of the tangent is looked at again with the exact ones."""
+        if not sign_changed(monitor.function(self.before), monitor.function(self.trial)):
             return False
-        return monitor.label != "LP" or sign_changed(value, monitor.function(self._corrected(trial.x, step, exact=True)))
+        if monitor.label != "LP":
+            return True
+        ends = self._corrected(self.state.x, 0.0, exact=True), self._corrected(self.trial.x, self.step, exact=True)
+        return sign_changed(*(monitor.function(end) for end in ends))
 
     def _locate(self, monitor: Monitor):
         """The zero of a monitor inside a step; where location fails, the nearer end, named "possible"."""
@@ -204,13 +205,16 @@ class Segment:
         return Event(at, "EP", "closed", there, Stop("closed", "the branch closed on its first point"))
 
 
-def _same_place(event: Event, found: list[Event]) -> bool:
-    """Whether a fold is no event of its own: the parameter also turns where branches cross, and at a cusp of folds."""
+def _same_place(event: Event, found: list[Event], step: float) -> bool:
+    """Whether a fold is no event of its own: the parameter also turns where branches cross, and at a cusp of folds.
+
+    Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
+    """
     others = [other for other in found if other.label in ("BP", "CP") or other.name == "trivial branch"]
     if event.label != "LP" or not others:
         return False
     lost = event.name.startswith("possible")  # the equations are singular at the crossing: nothing else was found
-    return lost or any(np.max(np.abs(event.trial.x - other.trial.x)) < 1e-4 for other in others)
+    return lost or any(np.max(np.abs(event.trial.x - other.trial.x)) < 1e-4 + 2e-3 * step for other in others)
 
 
 # --- how well the mesh resolves a point -----------------------------------------------------------------------------

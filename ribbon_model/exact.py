@@ -19,6 +19,8 @@ The precession depends on (A, q) only. So a branch is ONE plane curve, the same 
 through kappa_n = c (1 - beta)/(1 - nu beta). The follower walks that curve, in z = (log(1 + A), log(q)/2): both circles
 are ordinary points of it, A = 0 being crossed transversally.
 
+The rods' quadratures are in `ribbon_model.exact_rods`; the follower and the functions here are common to the three laws.
+
 Units: bending modulus B = 1, length L = 2 pi. Source of every number: quadrature of the R = 0 equilibrium.
 """
 
@@ -26,10 +28,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Trapezoidal rule in v = log(tan(theta)). The integrands decay like exp(-|v|), and their poles stay at |Im v| = pi/2
-# (above 1 where d_2 is used) however small q is: the period may diverge, the accuracy does not.
-_SPACING, _TAIL = 1 / 6, 38.0
-_IMAGINARY_STEP = 1e-30
+from ribbon_model.exact_rods import FLOAT, RODS, Numerics, RodPoint
+
 _HOMOCLINIC = -300.0  # log(q)/2 at which the follower stops, before q underflows
 _SHORTEST_STEP = 1e-7
 
@@ -68,7 +68,7 @@ def bifurcation(m, n, nu):
 
 
 def residuals(c, A, kappa_n, m, n, nu):
-    """Defects of closure of a quarter wave: shape (2,), length minus pi/2n, azimuth minus pi m/2n in [-pi/2, pi/2].
+    """Defects of closure of a quarter wave of the ribbon: shape (2,), length minus pi/2n, azimuth minus pi m/2n (mod pi).
 
     Raises ValueError as `bifurcation`, if m is a multiple of 2n (the centreline would stay open), and if A < 0,
     c = nu kappa_n or q <= 0 (eta would not oscillate through zero).
@@ -78,55 +78,63 @@ def residuals(c, A, kappa_n, m, n, nu):
     return np.pi * np.array([(mean + mean_squared) / c - 1 / (2 * n), _defect(azimuth, m, n)])
 
 
-def solve(m, n, nu, guess, *, kappa_n=None, eta_max_squared=None):
+def solve(m, n, nu, guess, *, kappa_n=None, eta_max_squared=None, amplitude=None, law="ribbon", root=0):
     """The point of the branch with given kappa_n, or given amplitude, nearest a guess in the sense of Newton's method.
 
     Parameters
     ----------
-    guess : ExactPoint or (c, A, kappa_n)
-    kappa_n, eta_max_squared : float
-        Exactly one of the two: what the point must have.
+    guess : ExactPoint, RodPoint, or for the ribbon (c, A, kappa_n)
+    kappa_n, eta_max_squared, amplitude : float
+        Exactly one of them: what the point must have. The two amplitudes are the A of the ribbon and of the rods.
+    law, root :
+        As for `curve`.
 
     Raises
     ------
     ValueError
-        On both or neither target, or where `residuals` raises it.
+        On several targets or none, or where `residuals` raises it.
     RuntimeError
         If Newton does not converge. Near a fold of kappa_n prescribe the amplitude, and conversely.
     """
-    _check(m, n, nu)
-    if (kappa_n is None) == (eta_max_squared is None):
-        raise ValueError("give exactly one of kappa_n and eta_max_squared")
-    known = isinstance(guess, ExactPoint)
-    A, q = (guess.eta_max_squared, guess.q) if known else (guess[1], _q(*guess, nu))
-    z = np.array([np.log1p(A), np.log(q) / 2])
+    family = _family(law, m, n, nu, root)
+    A = eta_max_squared if law == "ribbon" else amplitude
+    if (kappa_n is None) == (A is None) or (eta_max_squared is not None and amplitude is not None):
+        raise ValueError(f"give exactly one of kappa_n and {'eta_max_squared' if law == 'ribbon' else 'amplitude'}")
+    if isinstance(guess, ExactPoint | RodPoint):
+        z = family.coordinates(guess)
+    else:
+        z = np.array([np.log1p(guess[1]), np.log(_q(*guess, nu)) / 2])
     for _ in range(30):
-        defect, numerator, denominator = _along(z, m, n, nu)
+        defect, numerator, denominator = FLOAT.gradients(family.parts, z)
         if kappa_n is None:
-            target = np.expm1(z[0]) - eta_max_squared, np.array([np.exp(z[0]), 0.0])
+            target = np.expm1(z[0]) - A, np.array([np.exp(z[0]), 0.0])
         else:
             target = tuple(numerator[i] - kappa_n * denominator[i] for i in (0, 1))
         update = np.linalg.solve([defect[1], target[1]], [-defect[0], -target[0]])
         size = np.abs(update).max()
         z = z + update * min(1, 0.5 / max(size, 1e-300))  # logarithms: half a unit is already far
         if size < 1e-11:
-            return _point(z, m, n, nu)
+            return family.point(z)
     raise RuntimeError(f"no convergence on branch ({m}, {n}): start nearer, or prescribe the other quantity")
 
 
-def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05):
-    """The branch from the m-covered circle to the (2n-m)-covered one, or to a limit of kappa_n.
+def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", root=0):
+    """The branch from the m-covered circle to the one where it ends, or to a limit of kappa_n.
 
     Parameters
     ----------
     kappa_limits : (float, float)
         The curve stops where kappa_n leaves this interval.
     step : float
-        Largest arclength between points in the plane (log(1 + A), log(q)/2).
+        Largest arclength between points in the plane of the unknowns: (log(1 + A), log(q)/2) of the ribbon.
+    law : str
+        'ribbon', 'flat rod' or 'isotropic rod'.
+    root : int
+        Which of the thresholds on the m-covered circle: 0, or for the isotropic rod also 1.
 
     Returns
     -------
-    list of ExactPoint
+    list of ExactPoint, or of RodPoint
         In order, folds included; the last label says why the curve ends.
 
     Raises
@@ -136,61 +144,128 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05):
     RuntimeError
         If the follower cannot proceed.
     """
-    _check(m, n, nu)
-    start, (lowest, highest) = bifurcation(m, n, nu), kappa_limits
+    family, (lowest, highest) = _family(law, m, n, nu, root), kappa_limits
+    start, begin = family.threshold(m), family.circle(m)
     if not lowest <= start <= highest:
         raise ValueError(f"branch ({m}, {n}) starts at kappa_n = {start:.6g}, outside {tuple(kappa_limits)}")
-    sign = np.sign(_along(_circle(m, n), m, n, nu)[2][0])
+    sign = np.sign(FLOAT.gradients(family.parts, begin)[2][0])
 
     def room(z):  # > 0 inside the limits; continuous where kappa_n passes through infinity
-        _, (numerator, _), (denominator, _) = _along(z, m, n, nu)
+        _, (numerator, _), (denominator, _) = FLOAT.gradients(family.parts, z)
         return sign * min(highest * denominator - numerator, numerator - lowest * denominator)
 
     def turning(z):
-        return _turning(z, m, n, nu)
+        return _turning(family, z)[1]
 
-    points = [_point(_circle(m, n), m, n, nu, "BP")]
-    for line, length, ahead in _segments(m, n, step):
-        stops = [(length, ahead, "MX" if ahead[1] < _HOMOCLINIC else "")]
-        if turning(line(0.0)) * turning(ahead) < 0:
+    points, before = [family.point(begin, "BP")], turning(begin)
+    for line, length, ahead in _segments(family, step):
+        stops = [(length, ahead, "MX" if _homoclinic(ahead) else "")]
+        after = turning(ahead)
+        if before * after < 0:
             fold = _root(turning, line, 0.0, length)
             stops.insert(0, (fold, line(fold), "LP"))
-        last = 0.0
+        before, last = after, 0.0
         for s, z, label in stops:
-            if z[0] < 0 and room(_circle(2 * n - m, n)) >= 0:
-                return [*points, _point(_circle(2 * n - m, n), m, n, nu, "BP")]
+            if z[0] < 0 and room(family.circle(family.finish)) >= 0:
+                return [*points, family.point(family.circle(family.finish), "BP")]
             if room(z) < 0:
-                return [*points, _point(line(_root(room, line, last, s)), m, n, nu, "EP")]
-            points.append(_point(z, m, n, nu, label))
+                return [*points, family.point(line(_root(room, line, last, s)), "EP")]
+            points.append(family.point(z, label))
             last = s
     return points
 
 
-def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0)):
+def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0):
     """The points of `curve` at which kappa_n is stationary, in order. Raises as `curve` does."""
-    return [point for point in curve(m, n, nu, kappa_limits) if point.label == "LP"]
+    return [point for point in curve(m, n, nu, kappa_limits, law=law, root=root) if point.label == "LP"]
 
 
-def end(m, n, nu):
+def end(m, n, nu, law="ribbon", root=0):
     """(covering index, kappa_n) of the circle where the branch ends, or None. Raises as `curve`.
 
-    None if the branch never returns to a circle (2n < m), or has infinite kappa_n somewhere on the way.
+    None if the branch never returns to a circle (2n < m, except for the isotropic rod), or has infinite kappa_n somewhere on
+    the way. The index is kappa_star there: negative, on some branches of the isotropic rod, if omega_1 is.
     """
-    _check(m, n, nu)
-    if 2 * n < m:
+    family = _family(law, m, n, nu, root)
+    if family.finish is None:
         return None
-    signs = {np.sign(_along(ahead, m, n, nu)[2][0]) for _, _, ahead in _segments(m, n, 0.05)}
-    return (2 * n - m, bifurcation(2 * n - m, n, nu)) if len(signs) == 1 else None
+    signs = set()
+    for _, _, ahead in _segments(family, 0.05):
+        if _homoclinic(ahead):
+            return None
+        signs.add(np.sign(FLOAT.gradients(family.parts, ahead)[2][0]))
+    return (family.finish, family.threshold(family.finish)) if len(signs) == 1 else None
 
 
-def _check(m, n, nu):
-    _check_mode(m, n, nu)
+def refine(point, digits):
+    """kappa_n and kappa_star of a point of `curve`, to many digits.
+
+    A fold is located anew and a circle is kept a circle; every other point keeps its kappa_n. nu, and that kappa_n, are taken
+    as the decimal numbers that Python prints (0.3 is 3/10).
+
+    Parameters
+    ----------
+    point : ExactPoint or RodPoint
+    digits : int
+        Significant decimal digits. The time is a few seconds for 30, and grows with the cube.
+
+    Returns
+    -------
+    kappa_n, kappa_star : mpmath.mpf
+
+    Raises
+    ------
+    RuntimeError
+        If the iteration does not converge.
+    """
+    import mpmath  # of no use to anything else
+
+    law, root = (point.law, point.root) if isinstance(point, RodPoint) else ("ribbon", 0)
+    coarse = _family(law, point.m, point.n, point.nu, root)
+
+    def conditions(family, z, kappa_n, numerics):
+        defect, turning = _turning(family, z, numerics)
+        if point.label == "LP":
+            return np.array([defect, turning])
+        if point.label == "BP":
+            return np.array([defect, z[0]])
+        return np.array([defect, family.values(z, numerics)[0] - kappa_n])
+
+    z = coarse.coordinates(point)
+    steps = 1e-5 * np.eye(2)
+    slopes = [
+        (conditions(coarse, z + e, point.kappa_n, FLOAT) - conditions(coarse, z - e, point.kappa_n, FLOAT)) for e in steps
+    ]
+    inverse = np.linalg.inv(np.array(slopes).T / 2e-5)
+    with mpmath.workdps(digits + 10):
+        numerics = Numerics(digits + 4)
+        fine = type(coarse)(point.m, point.n, mpmath.mpf(repr(point.nu)), root)
+        z, kappa_n = numerics.array(z), mpmath.mpf(repr(point.kappa_n))
+        for _ in range(digits):  # a chord: some six digits each time
+            update = numerics.array(inverse @ conditions(fine, z, kappa_n, numerics).astype(float))
+            z = z - update
+            if max(abs(update)) < mpmath.mpf(10) ** (-digits - 2):
+                return tuple(+value for value in fine.values(z, numerics)[:2])
+    raise RuntimeError(f"no convergence to {digits} digits on branch ({point.m}, {point.n})")
+
+
+def _family(law, m, n, nu, root):
+    if law != "ribbon" and law not in RODS:
+        raise ValueError(f"law = {law!r} is none of 'ribbon', {', '.join(map(repr, RODS))}")
+    if root not in ((0, 1) if law == "isotropic rod" else (0,)):
+        raise ValueError(f"root = {root}: the {law} has no such threshold")
+    _check(m, n, nu, root)
+    return _Ribbon(m, n, nu) if law == "ribbon" else RODS[law](m, n, nu, root)
+
+
+def _check(m, n, nu, root=0):
+    _check_mode(m, n, nu, root)
     if m % (2 * n) == 0:  # every two-fold axis then lies in the mirror plane: the mean of d_3 normal to it is free
         raise ValueError(f"branch ({m}, {n}) does not close with R = 0, because m is a multiple of 2n")
 
 
-def _check_mode(m, n, nu):
-    if min(m, n) < 1 or m == n:
+def _check_mode(m, n, nu, root=0):
+    if min(m, n) < 1 or (m == n and root == 0):  # K = 1 is the motion; K = -1/(1 + nu), the isotropic rod's other root, is not
         raise ValueError(f"(m, n) = ({m}, {n}) is no buckling mode: need m, n >= 1 and n != m (a rigid motion)")
     if not -1 < nu < 1:
         raise ValueError(f"nu = {nu} is outside (-1, 1)")
@@ -205,69 +280,87 @@ def _q(c, A, kappa_n, nu):
     return np.float64(q)
 
 
-def _quadratures(A, q):
+def _quadratures(A, q, numerics=FLOAT):
     """Means over theta of |azimuth|/pi, 1/sqrt(eta^2 + q), eta^2/sqrt(eta^2 + q); and |mu/a|. A, q of one shape."""
     A, q = A[..., None], q[..., None]
-    amplitude, size = max(A.real.flat[0], 0.0), q.real.flat[0]
-    lower = 0.5 * np.log(size / amplitude) if amplitude > size else 0.0
-    v = _SPACING * np.arange((lower - _TAIL) // _SPACING, _TAIL // _SPACING)
-    eta_squared, beta = A / (1 + np.exp(-2 * v)), (A + 4 - q) / 2
-    mu = np.sqrt(beta**2 + A * q)
-    weight = _SPACING / (np.pi * np.cosh(v) * np.sqrt(eta_squared + q))
-    if abs(beta - A).flat[0] < 0.2 * np.sqrt(amplitude):  # d_3 passes close to the axis
+    amplitude, size = (float(numerics.real(value).flat[0]) for value in (A, q))
+    v = numerics.nodes(0.5 * np.log(size / amplitude) if amplitude > max(size, 0.0) else 0.0, 0.0)
+    eta_squared, beta = A / (1 + numerics.exp(-2 * v)), (A + 4 - q) / 2
+    mu = numerics.sqrt(beta**2 + A * q)
+    weight = numerics.spacing / (numerics.pi * numerics.cosh(v) * numerics.sqrt(eta_squared + q))
+    if abs(beta - A).flat[0] < 0.2 * np.sqrt(max(amplitude, 0.0)):  # d_3 passes close to the axis
         azimuth = mu * (beta + eta_squared) / ((beta - eta_squared) ** 2 + 4 * eta_squared)
     else:
-        azimuth = mu * (beta - eta_squared) / ((beta - A) ** 2 + 4 * A / (1 + np.exp(2 * v)))
+        azimuth = mu * (beta - eta_squared) / ((beta - A) ** 2 + 4 * A / (1 + numerics.exp(2 * v)))
     return (azimuth * weight).sum(-1), weight.sum(-1), (eta_squared * weight).sum(-1), mu[..., 0]
 
 
-def _defect(azimuth, m, n):
+def _defect(azimuth, m, n, numerics=FLOAT):
     """Azimuth of a quarter wave minus that of a closed loop, both over pi, modulo 1. sign(mu/a) = sign(m - n)."""
-    defect = np.sign(m - n) * azimuth - m / (2 * n)
-    return defect - np.round(np.real(defect))
+    defect = ((1 if m > n else -1) * azimuth * 2 * n - m) / (2 * n)
+    return defect - np.round(np.asarray(numerics.real(defect)).astype(float))
 
 
-def _along(z, m, n, nu):
-    """(value, gradient (2,)) of the azimuth's defect, of c (1 - beta) and of 1 - nu beta; kappa_n is their ratio."""
-    x, rho = z[:, None] + 1j * _IMAGINARY_STEP * np.eye(2)  # complex step: gradients exact to round-off
-    A, q = np.expm1(x), np.exp(2 * rho)
-    azimuth, mean, mean_squared, _ = _quadratures(A, q)
-    beta = (A + 4 - q) / 2
-    results = _defect(azimuth, m, n), 2 * n * (mean + mean_squared) * (1 - beta), 1 - nu * beta
-    return [(result[0].real, result.imag / _IMAGINARY_STEP) for result in results]
+class _Ribbon:
+    """The ribbon's branch in z = (log(1 + A), log(q)/2); the same interface as `ribbon_model.exact_rods.Rod`."""
+
+    def __init__(self, m, n, nu, root=0):
+        self.m, self.n, self.nu = m, n, nu
+        self.finish = 2 * n - m if 2 * n > m else None
+
+    def threshold(self, index):
+        return bifurcation(index, self.n, self.nu)
+
+    def circle(self, index):
+        return np.array([0.0, np.log(2 * self.n / index)])
+
+    def parts(self, x, y, numerics=FLOAT):
+        """Defect of the azimuth over pi, c (1 - beta) and 1 - nu beta, of the shape of x, y; kappa_n is their ratio."""
+        A, q = numerics.expm1(x), numerics.exp(2 * y)
+        azimuth, mean, mean_squared, _ = _quadratures(A, q, numerics)
+        beta = (A + 4 - q) / 2
+        return _defect(azimuth, self.m, self.n, numerics), 2 * self.n * (mean + mean_squared) * (1 - beta), 1 - self.nu * beta
+
+    def values(self, z, numerics=FLOAT):
+        """kappa_n, kappa_star, c, mu at z."""
+        n, nu = self.n, self.nu
+        A, q = numerics.expm1(z[:1]), numerics.exp(2 * z[1:])
+        _, mean, mean_squared, mu = _quadratures(A, q, numerics)
+        c, kappa_star, beta = 2 * n * (mean + mean_squared), 2 * n * (mean + nu * mean_squared), (A + 4 - q) / 2
+        mu = mu * c * (1 - nu) / (1 - nu * beta)  # the last factors are a, without cancellation
+        values = c * (1 - beta) / (1 - nu * beta), kappa_star, c, mu if self.m > n else -mu
+        return tuple(value[0] for value in values)
+
+    def point(self, z, label=""):
+        kappa_n, kappa_star, c, mu = self.values(z)
+        values = kappa_n, kappa_star, c, np.expm1(z[0]), np.exp(2 * z[1]), mu, c**2 / 2 - kappa_n * kappa_star
+        return ExactPoint(self.m, self.n, float(self.nu), *map(float, values), label)
+
+    def coordinates(self, point):
+        return np.array([np.log1p(point.eta_max_squared), np.log(point.q) / 2])
 
 
-def _point(z, m, n, nu, label=""):
-    A, q = np.expm1(z[0]), np.exp(2 * z[1])
-    _, mean, mean_squared, mu = _quadratures(A, q)
-    c, kappa_star, beta = 2 * n * (mean + mean_squared), 2 * n * (mean + nu * mean_squared), (A + 4 - q) / 2
-    kappa_n = c * (1 - beta) / (1 - nu * beta)
-    mu = np.sign(m - n) * mu * c * (1 - nu) / (1 - nu * beta)  # the last factors are a, without cancellation
-    values = kappa_n, kappa_star, c, A, q, mu, c**2 / 2 - kappa_n * kappa_star
-    return ExactPoint(m, n, float(nu), *map(float, values), label)
+def _homoclinic(z):
+    return z[1] < _HOMOCLINIC or z[0] > -2 * _HOMOCLINIC
 
 
-def _circle(m, n):
-    return np.array([0.0, np.log(2 * n / m)])
-
-
-def _tangent(z, m, n):
-    gradient = _along(z, m, n, 0.0)[0][1]
+def _tangent(family, z):
+    gradient = FLOAT.gradients(family.parts, z)[0][1]
     return np.array([gradient[1], -gradient[0]]) / np.hypot(*gradient)
 
 
-def _turning(z, m, n, nu):
-    """d kappa_n/ds times (1 - nu beta)^2 and a factor of constant sign: zero at a fold, finite where kappa_n is not."""
-    (_, across), numerator, denominator = _along(z, m, n, nu)
+def _turning(family, z, numerics=FLOAT):
+    """Defect; d kappa_n/ds times denominator^2 and a factor of constant sign: zero at a fold, finite where kappa_n is not."""
+    (defect, across), numerator, denominator = numerics.gradients(family.parts, z)
     gradient = numerator[1] * denominator[0] - numerator[0] * denominator[1]
-    return gradient[0] * across[1] - gradient[1] * across[0]
+    return defect, gradient[0] * across[1] - gradient[1] * across[0]
 
 
-def _correct(z, tangent, m, n):
+def _correct(family, z, tangent):
     """The curve's point on the normal to `tangent` through z (Newton), or None if there is none nearby."""
     normal = np.array([-tangent[1], tangent[0]])
     for _ in range(7):
-        value, gradient = _along(z, m, n, 0.0)[0]
+        value, gradient = FLOAT.gradients(family.parts, z)[0]
         update = -value / (gradient @ normal)
         if not abs(update) < 0.5:
             return None
@@ -277,26 +370,26 @@ def _correct(z, tangent, m, n):
     return None
 
 
-def _segments(m, n, step):
+def _segments(family, step):
     """Walk from the m-covered circle: yield (line, length, ahead), with line(s) the curve at 0 <= s <= length.
 
     Ends with the first `ahead` at negative A, or nearly homoclinic.
     """
-    z = _circle(m, n)
-    tangent = _tangent(z, m, n)
+    z = family.circle(family.m)
+    tangent = _tangent(family, z)
     tangent, length = tangent * np.sign(tangent[0]), step / 10  # A grows from 0
     while length > _SHORTEST_STEP:
-        ahead = _correct(z + length * tangent, tangent, m, n)
-        turned = tangent if ahead is None else _tangent(ahead, m, n)
+        ahead = _correct(family, z + length * tangent, tangent)
+        turned = tangent if ahead is None else _tangent(family, ahead)
         cosine = turned @ tangent
         if ahead is None or abs(cosine) < 0.985:
             length /= 2
             continue
-        yield lambda s, z=z, tangent=tangent: _correct(z + s * tangent, tangent, m, n), length, ahead
-        if ahead[0] < 0 or ahead[1] < _HOMOCLINIC:
+        yield lambda s, z=z, tangent=tangent: _correct(family, z + s * tangent, tangent), length, ahead
+        if ahead[0] < 0 or _homoclinic(ahead):
             return
         z, tangent, length = ahead, turned * np.sign(cosine), min(1.5 * length, step)
-    raise RuntimeError(f"branch ({m}, {n}) lost near A = {np.expm1(z[0]):.6g}, q = {np.exp(2 * z[1]):.6g}")
+    raise RuntimeError(f"branch ({family.m}, {family.n}) lost near A = {np.expm1(z[0]):.6g}, second unknown {z[1]:.6g}")
 
 
 def _root(function, line, lower, upper):
