@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import sys
 from pathlib import Path
 
@@ -25,19 +26,33 @@ def main(argv=None) -> int:
     parser.add_argument("--width", type=float, default=0.3, help="width of the drawn strip, in units of L / 2 pi")
     options = parser.parse_args(argv)
     from branches.read import read_branch
-    from branches.store import StoreError
+    from branches.store import StoreError, prepare, write_bytes
 
+    out = Path(options.out) if options.out else Path(options.file).with_suffix(".pdf")
     try:
+        check(options, out)
         branch = read_branch(options.file)
-        if not 0 <= options.shapes <= 12:
-            raise StoreError(f"--shapes {options.shapes}: must lie between 0 and 12")
-        out = Path(options.out) if options.out else Path(options.file).with_suffix(".pdf")
-        draw(branch, options.shapes, options.width).savefig(out, dpi=160)
-    except (StoreError, OSError, ValueError) as error:
+        prepare(out)
+        picture = io.BytesIO()
+        draw(branch, options.shapes, options.width).savefig(picture, format=out.suffix[1:].lower(), dpi=160)
+        write_bytes(out, picture.getvalue())
+    except (StoreError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     print(f"written to {out}")
     return 0
+
+
+def check(options, out: Path) -> None:
+    """Raise ValueError on an option that makes no picture."""
+    if out.suffix.lower() not in (".pdf", ".svg", ".png"):
+        raise ValueError(f"--out {str(out)!r}: must end in .pdf, .svg or .png")
+    if out.exists() and not out.is_file():
+        raise ValueError(f"--out {str(out)!r}: must be a file")
+    if not 0 <= options.shapes <= 12:
+        raise ValueError(f"--shapes {options.shapes}: must lie between 0 and 12")
+    if not 0 < options.width <= 2:
+        raise ValueError(f"--width {options.width:g}: must lie between 0 and 2")
 
 
 def draw(branch, shapes: int = 6, width: float = 0.3):
