@@ -11,6 +11,7 @@
 The tutorial is docs/contin.md.
 """
 
+from contin._cache import cache_directory  # the first of all: it tells numba where to keep compiled code
 from contin.algebraic import Algebraic, AlgebraicProblem
 from contin.arclength import Continuation, follow
 from contin.branch import Branch, Point, Stop
@@ -32,6 +33,6 @@ from contin.switching import BranchPoint, MultiplePoint, locate_branch_point
 __all__ = [
     "Algebraic", "AlgebraicProblem", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
-    "ProblemError", "Settings", "State", "Stop", "correct", "curve", "diagram", "follow", "load", "locate_branch_point",
-    "point_of", "save", "sensitivities", "solve", "trace",
+    "ProblemError", "Settings", "State", "Stop", "cache_directory", "correct", "curve", "diagram", "follow", "load",
+    "locate_branch_point", "point_of", "save", "sensitivities", "solve", "trace",
 ]  # fmt: skip

@@ -10,25 +10,22 @@ another file is never missed.
 from __future__ import annotations
 
 import builtins
-import functools
 import hashlib
 import importlib.util
 import inspect
 import keyword
 import math
-import os
 import sys
-import tempfile
 import types
 from collections import namedtuple
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from contin._analytic import AnalyticCompiler
+from contin._cache import cache_directory, write_text
 from contin.errors import ProblemError
 
 #: Part of every fingerprint: changes when functions are compiled by other rules (the template has its own part).
@@ -246,29 +243,6 @@ def outputs(function: Callable, arguments: Sequence[tuple[str, ...] | None], wha
     return len(result) if isinstance(result, (tuple, list, np.ndarray)) else 0
 
 
-def cache_directory() -> Path:
-    """Where compiled problems are kept: ``CONTIN_CACHE_DIR``, else the user's cache directory, else a temporary one."""
-    chosen = os.environ.get("CONTIN_CACHE_DIR")
-    if not chosen:
-        from platformdirs import user_cache_dir
-
-        chosen = os.path.join(user_cache_dir("contin", appauthor=False), "problems")
-    try:
-        os.makedirs(chosen, exist_ok=True)
-        if os.access(chosen, os.W_OK):
-            return Path(chosen)
-    except OSError:
-        pass
-    return _temporary_directory()
-
-
-@functools.cache
-def _temporary_directory() -> Path:
-    path = Path(tempfile.mkdtemp(prefix="contin-"))
-    print(f"contin: no writable cache, compiling into {path}; set CONTIN_CACHE_DIR to keep it", file=sys.stderr)
-    return path
-
-
 class Batch:
     """Functions of a point, compiled together: values and exact Jacobian at many points in one call.
 
@@ -362,14 +336,6 @@ def _module(key: str, dispatchers: dict[str, Dispatcher], name: str, source: str
     except numba.core.errors.NumbaError as error:
         raise ProblemError(_explain(name, error)) from error
     return module
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file so that no other process ever sees half of it."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "w") as file:
-        file.write(text)
-    os.replace(temporary, path)
 
 
 def _explain(name: str, error: Exception) -> str:

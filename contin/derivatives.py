@@ -8,7 +8,7 @@ import math
 import types
 from collections.abc import Callable, Sequence
 
-from contin.compilation import cache_directory, write_text
+from contin._cache import cache_directory, write_text
 
 
 def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[..., tuple]:

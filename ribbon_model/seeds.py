@@ -76,6 +76,8 @@ def whole_loop(law: Law, t, states, degree: int, parameters: Mapping[str, float]
 def _leave(system: Collocation, circle: np.ndarray):
     """The branch point at a circle, and the tangent that is not the circle's own."""
     found = locate_branch_point(system, circle)
+    if not found.tangents:
+        raise ValueError("no branch leaves the circle there")
     at = system.parameter_index("M2")
     tangent = max(found.tangents, key=lambda vector: abs(vector[at]))
     return system, found.x, tangent * np.sign(tangent[at])
