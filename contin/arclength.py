@@ -266,7 +266,7 @@ class Continuation:
         self, label, name, trial: Trial, gone: float, state: State | None = None, details=None, monitor: Monitor | None = None
     ) -> Point:
         arclength, errors = (state or self.state).arclength + gone, {}
-        if label and label != "MX" and self.settings.errors:
+        if label and label != "MX" and name != "closed" and self.settings.errors:  # closed: the first point once more
             trial, errors, details = refined(label, trial, details, monitor, self.settings)
         system = trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
