@@ -6,7 +6,7 @@ import pytest
 
 from ribbon_model import exact
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
-from ribbon_model.linear import thresholds
+from ribbon_model.linear import stability_interval, thresholds
 
 #: Table 3 of Audoly & Seffen (2015): K for nu = .3, n = 1 ... 7; the 1. of n = m are rigid rotations.
 TABLE_3 = {
@@ -53,3 +53,17 @@ def test_limits():
     with pytest.raises(ValueError, match="twisting modulus"):
         thresholds(RIBBON, 1, 2, -0.9)
     assert math.isfinite(thresholds(RIBBON, 1, 60, 0.5)[0])
+
+
+def test_published_intervals_of_stability():
+    """Section 6.2: -.17 < kappa_n r0 < 1.74 for m = 3, below 2.50 for m = 1; the flat rod up to 5.62 (nu = .3)."""
+    assert [round(end, 2) for end in stability_interval(RIBBON, 3, 0.3)] == [-0.17, 1.74]
+    low, high = stability_interval(RIBBON, 1, 0.3)
+    assert (low, round(high, 2)) == (-math.inf, 2.5)
+    assert round(stability_interval(FLAT_ROD, 1, 0.3)[1], 2) == 5.62
+
+
+def test_naturally_straight_isotropic_rods():
+    """Section 6.2: with kappa_n = 0 and nu = .3 an isotropic rod is unstable for all m but 1."""
+    assert stability_interval(ISOTROPIC_ROD, 1, 0.3)[0] < 0 < stability_interval(ISOTROPIC_ROD, 1, 0.3)[1]
+    assert all(stability_interval(ISOTROPIC_ROD, m, 0.3)[0] > 0 for m in (3, 5, 7))
