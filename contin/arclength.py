@@ -19,7 +19,7 @@ import numpy as np
 from contin.branch import Branch, Point, Stop
 from contin.corrector import correct
 from contin.errors import ConvergenceError, ProblemError
-from contin.events import Monitor, Trial, fold, limit, user_zero
+from contin.events import Monitor, Trial, fold, limit, sign_changed, user_zero
 from contin.location import Segment, refined
 from contin.settings import Settings
 from contin.steps import State, corrected, predict, turn, unit_tangent
@@ -160,8 +160,7 @@ class Continuation:
             )  # fmt: skip
             yield self._point("MX", "no convergence", Trial(state.system, state.x, state.tangent, state.sign), 0.0)
             return
-        factors = self._factors and self._factors[1]
-        for event in Segment(state, trial, step, self.settings, self.start, factors).events(self._monitors):
+        for event in self._segment(state, trial, step).events(self._monitors):
             yield self._point(event.label, event.name, event.trial, event.at, state, event.details, event.monitor)
             if event.stop is not None:
                 self.stop = event.stop
@@ -192,9 +191,9 @@ class Continuation:
                 angle = turn(state, trial)
                 if angle <= settings.angle and distance <= _ASTRAY * settings.accuracy * step:
                     trial.passed, clear = self._passed(state, trial)
-                    if step < 2 * finest or (trial.passed < 2 and clear):
+                    if step < 2 * finest or (trial.passed < 2 and clear and self._connected(state, trial, step)):
                         return state, step, trial, distance
-                    problem = ConvergenceError("several branch points in one step")
+                    problem = ConvergenceError("several branch points in one step, or another branch at its end")
                 else:
                     problem = ConvergenceError(
                         f"tangents turn by {angle:.2f} rad in one step, the prediction is off by {distance / step:.2f} of it"
@@ -212,6 +211,15 @@ class Continuation:
         row = state.system.weights * state.tangent
         tangent = self._tangent(state.system, state.x, row)
         return tangent if np.all(np.isfinite(tangent)) else state.tangent
+
+    def _connected(self, state: State, trial: Trial, step: float) -> bool:
+        """Whether a change of the determinant's sign comes from a branch point: without one, Newton left the branch."""
+        if state.singular or not self.settings.branch_points or not sign_changed(state.sign, trial.sign):
+            return True
+        return self._segment(state, trial, step).crossing().name != "possible"
+
+    def _segment(self, state: State, trial: Trial, step: float) -> Segment:
+        return Segment(state, trial, step, self.settings, self.start, self._factors and self._factors[1])
 
     def _passed(self, state: State, trial: Trial) -> tuple[int, bool]:
         """How many branch points the step passes, by :func:`crossings` (the determinant sees the parity only)."""

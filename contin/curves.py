@@ -21,6 +21,13 @@ from contin.events import Monitor
 from contin.settings import Settings
 from contin.switching import BranchPoint, _Bordered, locate_branch_point
 
+#: Cosine between a border and the null vector that it stands for, below which it is renewed.
+_FITS = 0.7
+
+
+def _cosine(a, b) -> float:
+    return float(abs(a @ b) / np.sqrt((a @ a) * (b @ b)))
+
 
 class _Extended:
     """What extended systems share: unknowns, names and columns are those of the underlying system."""
@@ -64,8 +71,11 @@ class _Extended:
         return self._on(self.base.refined())
 
     def adapted(self, x, control):
-        """The extended system on a better mesh, its borders renewed."""
-        return self._on(self.base.adapted(x[: self.base.size], control), x)
+        """The extended system on a better mesh, or with new borders where the old ones no longer fit; its carrier."""
+        changed = self.base.adapted(x[: self.base.size], control)
+        if changed is None and self._stale(x):
+            changed = self.base, np.array
+        return self._on(changed, x)
 
     def _on(self, changed, x=None):
         if changed is None:
@@ -120,6 +130,13 @@ class FoldCurve(_Extended):
                 b, c = w / np.linalg.norm(w), base.weights * v / np.sqrt((base.weights * v) @ v)
                 self.borders = (b, c)
         return v, w, g
+
+    def _stale(self, x) -> bool:
+        """Whether the null vectors have turned away from the borders."""
+        v, w, _ = self._null(x)
+        b, c = self.borders
+        root = np.sqrt(self.base.weights)
+        return min(_cosine(c / root, v * root), _cosine(b, w)) < _FITS
 
     def residual(self, x):
         """F and g."""
@@ -177,6 +194,12 @@ class BranchPointCurve(_Extended):
             found = locate_branch_point(system, inside)
             self.borders = (found.kernel, found.left)
         return system, inside, _Bordered(system, inside, *self.borders)
+
+    def _stale(self, x) -> bool:
+        """Whether kernel and left null vector have turned away from the borders."""
+        system, _, matrix = self._matrix(x)
+        longest = max(np.sqrt((system.weights * v) @ v) for v in matrix.kernel)  # 1 where the kernel lies along its border
+        return min(1 / longest, _cosine(self.borders[1], _left(matrix, self.base.equations))) < _FITS
 
     def residual(self, x):
         """F + beta psi, and g."""

@@ -41,11 +41,12 @@ class Monitor:
 class Trial:
     """A corrected point as monitors see it: ``trial["mu"]``, ``trial.tangent``, ``trial.sign`` (of the determinant).
 
-    ``factors`` is the factorization that the tangent came from, ``passed`` the number of branch points since the last point.
+    ``factors`` is the factorization that the tangent came from, ``passed`` the number of branch points since the last point,
+    ``crossing`` the one that was located on the way here.
     """
 
     def __init__(self, system, x, tangent, sign, iterations=0, newton_error=0.0, factors=None):
-        self.factors, self.passed = factors, 0
+        self.factors, self.passed, self.crossing = factors, 0, None
         self.system, self.x, self.tangent, self.sign = system, x, tangent, sign
         self.iterations, self.newton_error = iterations, newton_error
         self._functionals = None

@@ -15,6 +15,9 @@ from contin.settings import Settings
 from contin.steps import State, corrected
 from contin.switching import MultiplePoint, along, inner, locate_branch_point, smallest_directions
 
+#: A component of the unit tangent below this at both ends of a step is zero: its sign says nothing.
+_ROUND_OFF = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Event:
@@ -63,7 +66,7 @@ class Segment:
             if home is not None:
                 found.append(home)
             elif self.settings.branch_points and sign_changed(state.sign, trial.sign):
-                found.append(self._branch_point())
+                found.append(self.crossing())
             elif trial.passed > 1:
                 found.append(self._multiple_point())
             for monitor in monitors:
@@ -99,7 +102,8 @@ class Segment:
         if monitor.label != "LP":
             return True
         ends = self._corrected(self.state.x, 0.0, exact=True), self._corrected(self.trial.x, self.step, exact=True)
-        return sign_changed(*(monitor.function(end) for end in ends))
+        values = [monitor.function(end) for end in ends]
+        return sign_changed(*values) and max(map(abs, values)) > _ROUND_OFF
 
     def _locate(self, monitor: Monitor):
         """The zero of a monitor inside a step; where location fails, the nearer end, named "possible"."""
@@ -118,7 +122,13 @@ class Segment:
         details = None if monitor.describe is None else monitor.describe(there)
         return Event(at, monitor.label, name, there, stop, details, monitor)
 
-    def _branch_point(self):
+    def crossing(self) -> Event:
+        """The branch point inside the step, located once."""
+        if self.trial.crossing is None:
+            self.trial.crossing = self._branch_point()
+        return self.trial.crossing
+
+    def _branch_point(self) -> Event:
         """The branch point inside a step, its bracket halved until the locator's answer lies inside it."""
         state, trial, step = self.state, self.trial, self.step
         low, high = 0.0, step
@@ -175,7 +185,7 @@ class Segment:
         if name is None or not sign_changed(before[name], trial[name]):
             return None
         stop = Stop("trivial branch", f"returned to the trivial branch ({name} = 0)")
-        event = self._branch_point() if self.settings.branch_points else None
+        event = self.crossing() if self.settings.branch_points else None
         if event is None or abs(event.trial[name]) > 1e-6 * max(abs(before[name]), abs(trial[name])):
             monitor = Monitor("EP", "trivial branch", lambda there: there[name], terminal=True)
             event = self._locate(monitor)

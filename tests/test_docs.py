@@ -8,7 +8,11 @@ import pytest
 DOCS = sorted((Path(__file__).resolve().parent.parent / "docs").glob("*.md"))
 
 
-@pytest.mark.parametrize("page", [page for page in DOCS if "```python" in page.read_text() and page.stem != "file-format"], ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [page for page in DOCS if "```python" in page.read_text() and page.stem != "file-format"],
+    ids=lambda page: page.stem,
+)
 def test_blocks_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scope = {}

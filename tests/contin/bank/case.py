@@ -1,0 +1,93 @@
+"""What a reference problem consists of: runs, and the special points that must come out, in order, none more, none fewer."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import pytest
+
+from contin import Branch, Continuation, Point, Settings, Stop
+
+#: Wanted agreement with the reference, relative to max(1, |value|).
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Special:
+    """A labelled point of a run: AUTO's two letters, and reference values of parameters and functionals.
+
+    ``error`` bounds the error of the reference values themselves, relative to max(1, |value|).
+    """
+
+    label: str
+    values: Mapping[str, float]
+    error: float = 1e-15
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One run of a problem.
+
+    Attributes
+    ----------
+    name : str
+    run : callable
+        ``run()`` computes the branch.
+    specials : sequence of Special
+        Everything labelled after the first point, in the order of the run, its end included.
+    broken : str
+        What the engine is known to do wrong here; empty if nothing.
+    """
+
+    name: str
+    run: Callable[[], Branch]
+    specials: Sequence[Special]
+    broken: str = ""
+
+
+def value(point: Point, name: str) -> float:
+    """A parameter or functional of a point, or the frequency of a Hopf point."""
+    return point.details["frequency"] if name == "frequency" else point[name]
+
+
+def labelled(branch: Branch) -> list[Point]:
+    """The points of a run that are to be compared."""
+    return [point for point in branch.points[1:] if point.label]
+
+
+def deviations(point: Point, special: Special) -> dict[str, float]:
+    """|computed - reference| / max(1, |reference|) for every value."""
+    return {name: abs(value(point, name) - known) / max(1.0, abs(known)) for name, known in special.values.items()}
+
+
+def run_until(start: Point, free: Sequence[str], labels: int, **settings) -> Branch:
+    """Follow a branch that has no end of its own until it has come past so many labelled points."""
+    system, x = start.system.with_free(free, start.x)
+    run = Continuation(system, x, Settings(**settings))
+    points, found = [], -1
+    for point in run:
+        points.append(point)
+        found += bool(point.label)
+        if found == labels:
+            return Branch(points, Stop("cut", f"{labels} labelled points passed"))
+    return Branch(points, run.stop)
+
+
+def bank(*names: str) -> list:
+    """The cases of these problems as pytest's parameters; those known to be broken are expected to fail."""
+    cases = [case for name in names for case in importlib.import_module(f"bank.{name}").CASES]
+    marks = [[pytest.mark.xfail(reason=case.broken, strict=True)] if case.broken else [] for case in cases]
+    return [pytest.param(case, id=case.name, marks=mark) for case, mark in zip(cases, marks)]
+
+
+def check(case: Case):
+    """Run a case and assert that what came out is what is known."""
+    branch = case.run()
+    found = labelled(branch)
+    assert [point.label for point in found] == [special.label for special in case.specials], branch.stop
+    assert not [point.name for point in found if "possible" in point.name]
+    for point, special in zip(found, case.specials):
+        for name, deviation in deviations(point, special).items():
+            assert deviation <= max(TOLERANCE, special.error), (point.label, name, value(point, name), special.values[name])

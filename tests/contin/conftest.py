@@ -1,0 +1,6 @@
+"""Makes the bank of reference problems (tests/contin/bank) importable as ``bank``."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
