@@ -1,8 +1,8 @@
 """The reaction A -> B in a stirred tank (AUTO demo ``ab``; Uppal, Ray & Poore 1974).
 
-x' = -x + p1 (1 - x) e^y, y' = -y + p1 p2 (1 - x) e^y - p3 y, p3 = 2. Equilibria have y = p2 x / (1 + p3) and
-p1 = x e^-y / (1 - x). Folds where x (1 - x) = (1 + p3) / p2, Hopf points where the trace p2 x - 1 / (1 - x) - 1 - p3 vanishes and
-the determinant is positive (the other zero of the trace is a neutral saddle). Values by mpmath with 30 digits.
+x' = -x + p1 (1 - x) e^y, y' = -y + p1 p2 (1 - x) e^y - p3 y, p3 = 2. Equilibria have y = p2 x / (1 + p3) and p1 = x
+e^-y / (1 - x). Folds where x (1 - x) = (1 + p3) / p2, Hopf points where the trace p2 x - 1 / (1 - x) - 1 - p3 vanishes
+and the determinant is positive (the other zero of the trace is a neutral saddle). Values by mpmath with 30 digits.
 """
 
 import functools

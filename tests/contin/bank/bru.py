@@ -1,11 +1,11 @@
 """Steady states of the Brusselator with diffusion (the reaction of AUTO demo ``bru``; Holodniok, Klic & Kubicek).
 
-dx / L^2 x'' + x^2 y - (b + 1) x + a = 0, dy / L^2 y'' - x^2 y + b x = 0, x = a and y = b / a at both ends; a = 2, b = 4.6,
-dx = 0.0016, dy = 0.008, and the length L grows. The uniform state loses stability to mode n where
-0.0016 k^2 - 2.8 k + 500 = 0 with k = (n pi / L)^2, at two lengths for every n. Both branches of mode 1 are one closed loop, with
-folds and with branch points at which the reflection symmetry breaks; so are both ends of mode 2's, through one of these points.
-Folds and points of broken symmetry by collocation of degree 8 in extended precision (``bank.longdouble``; the latter on half the
-domain, with an antisymmetric null vector); meshes of N and 2 N intervals agree to 1e-17.
+dx / L^2 x'' + x^2 y - (b + 1) x + a = 0, dy / L^2 y'' - x^2 y + b x = 0, x = a and y = b / a at both ends; a = 2, b =
+4.6, dx = 0.0016, dy = 0.008, and the length L grows. The uniform state loses stability to mode n where 0.0016 k^2 - 2.8
+k + 500 = 0 with k = (n pi / L)^2, at two lengths for every n. Both branches of mode 1 are one closed loop, with folds
+and with branch points at which the reflection symmetry breaks; so are both ends of mode 2's, through one of these
+points. Folds and points of broken symmetry by collocation of degree 8 in extended precision (``bank.longdouble``; the
+latter on half the domain, with an antisymmetric null vector); meshes of N and 2 N intervals agree to 1e-17.
 """
 
 import functools

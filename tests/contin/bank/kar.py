@@ -1,9 +1,9 @@
 """Von Karman's flow above a rotating disk (AUTO demo ``kar``; Lentini & Keller 1980), on a domain of length 500.
 
 h' = f, f'' = f^2 - g^2 - 2 gam g - 2 h f', g'' = 2 gam f + 2 f g - 2 h g'; at the disk h = f = 0, g = 1 - gam; far away
-h = inf, and f, g decay as the linearized equations say. Six conditions for five states: gam and inf are both free. The branch winds
-through many folds. Values by collocation of degree 8 in extended precision (``bank.longdouble``), folds as boundary value
-problems with the null vector among the states; meshes of N and 2 N intervals agree to 1e-18.
+h = inf, and f, g decay as the linearized equations say. Six conditions for five states: gam and inf are both free. The
+branch winds through many folds. Values by collocation of degree 8 in extended precision (``bank.longdouble``), folds as
+boundary value problems with the null vector among the states; meshes of N and 2 N intervals agree to 1e-18.
 """
 
 import functools

@@ -1,8 +1,8 @@
 """A linear eigenvalue problem (AUTO demo ``lin``): u'' + (lam pi)^2 u = 0, u(0) = p2, u(1) = 0, mean of u^2 = p3.
 
-Branch points at lam = 1, 2, 3, ...; the branches of eigenfunctions stand upright, lam does not change on them. With p3 = 1
-held, u = A sin(lam pi (1 - t)) gives p2 = A sin(lam pi), A^2 (1/2 - sin(2 lam pi) / (4 lam pi)) = 1: p2 turns where that function of
-lam does. Values by mpmath with 40 digits.
+Branch points at lam = 1, 2, 3, ...; the branches of eigenfunctions stand upright, lam does not change on them. With p3
+= 1 held, u = A sin(lam pi (1 - t)) gives p2 = A sin(lam pi), A^2 (1/2 - sin(2 lam pi) / (4 lam pi)) = 1: p2 turns where
+that function of lam does. Values by mpmath with 40 digits.
 """
 
 import functools

@@ -1,7 +1,7 @@
 """Equilibria of a harvested predator-prey system (AUTO demo ``pp2``): branch points, a fold, a Hopf point.
 
-x' = p2 x (1 - x) - x y - p1 (1 - exp(-p3 x)), y' = -y + p4 x y; p2 = p4 = 3, p3 = 5. Prey alone:
-p1 = 3 x (1 - x) / (1 - exp(-5 x)), from the origin at p1 = 3/5; with predators x = 1/3, on a line in p1. Values by mpmath with 30 digits.
+x' = p2 x (1 - x) - x y - p1 (1 - exp(-p3 x)), y' = -y + p4 x y; p2 = p4 = 3, p3 = 5. Prey alone: p1 = 3 x (1 - x) / (1
+- exp(-5 x)), from the origin at p1 = 3/5; with predators x = 1/3, on a line in p1. Values by mpmath with 30 digits.
 """
 
 import functools
