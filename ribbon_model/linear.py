@@ -39,9 +39,9 @@ def thresholds(law: Law, m: int, n: int, nu: float) -> tuple[float, ...]:
 def stability_interval(law: Law, m: int, nu: float) -> tuple[float, float]:
     """The kappa_n r0 around the natural state 1 for which the m-covered circle is linearly stable, as published (Fig. 10).
 
-    Its ends are where the second root (26b), b k^2 (1 - k^2) / c, first changes sign for some wavenumber n other than m: b = 0, or
-    c = 0 for the isotropic rod (where c < 0 the energy has a negative direction even if (26b) comes out positive, so the interval
-    around 1 is the one in which the energy is a minimum too). Infinite where no mode ends it: m = 1, below.
+    Its ends are where the second root (26b), b k^2 (1 - k^2) / c, first changes sign for some wavenumber n other than m: b = 0,
+    or c = 0 for the isotropic rod. (Where c < 0 the energy has a negative direction even if (26b) comes out positive, so in
+    this interval around 1 the energy is a minimum too.) Infinite where no mode ends it: m = 1, below.
     """
     low, high = -math.inf, math.inf
     for n in range(1, 8 * m + 8):  # thresholds move away from 1 as n moves away from m
