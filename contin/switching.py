@@ -10,6 +10,7 @@ Hessian of beta is the algebraic bifurcation equation.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,6 +106,13 @@ class MultiplePoint:
 _WATCHED = 3
 
 
+@functools.lru_cache(maxsize=8)
+def _random_block(size, count):
+    block = np.random.default_rng(5).standard_normal((size, count))
+    block.flags.writeable = False
+    return block
+
+
 def smallest_directions(factors, size, count: int = _WATCHED):
     """Right and left singular vectors, as columns, of the smallest singular values: inverse iteration on a block.
 
@@ -115,7 +123,7 @@ def smallest_directions(factors, size, count: int = _WATCHED):
         right^T J^-1 left: about the reciprocals of the singular values.
     """
     count = min(count, size)
-    right = np.random.default_rng(5).standard_normal((size, count))
+    right = _random_block(size, count)
     for _ in range(2):
         left = np.array([factors.solve_transposed(v) for v in right.T]).T
         left = np.linalg.qr(left / np.abs(left).max(axis=0))[0]
@@ -141,7 +149,10 @@ def crossings(before, after, size) -> tuple[int, bool]:
         earlier = right.T @ np.array([before.solve(w) for w in left.T]).T
         if not (np.all(np.isfinite(response)) and np.all(np.isfinite(earlier))):
             return 0, True
-        values = np.linalg.eigvals(np.linalg.lstsq(earlier, response, rcond=None)[0])
+        try:
+            values = np.linalg.eigvals(np.linalg.solve(earlier, response))
+        except np.linalg.LinAlgError:  # exactly singular: nothing can be told, smaller steps will
+            return 0, False
     passed = (values.real < 0) & (np.abs(values.imag) < np.abs(values.real))
     return int(np.count_nonzero(passed)), not np.any(~passed & (np.abs(values) > _SHRINKS))
 
