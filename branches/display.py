@@ -149,6 +149,8 @@ def _describe(config, event) -> str:
     if name == "start":
         return f"leaves the {config.m}-covered circle at {place}{certain}"
     if name == "trivial branch":
-        return f"ends on the {round(abs(event['kappa_star']))}-covered circle at {place}{certain}"
+        covering = round(event["kappa_star"])
+        inside_out = ", curled against its natural curvature" if covering < 0 else ""
+        return f"ends on the {abs(covering)}-covered circle{inside_out} at {place}{certain}"
     what = f" ({name})" if name and label != b"LP" else ""
     return f"{_KINDS.get(label, 'end')}{what} at {place}{certain}, kappa* = {event['kappa_star']:.10f}"

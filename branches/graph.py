@@ -70,7 +70,7 @@ def _node(event, family, reason):
     attributes["error"] = float(event["error_kappa_n"])
     label, place = event["label"], event["name"].decode()
     if place in ("start", "trivial branch"):
-        covering = round(abs(attributes["kappa_star"]))
+        covering = round(attributes["kappa_star"])  # negative where the circle is curled against its natural curvature
         return _circle(family, covering), attributes | {"kind": "circle", "covering": covering, "mode": family["n"]}
     kind = {b"LP": "fold", b"BP": "branch point", b"MX": "lost"}.get(label, "end")
     if kind == "end" and reason == "limit":

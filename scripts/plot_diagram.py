@@ -78,10 +78,15 @@ def draw(graph, law: str, nu: float, window=(-8.0, 14.0)):
             mark(axes, node, height)
         axes.set(xlim=window, xlabel=r"natural curvature $\kappa_n L/2\pi$")
         axes.grid(alpha=0.2)
+    bottom = min((node["kappa_star"] for node in nodes if node["kind"] == "circle"), default=1)
     top = max((node["kappa_star"] for node in nodes if node["kind"] == "circle"), default=1)
-    panels[0].set(ylim=(0.5, top + 0.7), ylabel=r"conjugate curvature $\bar\kappa^*$", title="in conjugate coordinates")
+    panels[0].set(
+        ylim=(bottom - 0.5, top + 0.7), ylabel=r"conjugate curvature $\bar\kappa^*$", title="in conjugate coordinates"
+    )
     panels[1].set(
-        ylim=(0.3, top + 0.9), ylabel="covering index of the circles (branches between: schematic)", title="disentangled"
+        ylim=(bottom - 0.7, top + 0.9),
+        ylabel="covering index of the circles (branches between: schematic)",
+        title="disentangled",
     )
     panels[1].set_yticks(sorted({node["covering"] for node in nodes if node["kind"] == "circle"}))
     waves = sorted({data["n"] for data in edges})
@@ -174,6 +179,8 @@ def planar(axes, nodes, law, nu, window):
 
     for m in sorted({node["covering"] for node in nodes if node["kind"] == "circle"}):
         axes.plot(window, [m, m], color=UNSTABLE, lw=0.8, zorder=1)
+        if m < 1:  # curled against its natural curvature: the published intervals do not speak of these
+            continue
         low, high = stability_interval(LAWS[law], m, nu)
         axes.plot(
             [max(window[0], m * low), min(window[1], m * high)], [m, m], color=STABLE, lw=2.6, zorder=1, solid_capstyle="butt"
