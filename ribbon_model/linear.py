@@ -1,9 +1,20 @@
-"""Linear stability of the m-covered circle: the circle bifurcations (section 6.2 of Audoly & Seffen 2015)."""
+"""Linear stability of the m-covered circle (section 6.2 of Audoly & Seffen 2015): bifurcations, intervals, index of the energy.
+
+kappa_n is in units of L = 2 pi, so kappa_n r0 = kappa_n / m on the m-covered circle. Two notions of stability are kept apart,
+because for the isotropic rod they disagree:
+
+- as published: every root (26b), b k**2 (1 - k**2) / c, is positive;
+- of the energy: its second variation has no negative direction. The balance (16c) has no rotational inertia, so where gc, the
+  stiffness of a pure twist, is negative the published root can come out positive although the energy is not a minimum.
+
+For the ribbon and the flat rod g is infinite, c = 1, and both say the same.
+"""
 
 from __future__ import annotations
 
 import math
 
+from ribbon_model.dispersion import coefficients, tangent_moduli
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
 
 
@@ -39,20 +50,94 @@ def thresholds(law: Law, m: int, n: int, nu: float) -> tuple[float, ...]:
 def stability_interval(law: Law, m: int, nu: float) -> tuple[float, float]:
     """The kappa_n r0 around the natural state 1 for which the m-covered circle is linearly stable, as published (Fig. 10).
 
-    Its ends are where the second root (26b), b k^2 (1 - k^2) / c, first changes sign for some wavenumber n other than m: b = 0,
-    or c = 0 for the isotropic rod. (Where c < 0 the energy has a negative direction even if (26b) comes out positive, so in
-    this interval around 1 the energy is a minimum too.) Infinite where no mode ends it: m = 1, below.
+    On either side it ends at the threshold of n = m - 1 or m + 1: thresholds move away from 1 as n moves away from m.
+    The ribbon has, besides, the limit 1/nu where t = 0 and all high wavenumbers go unstable together; it comes first only
+    for nu < 0, m = 1. Infinite where nothing ends it. The boundary c = 0 of the isotropic rod never does: where c = 0,
+    b (1 - k**2) = -(t k (1 - k**2))**2 / g, so the mode is unstable already. (Beyond c = 0 all published roots may become
+    positive again, at m = 2, nu = -.3 for instance: islands that are no minima of the energy.)
+
+    For the isotropic rod the energy of this interval need not be a minimum: see `energy_interval`.
+
+    Raises
+    ------
+    ValueError
+        m < 1, nu outside (-1, 1), or a law without closed formulas.
     """
-    low, high = -math.inf, math.inf
-    for n in range(1, 8 * m + 8):  # thresholds move away from 1 as n moves away from m
-        if n == m:
+    _check(m, nu)
+    ends = []
+    for n in (m - 1, m + 1):
+        if n == 0:
             continue
         try:
-            ends = [value / m for value in thresholds(law, m, n, nu)]
-        except ValueError:  # no such threshold for this nu < 0
+            ends += [value / m for value in thresholds(law, m, n, nu)]
+        except ValueError:
+            if law is not RIBBON:
+                raise
+            # nu away from 0, beyond the modes that have a threshold where t > 0: the limit below comes first
+    if law is RIBBON and nu != 0:
+        ends.append(1 / nu)
+    return max([-math.inf, *(end for end in ends if end < 1)]), min([math.inf, *(end for end in ends if end > 1)])
+
+
+def energy_interval(law: Law, m: int, nu: float) -> tuple[float, float]:
+    """The kappa_n r0 around 1 for which the energy of the m-covered circle is a minimum; raises as `stability_interval`.
+
+    `stability_interval`, cut at kappa_n r0 = 1 - g: below it the moment of the circle, 1 - kappa_n r0, exceeds g and the strip
+    gains by turning over about its own centreline (n = 0, not among the modes of (26): it moves no mass). It matters for the
+    isotropic rod, g = 1, at m = 1: a ring cannot be stable inside out.
+    """
+    low, high = stability_interval(law, m, nu)
+    g, _ = tangent_moduli(law, 1.0, nu)
+    return max(low, 1 - g), high
+
+
+def index(law: Law, m: int, kappa_n: float, nu: float) -> float:
+    """Number of negative directions of the energy of the m-covered circle, closed loops only; kappa_n for L = 2 pi.
+
+    Each wavenumber n counts twice, cosine and sine. With b, c of (25) the quadratic form of (psi_2, psi_3) has the determinant
+    g b (1 - k**2) and the diagonal term g c, so it has
+
+    - one negative direction where b (1 - k**2) < 0; two where c < 0 instead; none otherwise;
+    - n = m: one where c < 0 (the other is the rigid rotation);
+    - n = 0: one, once, where c < 0: turning over about the centreline (uniform psi_2 would open the loop).
+
+    For g infinite c = 1 and only the sign of b (1 - k**2) counts. In-plane perturbations never lower the energy.
+
+    Returns
+    -------
+    int or float
+        ``math.inf`` where the ribbon's tangent twisting modulus is negative (zero, if kappa_n > m): all high n are unstable.
+
+    Raises
+    ------
+    ValueError
+        As `stability_interval`. On a bifurcation itself the zero directions are not counted.
+    """
+    _check(m, nu)
+    moment = 1 - kappa_n / m
+    g, t = tangent_moduli(law, kappa_n / m, nu)
+    if t < 0 or (t == 0 and moment < 0):
+        return math.inf
+    count = 0 if moment <= g else 1
+    n = 0
+    # modes beyond m are stable from the first one for which b < 0 and c > 0: b falls and c grows with n
+    while True:
+        n += 1
+        k = n / m
+        b, c = coefficients(moment, g, t, k)
+        if n == m:
+            count += 2 if c < 0 else 0
             continue
-        if law is ISOTROPIC_ROD:
-            ends.append(-((n / m) ** 2) / (1 + nu))  # c = 0: M = 1 + k^2 t
-        low = max([low, *(end for end in ends if end < 1)])
-        high = min([high, *(end for end in ends if end > 1)])
-    return low, high
+        if b * (1 - k * k) < 0:
+            count += 2
+        elif c < 0:
+            count += 4
+        elif n > m:
+            return count
+
+
+def _check(m, nu):
+    if m != int(m) or m < 1:
+        raise ValueError(f"m = {m}: the covering index is a whole number from 1")
+    if not -1 < nu < 1:
+        raise ValueError(f"nu = {nu:g} is outside (-1, 1)")

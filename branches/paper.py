@@ -1,0 +1,90 @@
+"""``python -m branches.paper --out DIR [ITEM ...]``: the published tables and figures, computed, each number beside ours."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from branches.display import complain, survive_any_encoding, write_output
+
+if TYPE_CHECKING:  # --help needs neither numpy nor matplotlib
+    from branches.paper_page import Section
+
+
+def _later(module: str, name: str) -> Callable[[Path], Section]:
+    """A function of a module that is imported when it is called."""
+
+    def item(folder: Path) -> Section:
+        return getattr(importlib.import_module(module), name)(folder)
+
+    return item
+
+
+#: What can be asked for: name -> function(folder) -> Section; it may write pictures into the folder.
+ITEMS: dict[str, Callable[[Path], Section]] = {
+    "table1": _later("branches.paper_tables", "table1"),
+    "table2": _later("branches.paper_tables", "table2"),
+    "table3": _later("branches.paper_tables", "table3"),
+    "fig6": _later("branches.paper_unfolding", "fig6"),
+    "fig9": _later("branches.paper_circles", "fig9"),
+    "fig10": _later("branches.paper_circles", "fig10"),
+}
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message):
+        complain(f"error: {message} (--help shows what there is)")
+        raise SystemExit(2)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Compute what is asked for and write the page; the exit code: 0, or 2 for a request that cannot be met."""
+    parser = _Parser(
+        prog="python -m branches.paper",
+        description="The tables and figures of Audoly & Seffen (2015): pictures, and a page (index.md, index.html) where each "
+        "published number stands beside ours. The page holds the items of this call.",
+    )
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder to write to, made if it is not there")
+    parser.add_argument("items", nargs="*", metavar="ITEM", help=f"any of {', '.join(ITEMS)} (default: all)")
+    options = parser.parse_args(argv)
+    survive_any_encoding()
+    unknown = [name for name in options.items if name not in ITEMS]
+    if unknown:
+        complain(f"error: there is no item {', '.join(map(repr, unknown))}; known are {', '.join(ITEMS)}")
+        return 2
+    folder = Path(options.out)
+    try:
+        _try_writing(folder)
+        _compute(folder, list(dict.fromkeys(options.items)) or list(ITEMS))
+    except OSError as error:
+        complain(f"error: cannot write to {folder}: {error.strerror or error}")
+        return 2
+    return 0
+
+
+def _try_writing(folder: Path) -> None:
+    """Find out before the work, not after it, that the folder cannot be written to."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "index.md").open("a"):
+        pass
+
+
+def _compute(folder: Path, names: list[str]) -> None:
+    from branches.paper_page import write
+
+    sections = []
+    for name in names:
+        began = time.monotonic()
+        sections.append(ITEMS[name](folder))
+        write(folder, sections)  # after each item: an interrupted call leaves a page of what was done
+        write_output(f"{name}: {sections[-1].title} ({time.monotonic() - began:.1f} s)\n")
+    write_output(f"written to {folder / 'index.html'}\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,27 @@
+"""What the pictures of `branches.paper` share: colours that survive colour blindness and a grey printer, and saving."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+STABLE, UNSTABLE, MODES, RIGID = "#0072B2", "#D55E00", "#8a6d3b", "#000000"
+UNSTABLE_FILL = "#F3B48B"
+
+
+def pyplot():
+    """matplotlib.pyplot without a display, with SVG text as text and the same bytes from the same numbers."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "branches.paper", "font.size": 10})
+    import matplotlib.pyplot as plt
+
+    return plt
+
+
+def save(figure, folder: Path, name: str) -> str:
+    """Write name.png and name.svg; the name. Raises OSError."""
+    figure.savefig(folder / f"{name}.png", dpi=150)
+    figure.savefig(folder / f"{name}.svg", dpi=200, metadata={"Date": None})
+    pyplot().close(figure)
+    return name

@@ -1,0 +1,120 @@
+"""One page out of the sections that `branches.paper` computes: Markdown and plain HTML, no external resources."""
+
+from __future__ import annotations
+
+import html
+from dataclasses import dataclass, field
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Row:
+    """A published number beside ours.
+
+    Attributes
+    ----------
+    what : str
+    published : str
+        As printed, '2.50'; text where the paper gives no number, '' where it gives nothing.
+    ours : float or str
+    remark : str
+    measured : bool
+        The published value is a measurement: no verdict on digits.
+    """
+
+    what: str
+    published: str
+    ours: float | str
+    remark: str = ""
+    measured: bool = False
+
+    @property
+    def difference(self) -> float | None:
+        """Ours minus the published number, or None where one of them is not a number."""
+        try:
+            return float(self.ours) - float(self.published)
+        except ValueError:
+            return None
+
+    @property
+    def verdict(self) -> str:
+        """'yes' if ours rounds to the printed digits (half a unit of the last one), 'no', or ''."""
+        if self.difference is None or self.measured:
+            return ""
+        decimals = len(self.published.partition(".")[2])
+        return "yes" if abs(self.difference) <= 0.5 * 10.0**-decimals * (1 + 1e-9) else "no"
+
+    def cells(self) -> list[str]:
+        """The texts of a line of the table."""
+        ours = self.ours if isinstance(self.ours, str) else f"{self.ours:.6g}"
+        difference = "" if self.difference is None else f"{self.difference:+.1e}"
+        return [self.what, self.published, ours, difference, self.verdict, self.remark]
+
+
+HEADER = ("quantity", "published", "ours", "difference", "to the printed digits", "remark")
+
+
+@dataclass(frozen=True)
+class Section:
+    """What an item of `branches.paper` gives: a title, rows, names of pictures (without suffix, in the folder), remarks."""
+
+    title: str
+    rows: list[Row] = field(default_factory=list)
+    pictures: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+TITLE = "Audoly & Seffen (2015), number by number"
+LEAD = (
+    "Buckling of naturally curved elastic strips: the ribbon model makes a difference. J. Elasticity 119 (2015). "
+    "The difference is ours minus the published number."
+)
+
+
+def write(folder: Path, sections: list[Section]) -> None:
+    """Write index.md and index.html. Raises OSError if the folder cannot be written to."""
+    (folder / "index.md").write_text(markdown(sections), encoding="utf-8")
+    (folder / "index.html").write_text(page(sections), encoding="utf-8")
+
+
+def markdown(sections: list[Section]) -> str:
+    """The page as Markdown."""
+    lines = [f"# {TITLE}", "", LEAD, ""]
+    for section in sections:
+        lines += [f"## {section.title}", ""]
+        if section.rows:
+            lines += [_line(HEADER), _line(["---"] * len(HEADER)), *(_line(row.cells()) for row in section.rows), ""]
+        for name in section.pictures:
+            lines += [f"![{section.title}]({name}.png)", "", f"[vector graphics]({name}.svg)", ""]
+        lines += [f"- {note}" for note in section.notes] + [""] * bool(section.notes)
+    return "\n".join(lines)
+
+
+def _line(cells) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+STYLE = (
+    "body{font-family:sans-serif;max-width:70em;margin:2em auto;padding:0 1em;color:#111}"
+    "table{border-collapse:collapse;margin:1em 0}td,th{border-bottom:1px solid #bbb;padding:.25em .8em;text-align:left}"
+    "td:nth-child(2),td:nth-child(3),td:nth-child(4){text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%}"
+)
+
+
+def page(sections: list[Section]) -> str:
+    """The page as HTML: one file, and the pictures beside it."""
+    text = html.escape
+    body = [f"<h1>{text(TITLE)}</h1>", f"<p>{text(LEAD)}</p>"]
+    for section in sections:
+        body.append(f"<h2>{text(section.title)}</h2>")
+        if section.rows:
+            head = "".join(f"<th>{text(cell)}</th>" for cell in HEADER)
+            lines = ["".join(f"<td>{text(cell)}</td>" for cell in row.cells()) for row in section.rows]
+            body += ["<table>", f"<tr>{head}</tr>", *(f"<tr>{line}</tr>" for line in lines), "</table>"]
+        for name in section.pictures:
+            source = text(name, quote=True)
+            body.append(f'<p><a href="{source}.svg"><img src="{source}.png" alt="{text(section.title, quote=True)}"></a></p>')
+        if section.notes:
+            body += ["<ul>", *(f"<li>{text(note)}</li>" for note in section.notes), "</ul>"]
+    head = f'<meta charset="utf-8"><title>{text(TITLE)}</title><style>{STYLE}</style>'
+    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(body) + "\n</body></html>\n"

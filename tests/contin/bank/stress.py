@@ -1,0 +1,76 @@
+"""The whole bank under other settings: ``python -m bank.stress`` (from tests/contin, two minutes). Prints what then differs.
+
+Special points are properties of the problem: no step, angle or degree within reason may lose or invent one. A run that ends for
+want of points is no error.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import time
+
+from bank import case as cases
+
+import contin
+
+NAMES = (
+    "exp", "int", "bvp", "lin", "non", "ezp", "ext", "spb", "kar", "bru", "pd2",
+    "cusp", "ab", "abc", "enz", "dd2", "lrz", "pp2", "opt",
+)  # fmt: skip
+VARIANTS = (
+    {"step": 0.01}, {"step": 0.5}, {"step": 2.0}, {"angle": 0.15}, {"angle": 0.7}, {"accuracy": 0.1}, {"accuracy": 0.005},
+    {"max_step": 0.3}, {"degree": 3}, {"degree": 4}, {"degree": 8}, {"mesh": contin.MeshControl(tolerance=1e-9)},
+    {"newton": contin.Newton(tolerance=1e-10)},
+)  # fmt: skip
+
+
+def changed(function, extra, only=()):
+    """A function with options added (or, where ``only`` names some, those replaced that it was given)."""
+
+    def call(*args, **options):
+        more = {name: value for name, value in extra.items() if not only or name in options}
+        return function(*args, **{**options, **more})
+
+    return call
+
+
+def modules(variant):
+    """The bank's modules, loaded afresh, with these options in every run."""
+    options = {name: value for name, value in variant.items() if name != "degree"}
+    degree = {name: value for name, value in variant.items() if name == "degree"}
+    for name in NAMES:
+        sys.modules.pop(f"bank.{name}", None)
+        module = importlib.import_module(f"bank.{name}")
+        for place in (contin, cases):
+            for what in ("trace", "curve", "run_until"):
+                if what in vars(module) and what in vars(place):
+                    setattr(module, what, changed(getattr(place, what), options))
+        if degree and "solve" in vars(module):
+            module.solve = changed(contin.solve, degree, only=("degree",))
+        yield module
+
+
+def complaint(case) -> str:
+    """What is wrong with a run, in a line; empty if nothing."""
+    try:
+        branch = case.run()
+    except contin.ContinError as error:
+        return f"{type(error).__name__}: {error}"
+    found = cases.labelled(branch)
+    if [point.label for point in found] != [special.label for special in case.specials]:
+        return f"{[(point.label, point.name) for point in found]}; {branch.stop}"
+    worst = max(max(cases.deviations(*pair).values(), default=0) for pair in zip(found, case.specials))
+    return f"off by {worst:.1e}" if worst > 1e-8 else ""
+
+
+def main():
+    for variant in VARIANTS:
+        start, said = time.time(), []
+        for module in modules(variant):
+            said += [f"    {case.name}: {what[:200]}" for case in module.CASES if (what := complaint(case))]
+        print(variant, f"{time.time() - start:.0f} s,", f"{len(said)} differ", *said, sep="\n" if said else " ", flush=True)
+
+
+if __name__ == "__main__":
+    main()
