@@ -10,7 +10,7 @@ from pathlib import Path
 from branches import graph as diagram_graph
 from branches.config import Config, DiagramConfig, dump
 from branches.executor import WAIT, executor, run_jobs
-from branches.store import StoreError, prepare, write_bytes
+from branches.files import StoreError, prepare, write_bytes
 
 
 def compute(text: str) -> tuple[bytes, str]:
@@ -35,11 +35,11 @@ class _Plan:
     waits for the first, and is left out if that came to its start.
     """
 
-    def __init__(self, configs: list[Config], graph):
+    def __init__(self, configs: list[Config], missing: list[Config], graph):
         self._graph = graph
-        keys = {self._key(config): config for config in configs}
+        keys = {self._key(config) for config in configs}
         self._later = {key: other for key in keys if (other := self._partner(key)) in keys and other[2] < key[2]}
-        self._open = sorted(configs, key=lambda config: (self._key(config) in self._later, config.n * config.m))
+        self._open = sorted(missing, key=lambda config: (self._key(config) in self._later, config.n * config.m))
         self.left_out: list[Config] = []
 
     @staticmethod
@@ -85,7 +85,7 @@ def run_diagram(config: DiagramConfig, folder: Path, display, *, scheduler=None,
     prepare(folder / "diagram.json")
     configs = config.branches
     fresh = [one for one in configs if overwrite or not _stored(folder, one, graph)]
-    plan, failed = _Plan(fresh, graph), {}
+    plan, failed = _Plan(configs, fresh, graph), {}
     display.begin_diagram(config, len(configs), len(configs) - len(fresh))
     if fresh:
         _load_kernels(fresh)

@@ -6,6 +6,8 @@ import concurrent.futures as futures
 import contextlib
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator
 
 
@@ -35,7 +37,7 @@ def executor(scheduler: str | None = None, workers: int | None = None) -> Iterat
         # a forked process has the compiled kernels already; where there is no fork each one loads them
         methods = multiprocessing.get_all_start_methods()
         context = multiprocessing.get_context("fork" if "fork" in methods else None)
-        with futures.ProcessPoolExecutor(count, mp_context=context) as pool:
+        with futures.ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker) as pool:
             yield pool, count
         return
     try:
@@ -48,6 +50,18 @@ def executor(scheduler: str | None = None, workers: int | None = None) -> Iterat
         raise ExecutorError(f"--scheduler {scheduler!r}: no Dask scheduler answers there") from error
     with client:
         yield client.get_executor(), max(1, sum(client.nthreads().values()))
+
+
+def _begin_worker():
+    """Leave Ctrl-C to the parent, and never outlive it, however it ended."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    def follow_the_parent():
+        multiprocessing.parent_process().join()
+        os._exit(1)
+
+    threading.Thread(target=follow_the_parent, daemon=True).start()
 
 
 #: What a source of jobs returns when the next one depends on jobs that are still running.

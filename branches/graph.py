@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 
 #: Columns of a branch that an edge carries.
@@ -42,15 +43,19 @@ def add_branch(graph, branch, name: str) -> bool:
     config = branch.config
     family = {"law": config["law"], "nu": config["nu"], "m": config["m"], "n": config["n"]}
     special = [event for event in branch.events if event["label"] in (b"LP", b"BP", b"EP", b"MX")]
-    nodes = [_node(event, family, branch.reason) for event in special]
+    nodes = [_node_of(event, family, branch.reason) for event in special]
+    rows = [branch.points[first["point"] : last["point"] + 1] for first, last in pairwise(special)]
+    pieces = [{column: piece[column].tolist() for column in COLUMNS} for piece in rows]
+    return connect(graph, family, nodes, pieces, file=name)
+
+
+def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dict], **attributes) -> bool:
+    """Add a branch: its nodes from end to end, as of :func:`node`, and the columns of the pieces between; see `add_branch`."""
     if _circle(family, family["m"]) in graph and nodes[-1][1]["kind"] == "circle" and nodes[-1][0] in graph:
         return False
-    for node, attributes in nodes:
-        graph.add_node(node, **attributes)
-    for (a, _), (b, _), first, last in zip(nodes, nodes[1:], special, special[1:]):
-        rows = branch.points[first["point"] : last["point"] + 1]
-        columns = {column: rows[column].tolist() for column in COLUMNS}
-        graph.add_edge(a, b, **family, file=name, **columns)
+    graph.add_nodes_from(nodes)
+    for (a, _), (b, _), columns in zip(nodes, nodes[1:], pieces):
+        graph.add_edge(a, b, **family, **attributes, **columns)
     return True
 
 
@@ -63,20 +68,29 @@ def _circle(family, covering: int) -> str:
     return f"{family['law']} nu={family['nu']:g} circle {covering} mode {family['n']}"
 
 
-def _node(event, family, reason):
-    """Identifier and attributes of the node of a labelled point."""
-    attributes = {name: family[name] for name in ("law", "nu")}
-    attributes |= {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
-    attributes["error"] = float(event["error_kappa_n"])
-    label, place = event["label"], event["name"].decode()
-    if place in ("start", "trivial branch"):
-        covering = round(attributes["kappa_star"])  # negative where the circle is curled against its natural curvature
-        return _circle(family, covering), attributes | {"kind": "circle", "covering": covering, "mode": family["n"]}
-    kind = {b"LP": "fold", b"BP": "branch point", b"MX": "lost"}.get(label, "end")
+def node(family: dict, kind: str, values: dict, number: int) -> tuple[str, dict]:
+    """Identifier and attributes of a special point, the ``number``-th point of its branch.
+
+    A circle has one identifier whichever branch meets it there: its covering index (negative where it is curled against its
+    natural curvature) and the wavenumber.
+    """
+    attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
+    if kind == "circle":
+        covering = round(attributes["kappa_star"])
+        return _circle(family, covering), attributes | {"covering": covering, "mode": family["n"]}
+    return f"{family['law']} nu={family['nu']:g} ({family['m']},{family['n']}) {kind} {number}", attributes
+
+
+def _node_of(event, family, reason):
+    """The node of a labelled point of a branch file."""
+    values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
+    values |= {"error": float(event["error_kappa_n"]), "what": event["name"].decode()}
+    kind = {b"LP": "fold", b"BP": "branch point", b"MX": "lost"}.get(event["label"], "end")
     if kind == "end" and reason == "limit":
         kind = "leaves"
-    identifier = f"{family['law']} nu={family['nu']:g} ({family['m']},{family['n']}) {kind} {event['point']}"
-    return identifier, attributes | {"kind": kind, "what": place}
+    if values["what"] in ("start", "trivial branch"):
+        kind = "circle"
+    return node(family, kind, values, int(event["point"]))
 
 
 # --- questions ----------------------------------------------------------------------------------------------------
@@ -180,7 +194,7 @@ def save(graph, folder: Path) -> tuple[Path, Path]:
     """Write ``diagram.json`` (networkx node-link form, columns as lists) and ``diagram.graphml`` (columns as JSON text)."""
     import networkx
 
-    from branches.store import write_bytes
+    from branches.files import write_bytes
 
     folder = Path(folder)
     text = json.dumps(networkx.node_link_data(graph, edges="edges"), indent=1)
@@ -195,18 +209,25 @@ def save(graph, folder: Path) -> tuple[Path, Path]:
 
 
 def read(folder: str | Path):
-    """The diagram in a folder (or in a ``diagram.json``).
+    """The diagram in a folder (or in a ``diagram.json``); of a scene, ``.yaml``, its instant preview (`branches.preview`).
 
     Raises
     ------
     StoreError
         There is none.
+    ConfigError
+        The scene is none.
     """
     import networkx
 
-    from branches.store import StoreError
+    from branches.files import StoreError
 
     path = Path(folder)
+    if path.suffix in (".yaml", ".yml"):
+        from branches.config import load
+        from branches.preview import preview
+
+        return preview(load(path))
     path = path / "diagram.json" if path.is_dir() else path
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
@@ -225,16 +246,17 @@ def read(folder: str | Path):
 def main(argv=None) -> int:
     """Answer questions; the exit code."""
     parser = argparse.ArgumentParser(prog="python -m branches.graph", description="Ask a bifurcation diagram.")
-    parser.add_argument("folder", help="folder of a diagram scene, or its diagram.json")
+    parser.add_argument("folder", help="folder of a diagram scene, or its diagram.json; or a scene (.yaml): exact preview")
     parser.add_argument("--where", nargs=2, type=int, metavar=("M", "N"), help="where does the branch (M, N) go")
     parser.add_argument("--at", type=float, metavar="KAPPA_N", help="which states exist at this natural curvature")
     parser.add_argument("--folds", nargs=2, type=float, metavar=("LOW", "HIGH"), help="which folds lie in this window")
     options = parser.parse_args(argv)
-    from branches.store import StoreError
+    from branches.config import ConfigError
+    from branches.files import StoreError
 
     try:
         lines = list(_answers(read(options.folder), options))
-    except StoreError as error:
+    except (ConfigError, StoreError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyError as error:
@@ -245,6 +267,8 @@ def main(argv=None) -> int:
 
 
 def _answers(graph, options) -> Iterable[str]:
+    if "source" in graph.graph:
+        yield graph.graph["source"]
     if options.where:
         for branch in course(graph, *options.where):
             yield f"{branch['law']}, nu = {branch['nu']:g}: " + " -> ".join(map(_describe, branch["nodes"]))

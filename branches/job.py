@@ -8,7 +8,8 @@ import time
 from pathlib import Path
 
 from branches.config import Config, ConfigError, dump, parse
-from branches.store import BranchWriter, StoreError, open_branch, prepare, read_state
+from branches.files import StoreError, prepare
+from branches.store import BranchWriter, open_branch, read_state
 from contin import Continuation, ConvergenceError, MeshControl, Settings
 from ribbon_model.laws import LAWS
 from ribbon_model.seeds import half_loop_branch, primary_branch

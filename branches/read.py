@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from branches.config import ConfigError, parse
-from branches.store import StoreError, open_branch
+from branches.files import StoreError
+from branches.store import open_branch
 from ribbon_model.laws import LAWS
 from ribbon_model.shape import Shape, closed_strip
 

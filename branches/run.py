@@ -61,8 +61,8 @@ def _run(options) -> int:
     except ConfigError as error:
         return _refuse(error)
     from branches.display import Display
+    from branches.files import StoreError
     from branches.job import run_branch
-    from branches.store import StoreError
     from contin.errors import ContinError
 
     display = Display(quiet=options.quiet)
@@ -82,7 +82,7 @@ def _run_diagram(config, options) -> int:
     from branches.diagram import run_diagram
     from branches.display import Display
     from branches.executor import ExecutorError
-    from branches.store import StoreError
+    from branches.files import StoreError
     from contin.errors import ContinError
 
     if options.resume:
@@ -93,6 +93,8 @@ def _run_diagram(config, options) -> int:
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
     display = Display(quiet=options.quiet)
+    if signal.getsignal(signal.SIGINT) is _leave:
+        signal.signal(signal.SIGINT, _leave_diagram)
     try:
         outcome = run_diagram(
             config, folder, display, scheduler=options.scheduler, workers=options.workers, overwrite=options.overwrite
@@ -143,6 +145,12 @@ def output_path(options):
 def _leave(number, frame):
     """Ctrl-C before the first point: nothing is lost, and an exception amid a compilation would end in noise."""
     os.write(2, b"interrupted\n")
+    os._exit(EXIT_INTERRUPTED)
+
+
+def _leave_diagram(number, frame):
+    """Ctrl-C: every finished branch is in its file; processes that compute others end when this one does."""
+    os.write(2, b"\ninterrupted; finished branches are kept, and the same command computes what is missing\n")
     os._exit(EXIT_INTERRUPTED)
 
 

@@ -7,12 +7,8 @@ and renames it, so a killed run, a full disk or a power cut leave the last check
 from __future__ import annotations
 
 import contextlib
-import glob
 import json
-import os
 import platform
-import secrets
-import shutil
 import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,13 +16,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from branches.files import StoreError, write_bytes
 from contin import Collocation, Point, State, Stop
 
 FORMAT = "ribbon continuation branch"
 FORMAT_VERSION = 1
-
-#: Bytes that the smallest result takes, for a look at the disk before anything is computed.
-_SMALLEST = 64 * 1024
 
 #: Columns of /points and /events that are not parameters or functionals: name, type, meaning.
 _BOOKKEEPING = (
@@ -53,10 +47,6 @@ MEANINGS = {
     "sense": "sign of the moment on the circle",
     "unfold": "unfolding parameter of closure, zero",
 }  # fmt: skip
-
-
-class StoreError(Exception):
-    """A result file that cannot be written or read; the message is one sentence."""
 
 
 def versions() -> dict[str, str]:
@@ -274,67 +264,6 @@ def _extend(dataset, rows):
         start = len(dataset)
         dataset.resize(start + len(rows), axis=0)
         dataset[start:] = rows if isinstance(rows, np.ndarray) else np.array(rows, dtype=dataset.dtype)
-
-
-def _temporary(path: Path) -> Path:
-    """A hidden name of its own beside ``path``, no longer than names may be."""
-    return path.with_name(f".{path.name[:50]}.{secrets.token_hex(4)}.part")
-
-
-def _write(path: Path, data: bytes) -> None:
-    with open(path, "xb") as file:  # its mode is what the umask says
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Put a whole file in place of ``path`` (of what it links to), with its mode, or leave everything as it was.
-
-    Raises
-    ------
-    StoreError
-        It cannot be written.
-    """
-    path = Path(os.path.realpath(path))
-    temporary = _temporary(path)
-    try:
-        try:
-            _write(temporary, data)
-            if path.exists():
-                shutil.copymode(path, temporary)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
-
-
-def prepare(path: Path) -> None:
-    """Make the folder of ``path``, see that a result can be written, and remove what killed runs left behind.
-
-    Raises
-    ------
-    StoreError
-        Nothing can be written there.
-    """
-    path = Path(os.path.realpath(path))
-    try:
-        if path.parent.exists() and not path.parent.is_dir():
-            raise StoreError(f"cannot write {str(path)!r}: {str(path.parent)!r} is not a folder")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists() and not os.access(path, os.W_OK):
-            raise StoreError(f"cannot write {str(path)!r}: the file is read-only")
-        probe = _temporary(path)
-        try:
-            _write(probe, bytes(_SMALLEST))
-        finally:
-            probe.unlink(missing_ok=True)
-        for left in path.parent.glob(f".{glob.escape(path.name[:50])}.????????.part"):
-            if time.time() - left.stat().st_mtime > 60:  # not of a run that is writing right now
-                left.unlink()
-    except OSError as error:
-        raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
 
 
 @contextlib.contextmanager

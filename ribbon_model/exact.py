@@ -175,6 +175,12 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
     return points
 
 
+def coordinates(point):
+    """Where a point of `curve` lies in the plane of the unknowns, shape (2,), on which the branch is a smooth curve."""
+    law, root = (point.law, point.root) if isinstance(point, RodPoint) else ("ribbon", 0)
+    return _family(law, point.m, point.n, point.nu, root).coordinates(point)
+
+
 def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0):
     """The points of `curve` at which kappa_n is stationary, in order. Raises as `curve` does."""
     return [point for point in curve(m, n, nu, kappa_limits, law=law, root=root) if point.label == "LP"]

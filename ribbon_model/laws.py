@@ -13,8 +13,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from contin.derivatives import gradient
-
 
 @dataclass(frozen=True)
 class Law:
@@ -36,6 +34,8 @@ class Law:
     @functools.cached_property
     def response(self) -> Callable[..., tuple]:
         """``response(M1, M2, M3, kappa_n, nu)`` = (H, omega_1, omega_2, omega_3, dH/dkappa_n), plain Python."""
+        from contin.derivatives import gradient  # the engine is slow to load, and a law can be had without
+
         return gradient(self.hamiltonian, ("M1", "M2", "M3", "kappa_n"))
 
 

@@ -1,16 +1,22 @@
 """Scenes of many branches: the graph, the questions, the executor."""
 
+import itertools
 import json
+import os
+import signal
+import time
 
 import networkx
 import numpy as np
 import pytest
 
+from branches import draw_diagram
 from branches import graph as diagram
 from branches.config import ConfigError, parse
 from branches.diagram import file_name, run_diagram
 from branches.display import Display
 from branches.executor import ExecutorError, executor
+from branches.preview import preview
 from branches.read import read_branch
 from ribbon_model import exact
 
@@ -143,3 +149,67 @@ def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
 def test_bad_scenes(text, said):
     with pytest.raises(ConfigError, match=said):
         parse(text, "scene")
+
+
+def test_an_interrupted_diagram_leaves_no_process_and_goes_on(command, tmp_path):
+    """Ctrl-C: workers hold the other end of standard output, so it ends only when they are gone; the rest is computed later."""
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    process = command.start("scene.yaml", "--out", "here", "--workers", "2", start_new_session=True)
+    until = time.monotonic() + 120
+    while not list(tmp_path.glob("here/*.h5")) and time.monotonic() < until:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 130 and "finished branches are kept" in err
+    kept = {path: path.read_bytes() for path in tmp_path.glob("here/*.h5")}
+    again = command("scene.yaml", "--out", "here")
+    assert again.returncode == 0 and f"{len(kept)} of them computed before" in again.out
+    assert all(path.read_bytes() == image for path, image in kept.items())
+    assert len(list(tmp_path.glob("here/*.h5"))) == 7
+
+
+def test_the_preview_is_the_diagram(folder):
+    """From the quadrature alone: the same nodes (folds and ends to 1e-8) and the same answers, and it says what it is."""
+    computed, ahead = diagram.read(folder), preview(parse(SCENE, "scene"))
+    assert "exact quadrature" in ahead.graph["source"] and "source" not in computed.graph
+    assert diagram.families(ahead) == diagram.families(computed)
+    for _, _, m, n in diagram.families(computed):
+        (ours,), (theirs,) = (diagram.course(graph, m, n) for graph in (computed, ahead))
+        for column in ("kappa_n", "kappa_star", "energy"):
+            values = [[node[column] for node in branch["nodes"]] for branch in (ours, theirs)]
+            assert values[0] == pytest.approx(values[1], abs=1e-8)
+        assert [node["kind"] for node in ours["nodes"]] == [node["kind"] for node in theirs["nodes"]]
+    there, here = (sorted(state["energy"] for state in diagram.states_at(graph, 3.2)) for graph in (computed, ahead))
+    assert here == pytest.approx(there, abs=1e-3)  # between points both are splines, the preview's through fewer
+
+
+def test_disentangled_lines_cross_less_and_keep_kappa_n(folder):
+    graph, window = diagram.read(folder), (-8.0, 14.0)
+    lines = draw_diagram.lines(graph, "ribbon", 0.3)
+
+    def count(heights):
+        polylines = [np.column_stack([line.kappa_n, height])[None] for line, height in zip(lines, heights)]
+        return sum(int(draw_diagram.crossings(a, b)[0, 0]) for a, b in itertools.combinations(polylines, 2))
+
+    heights = draw_diagram.heights(lines, window)
+    assert count(heights) < count([line.kappa_star for line in lines])
+    for line, height in zip(lines, heights):
+        assert height[0] == pytest.approx(line.kappa_star[0])
+        assert not line.returns or height[-1] == pytest.approx(line.kappa_star[-1])
+
+
+def test_crossings_of_polylines():
+    """Two zigzags: counted by hand."""
+    zigzag, level = np.array([[[0, 0], [1, 2], [2, 0], [3, 2.0]]]), np.array([[[0, 1], [3, 1.0]], [[0, 3], [3, 3.0]]])
+    assert draw_diagram.crossings(zigzag, level).tolist() == [[3, 0]]
+
+
+@pytest.mark.parametrize("source", ["diagram", "scene"])
+def test_the_pictures(folder, command, tmp_path, root, source):
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    what = folder if source == "diagram" else "scene.yaml"
+    done = command(what, "--out", "x.svg", program=(str(root / "scripts" / "plot_diagram.py"),))
+    assert done.returncode == 0, done.err
+    assert (tmp_path / "x.svg").stat().st_size > 10_000
+    refused = command(what, "--out", "x.gif", program=(str(root / "scripts" / "plot_diagram.py"),))
+    assert refused.returncode == 2 and "must end in .pdf, .svg or .png" in refused.err

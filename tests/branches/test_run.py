@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 from branches.config import Config, ConfigError, load
+from branches.files import StoreError
 from branches.job import run_branch
 from branches.run import main
-from branches.store import StoreError
 from ribbon_model import exact
 
 #: A run of a second or two, so that there is time to interrupt it.

@@ -12,11 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from branches import store
+from branches import files
 from branches.config import Config
+from branches.files import StoreError, prepare, write_bytes
 from branches.job import run_branch
 from branches.read import read_branch
-from branches.store import StoreError, open_branch, prepare, write_bytes
+from branches.store import open_branch
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +119,7 @@ def test_a_failed_write_leaves_the_file_as_it_was(tmp_path, monkeypatch, trouble
     def fail(*arguments):
         raise trouble
 
-    monkeypatch.setattr(store.os, where, fail)
+    monkeypatch.setattr(files.os, where, fail)
     with pytest.raises((StoreError, KeyboardInterrupt)) as caught:
         write_bytes(path, b"after")
     if isinstance(trouble, OSError):
@@ -168,7 +169,7 @@ def test_where_nothing_can_be_written(tmp_path, monkeypatch):
         prepare(tmp_path / "file" / "x.h5")
     with pytest.raises(StoreError, match="cannot write '/proc/none/x.h5'"):
         prepare(Path("/proc/none/x.h5"))
-    monkeypatch.setattr(store.os, "access", lambda path, mode: False)  # root may write everything
+    monkeypatch.setattr(files.os, "access", lambda path, mode: False)  # root may write everything
     with pytest.raises(StoreError, match="read-only"):
         prepare(tmp_path / "file")
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from branches.display import complain, survive_any_encoding, write_output
 
 if TYPE_CHECKING:  # --help needs neither numpy nor matplotlib
-    from branches.paper_page import Section
+    from branches.paper.page import Section
 
 
 def _later(module: str, name: str) -> Callable[[Path], Section]:
@@ -27,12 +27,14 @@ def _later(module: str, name: str) -> Callable[[Path], Section]:
 
 #: What can be asked for: name -> function(folder) -> Section; it may write pictures into the folder.
 ITEMS: dict[str, Callable[[Path], Section]] = {
-    "table1": _later("branches.paper_tables", "table1"),
-    "table2": _later("branches.paper_tables", "table2"),
-    "table3": _later("branches.paper_tables", "table3"),
-    "fig6": _later("branches.paper_unfolding", "fig6"),
-    "fig9": _later("branches.paper_circles", "fig9"),
-    "fig10": _later("branches.paper_circles", "fig10"),
+    "table1": _later("branches.paper.tables", "table1"),
+    "table2": _later("branches.paper.tables", "table2"),
+    "table3": _later("branches.paper.tables", "table3"),
+    "fig6": _later("branches.paper.unfolding", "fig6"),
+    "fig9": _later("branches.paper.circles", "fig9"),
+    "fig10": _later("branches.paper.circles", "fig10"),
+    "fig11": _later("branches.paper.diagram", "fig11"),
+    "fig12": _later("branches.paper.diagram", "fig12"),
 }
 
 
@@ -75,7 +77,7 @@ def _try_writing(folder: Path) -> None:
 
 
 def _compute(folder: Path, names: list[str]) -> None:
-    from branches.paper_page import write
+    from branches.paper.page import write
 
     sections = []
     for name in names:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.paper_draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, pyplot, save
-from branches.paper_page import Row, Section
+from branches.paper.draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, pyplot, save
+from branches.paper.page import Row, Section
 from ribbon_model.dispersion import coefficients, squared_frequencies, tangent_moduli
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.linear import energy_interval, stability_interval
@@ -52,9 +52,9 @@ def fig10(folder: Path) -> Section:
     straight = [m for m in range(1, 40, 2) if np.prod(np.sign(stability_interval(ISOTROPIC_ROD, m, NU))) < 0]
     rows.append(Row("isotropic rod, κₙ = 0: stable for m =", "1", ", ".join(map(str, straight)), "section 6.2; odd m up to 39"))
     notes = [
-        "The boundary c = 0 of the isotropic rod is reproduced as published. It is not a loss of stability of the energy: beyond "
-        "it (26b) is positive although the energy still has a negative direction, a twist to which (16c) gives no inertia. "
-        "It ends none of the intervals.",
+        "The boundary c = 0 of the isotropic rod is reproduced as published. It is not a loss of stability of the energy: "
+        "beyond it (26b) is positive although the energy still has a negative direction, a twist to which (16c) gives no "
+        "inertia. It ends none of the intervals.",
         "Isotropic rod, m = 1: the published interval goes down to -1.64. A ring with κₙ < 0 lowers its energy by turning over "
         "about its centreline (n = 0; the paper counts it among the rigid modes), so the energy is a minimum only above 0.",
         "For the ribbon and the flat rod both notions agree.",

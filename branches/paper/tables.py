@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from branches.paper_page import Row, Section
+from branches.paper.page import Row, Section
 from ribbon_model import exact
 from ribbon_model.dispersion import tangent_moduli
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON

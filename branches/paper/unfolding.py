@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.paper_draw import STABLE, UNSTABLE_FILL, pyplot, save
-from branches.paper_page import Row, Section
+from branches.paper.draw import STABLE, UNSTABLE_FILL, pyplot, save
+from branches.paper.page import Row, Section
 from ribbon_model.dispersion import tangent_moduli
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.unfolding import HINGED, factors, first_root

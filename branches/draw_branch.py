@@ -1,0 +1,125 @@
+"""A branch as a picture: kappa* against kappa_n with folds and ends, and the strip along the branch (Fig. 11)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from branches.draw_diagram import smooth
+
+# Okabe-Ito colours: told apart by the colour-blind, and in print
+CURVE, FOLD, END, SHAPE, BACK = "#0072B2", "#D55E00", "#000000", "#E8A33D", "#7A5195"
+MARKS = {
+    "LP": ("*", FOLD, 170, "fold"), "EP": ("o", END, 45, "end"), "BP": ("o", END, 45, "branch point"),
+    "UZ": ("D", "#009E73", 40, "user value"),
+}  # fmt: skip
+
+
+def figure(branch, shapes: int = 6, width: float = 0.3):
+    """The figure of a branch.
+
+    Parameters
+    ----------
+    branch : branches.read.StoredBranch
+    shapes : int
+        Number of strips, at equal distances along the branch; labelled points are among them where they fit.
+    width : float
+        Width of the drawn strip, in units of L / 2 pi.
+    """
+    from matplotlib.figure import Figure
+
+    chosen = choose(branch, shapes)
+    columns = max(len(chosen), 1)
+    result = Figure(figsize=(9, 6.2 if chosen else 4.2), layout="constrained")
+    grid = result.add_gridspec(2 if chosen else 1, columns, height_ratios=[1, 2.2] if chosen else [1])
+    for column, point in enumerate(chosen):
+        axes = result.add_subplot(grid[0, column], projection="3d")
+        draw_strip(axes, branch.shape(point), width)
+        axes.set_title(chr(ord("a") + column), fontsize=10, y=0.98)
+    curve(result.add_subplot(grid[-1, :]), branch, chosen)
+    return result
+
+
+def choose(branch, count: int) -> list[int]:
+    """Numbers of the points whose strip is drawn: nearest to equal distances along the branch, labelled ones preferred."""
+    kept = branch.kept()
+    if not count or not len(kept):
+        return []
+    s = branch.points["arclength"][kept]
+    labelled = branch.points["label"][kept] != b""
+    spacing = (s[-1] - s[0]) / max(count - 1, 1) or 1.0
+    chosen = []
+    for target in np.linspace(s[0], s[-1], count):
+        distance = np.abs(s - target) - 0.45 * spacing * labelled
+        best = int(kept[np.argmin(distance)])
+        if best not in chosen:
+            chosen.append(best)
+    return sorted(chosen)
+
+
+def curve(axes, branch, chosen) -> None:
+    """kappa* against kappa_n, with marks at labelled points and letters at the strips drawn."""
+    points, config = branch.points, branch.config
+    axes.plot(*smooth(points["arclength"], points["kappa_n"], points["kappa_star"]), color=CURVE, lw=1.6, zorder=1)
+    seen = set()
+    for event in branch.events:
+        marker, colour, size, name = MARKS.get(event["label"].decode(), ("x", END, 40, "lost"))
+        label = None if name in seen or name == "branch point" else name
+        seen.add(name)
+        axes.scatter(event["kappa_n"], event["kappa_star"], marker=marker, color=colour, s=size, zorder=3, label=label)
+        if event["label"] == b"LP":
+            place = (event["kappa_n"], event["kappa_star"])
+            axes.annotate(f"{event['kappa_n']:.4f}", place, (9, -3), textcoords="offset points", fontsize=9)
+    axes.set_xlabel(r"natural curvature $\kappa_n L/2\pi$")
+    axes.set_ylabel(r"conjugate curvature $\bar\kappa^*$")
+    axes.set_title(f"{config['law']}, (m, n) = ({config['m']}, {config['n']}), $\\nu$ = {config['nu']:g}", fontsize=11)
+    axes.grid(alpha=0.25)
+    axes.margins(0.1)
+    axes.legend(frameon=False)
+    letters(axes, points, chosen)
+
+
+def letters(axes, points, chosen) -> None:
+    """Letters of the strips drawn, to the right of the curve as it goes; at a fold, which has a number there, to its left."""
+    axes.autoscale_view()
+    place = axes.transData.transform(np.column_stack([points["kappa_n"], points["kappa_star"]]))
+    for column, number in enumerate(chosen):
+        label, here = points["label"][number], (points["kappa_n"][number], points["kappa_star"][number])
+        if label == b"":
+            axes.scatter(*here, s=14, color=CURVE, zorder=2)
+        way = place[min(number + 1, len(place) - 1)] - place[max(number - 1, 0)]
+        right = np.array([way[1], -way[0]]) / (np.hypot(*way) or 1.0) * (-13 if label == b"LP" else 13)
+        axes.annotate(
+            chr(ord("a") + column), here, tuple(right), textcoords="offset points", ha="center", va="center", fontsize=10
+        )
+
+
+def draw_strip(axes, shape, width: float) -> None:
+    """A closed strip as a lit surface, one colour a side, seen from above at an angle, at equal scale."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    step = max(1, len(shape.arclength) // 400)
+    keep = np.unique(np.append(np.arange(0, len(shape.arclength), step), len(shape.arclength) - 1))
+    surface = shape.surface(width)[keep] - shape.centreline.mean(axis=0)
+    # the axis of the moment points up, and the strip is looked at from the same side at every point
+    up = np.cross(shape.centreline - shape.centreline.mean(axis=0), shape.directors[:, 2]).sum(axis=0)
+    up = up / np.linalg.norm(up) if np.linalg.norm(up) > 1e-9 else np.array([0.0, 0.0, 1.0])
+    side = shape.directors[0, 2] - shape.directors[0, 2] @ up * up
+    side /= np.linalg.norm(side)
+    surface = surface @ np.array([np.cross(side, up), side, up]).T
+    a, b = surface[:, 0], surface[:, -1]
+    quads = np.stack([a[:-1], a[1:], b[1:], b[:-1]], axis=1)
+    normals = np.cross(a[1:] - a[:-1], b[:-1] - a[:-1])
+    normals /= np.linalg.norm(normals, axis=1)[:, None] + 1e-300
+    light, eye = np.array([0.3, -0.4, 0.85]), np.array([0.55, -0.55, 0.63])
+    light /= np.linalg.norm(light)
+    from matplotlib.colors import to_rgb
+
+    front = (normals @ eye > 0)[:, None]
+    shade = (0.45 + 0.55 * np.abs(normals @ light))[:, None]
+    colours = np.where(front, to_rgb(SHAPE), to_rgb(BACK)) * shade
+    axes.add_collection3d(Poly3DCollection(quads, facecolors=colours, edgecolors=colours, linewidths=0.2))
+    reach = 0.8  # the same for all: the m-covered circle has radius 1 / m
+    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
+    axes.set_box_aspect((1, 1, 1), zoom=1.25)
+    axes.view_init(elev=32, azim=-45)
+    axes.set_axis_off()

@@ -1,0 +1,66 @@
+"""The instant preview: a diagram from the exact quadrature (`ribbon_model.exact`), nothing followed by continuation.
+
+It has the form of a computed diagram (`branches.graph`), says in ``graph.graph["source"]`` what it is, and is never mixed with
+computed branches.
+"""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+
+import numpy as np
+
+from branches import graph as diagram
+from branches.config import Config, DiagramConfig
+from ribbon_model import exact
+
+SOURCE = "preview: exact quadrature"
+_KINDS = {"LP": "fold", "BP": "circle", "EP": "leaves", "MX": "lost"}
+
+
+def preview(config: Config | DiagramConfig, step: float = 0.2):
+    """The diagram of a scene.
+
+    Parameters
+    ----------
+    config : Config or DiagramConfig
+    step : float
+        Largest distance between points, as for :func:`ribbon_model.exact.curve`.
+
+    Returns
+    -------
+    networkx.MultiGraph
+        As of :func:`branches.diagram.run_diagram`. Its edges' arclength is that in the plane of the quadrature's unknowns; a
+        branch whose quadrature fails is named, with the reason, in ``graph.graph["failed"]``.
+    """
+    single = isinstance(config, Config)
+    graph, failed = diagram.new_graph(config.title), {}
+    for one in sorted([config] if single else config.branches, key=lambda one: one.n * one.m):
+        family = {"law": one.law, "nu": one.nu, "m": one.m, "n": one.n}
+        if diagram.holds_circle(graph, one.law, one.nu, one.m, one.n):
+            continue  # there already, from its other end
+        try:
+            points = exact.curve(one.m, one.n, one.nu, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law)
+        except (ValueError, RuntimeError) as error:
+            failed[f"{one.law}, nu = {one.nu:g}, ({one.m}, {one.n})"] = str(error)
+            continue
+        _add(graph, family, points)
+    graph.graph |= {"source": SOURCE, "failed": json.dumps(failed), "absent": json.dumps({} if single else config.absent)}
+    return graph
+
+
+def _add(graph, family, points):
+    place = np.array([exact.coordinates(point) for point in points])
+    columns = {"arclength": np.append(0, np.cumsum(np.hypot(*np.diff(place, axis=0).T)))}
+    columns |= {name: np.array([getattr(point, name) for point in points]) for name in ("kappa_n", "kappa_star", "energy")}
+    special = [i for i, point in enumerate(points) if point.label]
+    nodes = [_node(family, points[i], i) for i in special]
+    pieces = [{name: values[a : b + 1].tolist() for name, values in columns.items()} for a, b in pairwise(special)]
+    diagram.connect(graph, family, nodes, pieces)
+
+
+def _node(family, point, number):
+    kind = _KINDS[point.label]
+    values = {"kappa_n": point.kappa_n, "kappa_star": point.kappa_star, "energy": point.energy}
+    return diagram.node(family, kind, values, number)

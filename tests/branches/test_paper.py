@@ -1,0 +1,43 @@
+"""``python -m branches.paper``: every published number within its printed digits, and nothing done that was not asked for."""
+
+import pytest
+
+from branches.paper.__main__ import ITEMS, main
+from branches.paper.page import Row
+
+#: Rows with a verdict of each item: all numbers that the paper prints.
+NUMBERS = {"table1": 1, "table2": 8, "table3": 24, "fig6": 1, "fig9": 2, "fig10": 8, "fig11": 3, "fig12": 9}
+
+
+@pytest.mark.parametrize("name", ITEMS)
+def test_every_published_number_within_its_printed_digits(name, tmp_path):
+    section = ITEMS[name](tmp_path)
+    verdicts = [row.verdict for row in section.rows]
+    assert "no" not in verdicts
+    assert verdicts.count("yes") == NUMBERS[name]
+    for picture in section.pictures:
+        assert all((tmp_path / f"{picture}{suffix}").stat().st_size > 10_000 for suffix in (".png", ".svg"))
+
+
+def test_verdicts_are_those_of_the_printed_digits():
+    assert Row("", "4.08", 4.0751).verdict == "yes" and Row("", "4.08", 4.0749).verdict == "no"
+    assert Row("", "10.", 10.4).verdict == "yes" and Row("", "10.", 10.6).verdict == "no"
+    assert Row("", "3.50", 2.5, measured=True).verdict == "" and Row("", "none", 2.5).verdict == ""
+
+
+def test_an_item_alone_loads_and_writes_what_it_needs(command):
+    code = "import sys; from branches.paper.__main__ import main; assert main(['--out', 'x', 'table3']) == 0; "
+    done = command(program=("-c", code + "assert not {'numba', 'matplotlib', 'h5py'} & set(sys.modules), sorted(sys.modules)"))
+    assert done.returncode == 0, done.err
+    assert sorted(path.name for path in (command.folder / "x").iterdir()) == ["index.html", "index.md"]
+    page = (command.folder / "x" / "index.md").read_text(encoding="utf-8")
+    assert "| m = 1, n = 2 | 2.50 | 2.5 |" in page and "Fig." not in page
+
+
+def test_what_is_refused(tmp_path, capsys):
+    assert main(["--out", str(tmp_path), "fig13"]) == 2
+    assert "there is no item 'fig13'; known are table1" in capsys.readouterr().err
+    (tmp_path / "file").write_text("")
+    assert main(["--out", str(tmp_path / "file"), "table3"]) == 2
+    assert "cannot write" in capsys.readouterr().err
+    assert (tmp_path / "file").read_text() == ""
