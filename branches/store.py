@@ -100,6 +100,8 @@ class BranchWriter:
             self._file = h5py.File.in_memory(image)
             self.count = self._create(problem) if image is None else self._rewind(problem)
         self._file.attrs["config"] = config_text
+        # asking HDF5 for the columns again for each row would take longer than computing the row
+        self._types = {table: self._file[table].dtype for table in ("points", "events")}
         self._saved = time.monotonic()
         self._spent = 0.0
 
@@ -182,8 +184,8 @@ class BranchWriter:
     def _flush(self):
         points = [self._row("points", point, number) for point, number in self._buffer]
         events = [self._row("events", point, number) for point, number in self._buffer if point.label]
-        _extend(self._file["points"], points)
-        _extend(self._file["events"], events)
+        _extend(self._file["points"], np.array(points, self._types["points"]))
+        _extend(self._file["events"], np.array(events, self._types["events"]))
         kept = [(p, i) for p, i in self._buffer if p.label or i % self._stride == 0]
         if kept:
             group, rows = self._file["solutions"], []
@@ -192,7 +194,7 @@ class BranchWriter:
                 count = len(point.system.nodes)
                 rows.append((number, start, count, point.system.degree))
                 start += count
-            _extend(group["index"], rows)
+            _extend(group["index"], np.array(rows, group["index"].dtype))
             _extend(group["t"], np.concatenate([point.system.nodes for point, _ in kept]))
             _extend(group["states"], np.concatenate([point.system.states(point.x) for point, _ in kept]))
         self._buffer.clear()
@@ -204,7 +206,7 @@ class BranchWriter:
             "iterations": point.iterations, "newton_error": point.newton_error,
             **{f"error_{name}": point.errors.get(name, np.nan) for name in self._free},
         }  # fmt: skip
-        return tuple(values[name] for name in self._file[table].dtype.names)
+        return tuple(values[name] for name in self._types[table].names)
 
     # --- what a resumed run needs --------------------------------------------------------------------------------
 
@@ -263,7 +265,7 @@ def _extend(dataset, rows):
     if len(rows):
         start = len(dataset)
         dataset.resize(start + len(rows), axis=0)
-        dataset[start:] = rows if isinstance(rows, np.ndarray) else np.array(rows, dtype=dataset.dtype)
+        dataset[start:] = rows
 
 
 @contextlib.contextmanager
