@@ -1,0 +1,128 @@
+"""The index of an equilibrium by conjugate points: Jacobi fields integrated along the loop, no basis functions.
+
+Rigid motions do not matter, so E = (theta, w) may be fixed to zero at S = 0, and then also at S = L: what is left is the index of
+a problem with fixed ends, which is the number of conjugate points in (0, L) (Morse). With p the momentum of E, Jacobi fields
+obey the Hamiltonian system
+
+    E' = A pi,   p' = N A pi / 2,   pi = p + N E / 2,   A = G G^T,
+
+and a conjugate point is where the plane of the six fields with E(0) = 0 has a vector with E = 0. That plane is Lagrangian: the
+eigenvalues exp(2 i alpha_k) of W = (p + i E)(p - i E)^-1 lie on the unit circle, begin at alpha_k = 0, leave upwards, and pass a
+multiple of pi upwards at each conjugate point and nowhere else. So the index is the sum of ceil(alpha_k(L) / pi) - 1, got from
+one continuous angle, the sum of the alpha_k = arg det(p + i E), and the eigenvalues of W at the end. The plane is made
+orthonormal again on the way, which changes neither.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ribbon_model.equilibrium import LENGTH
+from ribbon_model.second_variation import Equilibrium, coupling, cross_matrix
+
+
+@dataclass(frozen=True)
+class ConjugatePoints:
+    """Result of `conjugate_index`.
+
+    Attributes
+    ----------
+    index : int
+    distance : float
+        How far alpha_k(L) stays from a multiple of pi, the shift of phase left out: zero where a further mode is neutral.
+    defect : float
+        The largest of: distance of the count from a whole number, of the shift of phase from the plane of Jacobi fields, gap
+        of the frame and centreline at the end.
+    decided : bool
+        Whether ``distance`` exceeds a hundred times the defect.
+    """
+
+    index: int
+    distance: float
+    defect: float
+    decided: bool
+
+
+def conjugate_index(equilibrium: Equilibrium, tolerance: float = 1e-10) -> ConjugatePoints:
+    """Number of negative directions of the energy of a closed equilibrium, by conjugate points.
+
+    The equilibrium is integrated anew from its frame, moment and force at S = 0.
+
+    Parameters
+    ----------
+    tolerance : float
+        Relative tolerance of the integration (DOP853).
+
+    Raises
+    ------
+    RuntimeError
+        If the integration fails.
+    """
+    from scipy.integrate import solve_ivp
+
+    flow = _Flow(equilibrium)
+    frame, centreline, plane, angle = equilibrium.directors(np.zeros(1))[0], np.zeros(3), np.eye(12)[:, 6:], 0.0
+    start = frame.copy()
+    segments = 8 * max(2, equilibrium.symmetry.order)
+    for k in range(segments):
+        y = np.concatenate([frame.ravel(), centreline, plane.ravel(), [angle]])
+        span = (LENGTH * k / segments, LENGTH * (k + 1) / segments)
+        done = solve_ivp(flow, span, y, method="DOP853", rtol=tolerance, atol=tolerance / 10, first_step=span[1] - span[0])
+        if not done.success:
+            raise RuntimeError(f"the Jacobi fields could not be integrated: {done.message}")
+        frame, centreline, plane, angle = _split(done.y[:, -1])
+        plane = np.linalg.qr(plane)[0]
+    gap = max(np.abs(frame - start).max(), np.abs(centreline).max())
+    return _count(plane, angle, flow.phase_shift(start), gap)
+
+
+def _split(y):
+    return y[:9].reshape(3, 3), y[9:12], y[12:84].reshape(12, 6), y[84]
+
+
+class _Flow:
+    """The right-hand side; lab axes as the equilibrium's, origin at x(0)."""
+
+    def __init__(self, equilibrium: Equilibrium):
+        self.equilibrium = equilibrium
+        self.moment, self.force = equilibrium.moment, equilibrium.force
+        self.coupling = coupling(self.moment, self.force)
+
+    def __call__(self, s, y):
+        frame, centreline, plane, _ = _split(y)
+        moment = frame @ (self.moment - np.cross(centreline, self.force))
+        strain, compliance = self.equilibrium.response(moment[None])
+        spin = cross_matrix(strain[0] @ frame)
+        lever = np.hstack([np.eye(3), cross_matrix(centreline)])  # E' = lever^T u
+        E, p = plane[:6], plane[6:]
+        rate = lever.T @ (frame.T @ compliance[0] @ frame) @ (lever @ (p + self.coupling @ E / 2))
+        momentum_rate = self.coupling @ rate / 2
+        turning = np.linalg.solve(p + 1j * E, momentum_rate + 1j * rate).trace().imag
+        return np.concatenate([(frame @ spin.T).ravel(), frame[2], rate.ravel(), momentum_rate.ravel(), [turning]])
+
+    def phase_shift(self, frame):
+        """Momentum at S = L of the Jacobi field theta = omega, E = (omega, omega x x - d3) up to a rigid motion; zero on circles."""
+        strain, compliance = self.equilibrium.response((frame @ self.moment)[None])
+        E = np.concatenate([strain[0] @ frame, -frame[2]])
+        return self.coupling @ E
+
+
+def _count(plane, angle, shift, gap):
+    """The index from the plane at S = L and the sum of the angles alpha there."""
+    E, p = plane[:6], plane[6:]
+    unitary = np.linalg.solve((p - 1j * E).T, (p + 1j * E).T).T
+    defect, size, known = gap, np.linalg.norm(shift), 0
+    if size > 1e-8:
+        shift = shift / size
+        defect = max(defect, np.abs(unitary @ shift - shift).max())
+        complement = np.linalg.svd(shift[None])[2][1:]
+        unitary, known = complement @ unitary @ complement.T, 1
+    rest = np.mod(np.angle(np.linalg.eigvals(unitary)) / 2, math.pi)  # in [0, pi)
+    distance = float(np.minimum(rest, math.pi - rest).min())
+    count = (angle - rest.sum()) / math.pi - known
+    index = round(count)
+    defect = float(max(defect, abs(count - index)))
+    return ConjugatePoints(index, distance, defect, distance > 100 * defect)

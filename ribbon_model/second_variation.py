@@ -1,0 +1,186 @@
+"""What the second variation of the energy at an equilibrium needs: the equilibrium along the whole loop, and the form itself.
+
+The frame is perturbed by a rotation theta(S), components on the lab axes, periodic because a closed frame is: whether the
+quaternion comes back to itself or to its negative plays no part. With u = theta', the strains change by u on the directors, so
+omega_2 = 0 asks for u . d2 = 0, and the loop stays closed if the means of u and of w' = u x x vanish (w is minus the displacement,
+up to theta x x). With K = D2H = C C^T, u = sum of d_a (C v)_a, E = (theta, w) in R^6, and the constant
+
+    N = [[mu x, -R x], [-R x, 0]],   mu = M + x x R,
+
+twice the second variation of the energy under closure is
+
+    Q = int |v|^2 + E . N E' dS,     E' = G v = (u, u x x),     int E' dS = 0,
+
+see docs/stability.md. v is free: two functions (three for a law without omega_2 = 0), six conditions on their means.
+"""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from contin.collocation import basis, interpolation
+from ribbon_model.equilibrium import LENGTH
+from ribbon_model.laws import Law
+from ribbon_model.shape import frames
+
+_STEP = 1e-30  # of the imaginary part: derivatives to round-off
+_HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """Symmetry of a loop: its lab axes have e3 along the axis of rotation and, with a mirror, e1 = d3(0).
+
+    Attributes
+    ----------
+    order : int
+        Equal parts that the loop consists of, of length L / order.
+    winding : int
+        From one part to the next the frame turns by 2 pi winding / order about e3.
+    flip : bool
+        Whether d2 and d3 change sign besides (on the frame this is a half turn about d1; in space, a rotary reflection).
+    mirror : bool
+        Mirror symmetry at S = 0: d_i(-S) is the image of d_i(S), -d3(S) for i = 3.
+    """
+
+    order: int = 1
+    winding: int = 0
+    flip: bool = False
+    mirror: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A closed equilibrium, B = 1, L = 2 pi.
+
+    Attributes
+    ----------
+    directors : callable
+        directors(S) for S (K,) gives (K, 3, 3), rows d1, d2, d3 on the lab axes; periodic.
+    moment, force : ndarray, shape (3,)
+        M and R at S = 0 on the lab axes.
+    """
+
+    law: Law
+    nu: float
+    kappa_n: float
+    directors: Callable[[np.ndarray], np.ndarray]
+    moment: np.ndarray
+    force: np.ndarray
+    symmetry: Symmetry
+
+    def response(self, moment):
+        """Strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""
+        # the same code as plain Python's, on arrays of complex numbers
+        response = types.FunctionType(self.law.response.__code__, {"math": np})
+        arguments = np.repeat(moment.T[:, None].astype(complex), 3, axis=1)  # component, direction of the step, place
+        arguments[range(3), range(3)] += 1j * _STEP
+        shape = arguments.shape[1:]
+        strain = np.array([np.broadcast_to(w, shape) for w in response(*arguments, self.kappa_n, self.nu)[1:4]])
+        return strain[:, 0].real.T, strain.imag.transpose(2, 0, 1) / _STEP
+
+
+def coupling(moment, force) -> np.ndarray:
+    """The antisymmetric matrix N (6, 6) of the constants mu and R (3,)."""
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3], matrix[:3, 3:], matrix[3:, :3] = cross_matrix(moment), -cross_matrix(force), -cross_matrix(force)
+    return matrix
+
+
+def cross_matrix(a) -> np.ndarray:
+    """The matrix (3, 3) of a x."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def circle(law: Law, nu: float, m: int, kappa_n: float) -> Equilibrium:
+    """The planar m-covered circle."""
+
+    def directors(stations):
+        angle, zero, one = m * np.asarray(stations), np.zeros(len(stations)), np.ones(len(stations))
+        tangent = np.array([np.cos(angle), np.sin(angle), zero])
+        normal = np.array([np.sin(angle), -np.cos(angle), zero])  # d2 = d3 x d1
+        return np.array([[zero, zero, one], normal, tangent]).transpose(2, 0, 1)
+
+    moment = np.array([0.0, 0.0, m - kappa_n])
+    return Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), Symmetry(order=m, mirror=True))
+
+
+def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
+    """The equilibrium from the solution on the cell, the half loop or the loop; arguments as `shape.closed_strip`.
+
+    Raises
+    ------
+    ValueError
+        On the cell: quarter waves that do not close.
+    """
+    tables = basis(degree)
+    mesh = np.asarray(t)[::degree]
+    quaternions = np.asarray(states)[:, :4]
+    local = quaternions[np.arange(len(mesh) - 1)[:, None] * degree + np.arange(degree + 1)]
+
+    def sample(at):
+        j = np.clip(np.searchsorted(mesh, at, side="right") - 1, 0, len(mesh) - 2)
+        weights = interpolation(tables.nodes, tables.barycentric, (at - mesh[j]) / (mesh[j + 1] - mesh[j]))
+        return frames(np.einsum("ij,ijk->ik", weights, local[j]))
+
+    p = parameters
+    moment = np.array([p["M1"], p["M2"], p.get("M3", 0.0)])
+    force = np.array([p.get(name, 0.0) for name in ("R1", "R2", "R3")])
+    if math.isclose(p["length"], LENGTH):
+        axes, directors, symmetry = np.eye(3), lambda stations: sample(np.mod(stations, LENGTH) / LENGTH), Symmetry()
+    elif "turn" in p:
+        axes, directors, symmetry = _unfolded_cell(sample, p["length"])
+    else:
+        axes, directors, symmetry = _unfolded_half(sample)
+    return Equilibrium(law, p["nu"], p["kappa_n"], directors, axes @ moment, axes @ force, symmetry)
+
+
+def _unfolded_half(sample):
+    """Lab axes (rows), directors and symmetry of a half loop between mirrors."""
+    first = sample(np.zeros(1))[0]
+    axes = np.array([first[2], -first[1], first[0]])
+    mirror = np.diag([-1.0, 1.0, 1.0])
+
+    def directors(stations):
+        s = np.mod(stations, LENGTH)
+        beyond = s > LENGTH / 2
+        d = sample(np.where(beyond, LENGTH - s, s) / (LENGTH / 2)) @ axes.T
+        d[beyond] = d[beyond] @ mirror * np.array([1.0, 1.0, -1.0])[:, None]
+        return d
+
+    return axes, directors, Symmetry(mirror=True)
+
+
+def _unfolded_cell(sample, length):
+    """The same of a quarter wave: an image under the two-fold axis d2 at its end, then half waves one after the other."""
+    first, last = sample(np.array([0.0, 1.0]))
+    normal = np.cross(first[2], last[1])
+    if np.linalg.norm(normal) < 1e-6:  # then nothing turns from part to part, and any axis in the mirror plane will do
+        normal = first[0]
+    normal /= np.linalg.norm(normal)
+    axes = np.array([first[2], np.cross(normal, first[2]), normal])
+    axis = axes @ last[1]
+    half_turn = 2 * np.outer(axis, axis) - np.eye(3)
+    turn = half_turn @ np.diag([1.0, -1.0, -1.0])  # after the half turn about e1 = d3(0)
+    part, order = 2 * length, round(LENGTH / (2 * length))
+    winding = math.atan2(turn[1, 0], turn[0, 0]) * order / (2 * math.pi)
+    if abs(winding - round(winding)) > 1e-6:
+        raise ValueError(f"a part of the loop turns by {winding:.9g} times 2 pi / {order}: it does not close")
+    turns = [np.linalg.matrix_power(turn, k).T for k in range(order)]
+    signs = np.array([np.ones(3), _HALF_TURN])[:, :, None]
+
+    def directors(stations):
+        s = np.mod(stations, LENGTH)
+        number = np.minimum((s / part).astype(int), order - 1)
+        s = np.clip(s - number * part, 0, part)
+        beyond = s > length
+        d = sample(np.where(beyond, part - s, s) / length) @ axes.T
+        d[beyond] = d[beyond] @ half_turn * np.array([-1.0, 1.0, -1.0])[:, None]
+        return d @ np.array(turns)[number] * signs[number % 2]
+
+    return axes, directors, Symmetry(order, round(winding) % order, flip=True, mirror=True)
