@@ -9,7 +9,7 @@ from pathlib import Path
 
 from branches import graph as diagram_graph
 from branches.config import Config, DiagramConfig, dump
-from branches.executor import WAIT, executor, run_jobs
+from branches.executor import WAIT, executor, run_jobs, trouble
 from branches.files import StoreError, prepare, write_bytes
 
 
@@ -66,8 +66,15 @@ class _Plan:
         return WAIT if self._open else None
 
 
-def run_diagram(config: DiagramConfig, folder: Path, display, *, scheduler=None, workers=None, overwrite=False) -> str:
+def run_diagram(
+    config: DiagramConfig, folder: Path, display, *, scheduler=None, workers=None, time_limit=None, overwrite=False
+) -> str:
     """Compute the branches of a scene that ``folder`` does not hold yet, and the graph of all.
+
+    Parameters
+    ----------
+    time_limit : float, optional
+        Seconds that a branch may take in a process of this machine.
 
     Returns
     -------
@@ -89,8 +96,8 @@ def run_diagram(config: DiagramConfig, folder: Path, display, *, scheduler=None,
     display.begin_diagram(config, len(configs), len(configs) - len(fresh))
     if fresh:
         _load_kernels(fresh)
-        with executor(scheduler, workers) as (pool, limit):
-            for one, result in run_jobs(plan.next, _compute_one, pool, limit):
+        with executor(scheduler, workers, time_limit) as (submit, limit):
+            for one, result in run_jobs(plan.next, _compute_one, submit, limit):
                 problem = _take(folder, one, result, graph)
                 if problem:
                     failed[file_name(one)] = problem
@@ -149,7 +156,7 @@ def _take(folder: Path, config: Config, result, graph) -> str:
     from branches.read import read_branch
 
     if isinstance(result, BaseException):
-        return f"{type(result).__name__}: {result}"
+        return trouble(result)
     image, outcome = result
     path = folder / file_name(config)
     write_bytes(path, image)

@@ -16,8 +16,10 @@ class ExecutorError(Exception):
 
 
 @contextlib.contextmanager
-def executor(scheduler: str | None = None, workers: int | None = None) -> Iterator[tuple[futures.Executor, int]]:
-    """A ``concurrent.futures`` executor and the number of jobs it can run at a time.
+def executor(
+    scheduler: str | None = None, workers: int | None = None, time_limit: float | None = None
+) -> Iterator[tuple[Callable[..., futures.Future], int]]:
+    """A function ``submit(function, job)`` that returns a future, and the number of jobs that run at a time.
 
     Parameters
     ----------
@@ -25,6 +27,9 @@ def executor(scheduler: str | None = None, workers: int | None = None) -> Iterat
         Address of a Dask scheduler, as in ``tcp://host:8786``; local processes without.
     workers : int, optional
         Local processes; as many as this process may use cores by default.
+    time_limit : float, optional
+        Seconds after which a job in a local process is killed; its future then raises TimeoutError. A process that dies takes
+        its own job with it and no other.
 
     Raises
     ------
@@ -32,13 +37,16 @@ def executor(scheduler: str | None = None, workers: int | None = None) -> Iterat
         Dask is not installed, or the scheduler does not answer.
     """
     if scheduler is None:
+        from pebble import CONSTS, ProcessPool
+
+        CONSTS.sleep_unit = 0.02  # seconds between its looks at its processes, the last of which the end of a run waits for
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
         count = workers or cores or 1
         # a forked process has the compiled kernels already; where there is no fork each one loads them
         methods = multiprocessing.get_all_start_methods()
         context = multiprocessing.get_context("fork" if "fork" in methods else None)
-        with futures.ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker) as pool:
-            yield pool, count
+        with ProcessPool(count, initializer=_begin_worker, context=context) as pool:
+            yield lambda function, job: pool.schedule(function, [job], timeout=time_limit), count
         return
     try:
         from distributed import Client
@@ -49,7 +57,7 @@ def executor(scheduler: str | None = None, workers: int | None = None) -> Iterat
     except (OSError, ValueError) as error:
         raise ExecutorError(f"--scheduler {scheduler!r}: no Dask scheduler answers there") from error
     with client:
-        yield client.get_executor(), max(1, sum(client.nthreads().values()))
+        yield client.get_executor().submit, max(1, sum(client.nthreads().values()))
 
 
 def _begin_worker():
@@ -64,31 +72,40 @@ def _begin_worker():
     threading.Thread(target=follow_the_parent, daemon=True).start()
 
 
+def trouble(error: BaseException) -> str:
+    """Why a job gave no result, in words."""
+    if isinstance(error, TimeoutError):
+        return "not finished within the time limit"
+    if hasattr(error, "exitcode"):  # pebble's ProcessExpired
+        return f"its process died (exit code {error.exitcode})"
+    return f"{type(error).__name__}: {error}"
+
+
 #: What a source of jobs returns when the next one depends on jobs that are still running.
 WAIT = object()
 
 
-def run_jobs(source: Callable, function: Callable, pool: futures.Executor, limit: int) -> Iterator[tuple[object, object]]:
-    """Run ``function(job)`` for every job, at most ``limit`` at a time; yield (job, result or exception) as they finish.
+def run_jobs(source: Callable, function: Callable, submit: Callable, limit: int) -> Iterator[tuple[object, object]]:
+    """Run ``function(job)`` for every job, ``limit`` at a time; yield (job, result or exception) as they finish.
 
     Parameters
     ----------
     source : callable
-        ``source(running)`` returns the next job, None when there are no more, or :data:`WAIT`, given the list of jobs that run.
+        ``source(running)``, given the list of jobs handed out, returns the next one; None at the end; or :data:`WAIT`.
     function : callable
         At module level, so that it can be sent to another process.
     """
     running: dict[futures.Future, object] = {}
     exhausted = False
     while True:
-        while not exhausted and len(running) < limit:
+        while not exhausted and len(running) <= limit:  # one waits, so that no process does
             job = source(list(running.values()))
             if job is WAIT:
                 break
             if job is None:
                 exhausted = True
             else:
-                running[pool.submit(function, job)] = job
+                running[submit(function, job)] = job
         if not running:
             return
         done, _ = futures.wait(running, return_when=futures.FIRST_COMPLETED)

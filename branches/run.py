@@ -28,6 +28,9 @@ def arguments(argv=None):
         "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field, as in --set nu=0.2 --set mesh.degree=5"
     )
     parser.add_argument("--workers", type=int, metavar="N", help="processes for a scene of many branches (default: one a core)")
+    parser.add_argument(
+        "--time-limit", type=float, default=3600.0, metavar="S", help="seconds that one of many branches may take"
+    )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run a scene of many branches on a Dask cluster instead")
     parser.add_argument("--quiet", action="store_true", help="print the summary only")
     existing = parser.add_mutually_exclusive_group()
@@ -89,6 +92,8 @@ def _run_diagram(config, options) -> int:
         raise ConfigError("--resume: a scene of many branches needs none; run it again and it computes what is missing")
     if options.workers is not None and options.workers < 1:
         raise ConfigError(f"--workers {options.workers}: must be at least 1")
+    if not options.time_limit > 0:
+        raise ConfigError(f"--time-limit {options.time_limit:g}: must be above 0")
     folder = Path(options.out or Path(options.config).stem)
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
@@ -97,8 +102,9 @@ def _run_diagram(config, options) -> int:
         signal.signal(signal.SIGINT, _leave_diagram)
     try:
         outcome = run_diagram(
-            config, folder, display, scheduler=options.scheduler, workers=options.workers, overwrite=options.overwrite
-        )
+            config, folder, display, scheduler=options.scheduler, workers=options.workers, time_limit=options.time_limit,
+            overwrite=options.overwrite,
+        )  # fmt: skip
     except (StoreError, ExecutorError, ContinError) as error:
         display.clear()
         return _refuse(error)

@@ -10,6 +10,7 @@ import networkx
 import numpy as np
 import pytest
 
+from branches import diagram as diagrams
 from branches import draw_diagram
 from branches import graph as diagram
 from branches.config import ConfigError, parse
@@ -117,6 +118,30 @@ def test_where_it_runs_makes_no_difference(tmp_path):
     for config in scene.branches:
         a, b = (read_branch(tmp_path / place / file_name(config)).points for place in ("one", "dask"))
         assert np.array_equal(a, b)
+
+
+def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
+    scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), diagrams.compute
+
+    def troubled(text):
+        config = parse(text, "scene")
+        if (config.m, config.n) == (1, 4):
+            os.kill(os.getpid(), signal.SIGKILL)
+        if (config.m, config.n) == (3, 4):
+            time.sleep(60)
+        return compute(text)
+
+    monkeypatch.setattr(diagrams, "compute", troubled)
+    assert run_diagram(scene, tmp_path, Display(), workers=2, time_limit=5) == "lost"
+    graph = diagram.read(tmp_path)
+    assert [family[2:] for family in diagram.families(graph)] == [(1, 2)]
+    failed = json.loads(graph.graph["failed"])
+    reasons = [failed[file_name(scene.branches[i])] for i in (1, 3)]
+    assert reasons == ["its process died (exit code -9)", "not finished within the time limit"]
+    assert "failed" in capsys.readouterr().out
+    monkeypatch.undo()
+    assert run_diagram(scene, tmp_path, Display(), workers=2) == "complete"
+    assert "1 of them computed before" in capsys.readouterr().out
 
 
 def test_a_scheduler_that_is_not_there():
