@@ -42,6 +42,10 @@ def _copy_vector(target, source):
         target[i] = source[i]
 
 
+#: Pivots that are applied together to the rows below: each number loaded from memory then serves so many multiplications.
+_PANEL = 4
+
+
 @njit(inline="never", **_OPTIONS)
 def _eliminate(block, columns, pivots, border, border_pivot):
     """Eliminate the first ``columns`` columns of ``block`` (rows, width) by partial pivoting, in place.
@@ -51,33 +55,71 @@ def _eliminate(block, columns, pivots, border, border_pivot):
     """
     rows, width = block.shape
     sign = 1.0
-    for c in range(columns):
-        best, at = abs(block[c, c]), c
-        for i in range(c + 1, rows):
-            if abs(block[i, c]) > best:
-                best, at = abs(block[i, c]), i
-        pivots[c] = at
-        if at != c:
-            sign = -sign
-            for j in range(width):
-                block[c, j], block[at, j] = block[at, j], block[c, j]
-        pivot = block[c, c]
-        if pivot < 0:
-            sign = -sign
-        border_pivot[0] = min(border_pivot[0], abs(pivot))
-        for i in range(c + 1, rows):
-            factor = block[i, c] / pivot
-            block[i, c] = factor
-            if factor != 0.0:
-                for j in range(c + 1, width):
-                    block[i, j] -= factor * block[c, j]
-        for i in range(border.shape[0]):
-            factor = border[i, c] / pivot
-            border[i, c] = factor
-            if factor != 0.0:
-                for j in range(c + 1, width):
-                    border[i, j] -= factor * block[c, j]
+    start = 0
+    while start < columns:
+        end = min(start + _PANEL, columns)
+        for c in range(start, end):
+            best, at = abs(block[c, c]), c
+            for i in range(c + 1, rows):
+                if abs(block[i, c]) > best:
+                    best, at = abs(block[i, c]), i
+            pivots[c] = at
+            if at != c:
+                sign = -sign
+                for j in range(width):
+                    block[c, j], block[at, j] = block[at, j], block[c, j]
+            pivot = block[c, c]
+            if pivot < 0:
+                sign = -sign
+            border_pivot[0] = min(border_pivot[0], abs(pivot))
+            for i in range(c + 1, rows):
+                _subtract(block, i, block, c, block[i, c] / pivot, c + 1, end)
+            for i in range(border.shape[0]):
+                _subtract(border, i, block, c, border[i, c] / pivot, c + 1, end)
+            for above in range(start, c):
+                for j in range(end, width):
+                    block[c, j] -= block[c, above] * block[above, j]
+        _apply_panel(block, end, block, start, end)
+        _apply_panel(border, 0, block, start, end)
+        start = end
     return sign
+
+
+@njit(inline="always", **_OPTIONS)
+def _subtract(rows, i, block, c, factor, first, last):
+    """Keep the multiplier of row i, and subtract its multiple of pivot row c within the panel."""
+    rows[i, c] = factor
+    for j in range(first, last):
+        rows[i, j] -= factor * block[c, j]
+
+
+@njit(inline="never", **_OPTIONS)
+def _apply_panel(rows, first, block, start, end):
+    """Subtract the pivot rows start ... end of ``block`` from the rows from ``first`` on, right of the panel."""
+    count, width = rows.shape
+    if end - start < _PANEL:
+        for i in range(first, count):
+            for c in range(start, end):
+                factor = rows[i, c]
+                for j in range(end, width):
+                    rows[i, j] -= factor * block[c, j]
+        return
+    p0, p1, p2, p3 = block[start], block[start + 1], block[start + 2], block[start + 3]
+    i = first
+    while i + 1 < count:  # two rows at a time share what is loaded of the pivot rows
+        a, b = rows[i], rows[i + 1]
+        a0, a1, a2, a3 = a[start], a[start + 1], a[start + 2], a[start + 3]
+        b0, b1, b2, b3 = b[start], b[start + 1], b[start + 2], b[start + 3]
+        for j in range(end, width):
+            u0, u1, u2, u3 = p0[j], p1[j], p2[j], p3[j]
+            a[j] -= a0 * u0 + a1 * u1 + a2 * u2 + a3 * u3
+            b[j] -= b0 * u0 + b1 * u1 + b2 * u2 + b3 * u3
+        i += 2
+    if i < count:
+        a = rows[i]
+        a0, a1, a2, a3 = a[start], a[start + 1], a[start + 2], a[start + 3]
+        for j in range(end, width):
+            a[j] -= a0 * p0[j] + a1 * p1[j] + a2 * p2[j] + a3 * p3[j]
 
 
 @njit(
