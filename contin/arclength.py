@@ -22,13 +22,21 @@ from contin.errors import ConvergenceError, ProblemError
 from contin.events import Monitor, Trial, fold, limit, sign_changed, user_zero
 from contin.location import Segment, refined
 from contin.settings import Settings
-from contin.steps import State, corrected, predict, turn, unit_tangent
-from contin.switching import crossings, inner
+from contin.steps import State, corrected, hidden_turn, predict, sharpened, tangent_error, turn, unit_tangent
+from contin.switching import calm, crossings, inner, quotients
 
 #: A step is cut down to this fraction of itself to take several branch points one by one, before they count as one.
 _FINEST = 1e-3
 #: A corrected point this many times further from its prediction than aimed at is not believed.
 _ASTRAY = 2.5
+#: A tangent's component with a larger estimated error than this, relative to itself, may have the wrong sign.
+_DOUBT = 0.2
+#: A component above this is never in doubt.
+_STEEP = 0.3
+#: Beside a branch point, events are looked for from this fraction of the first step on.
+_ASIDE = 0.01
+#: A start this far outside a limit (relative to 1 + its size) still lies on it.
+_SLACK = 1e-9
 
 
 class Continuation:
@@ -58,11 +66,14 @@ class Continuation:
     def __init__(self, system, x, settings: Settings = Settings(), tangent=None, state: State | None = None, start=None):
         self.settings = settings
         self.stop: Stop | None = None
-        self._factors = None  # of the state's point, to compare the next ones with
+        self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         self._check(system)
         self.primary = settings.primary or system.free[0]
         self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
+        self._fold = fold(self.primary) if settings.folds else None
         self._monitors = self._all_monitors()
+        own = len(self.state.system.monitors())  # of the system itself: their signs may differ between meshes
+        self._comparable = [*self._monitors[: len(self._monitors) - own], *([self._fold] if self._fold else [])]
         self._resumed = state is not None
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
@@ -83,10 +94,9 @@ class Continuation:
 
     def _all_monitors(self):
         settings = self.settings
-        monitors = [fold(self.primary)] if settings.folds else []
-        monitors += [user_zero(name, value) for name, values in settings.zeros.items() for value in values]
-        monitors += [limit(name, value) for name, values in settings.limits.items() for value in values]
-        return [*monitors, *self.state.system.monitors(), *settings.monitors]
+        monitors = [user_zero(name, value) for name, values in settings.zeros.items() for value in values]
+        monitors += [limit(name, end, side) for name, ends in settings.limits.items() for end, side in zip(ends, (-1, 1))]
+        return [*monitors, *settings.monitors, *self.state.system.monitors()]
 
     # --- the first point -----------------------------------------------------------------------------------------
 
@@ -143,7 +153,7 @@ class Continuation:
 
     def _out_of_limits(self, trial) -> Stop | None:
         for name, (low, high) in self.settings.limits.items():
-            if not low <= trial[name] <= high:
+            if not low - _SLACK * (1 + abs(low)) <= trial[name] <= high + _SLACK * (1 + abs(high)):
                 return Stop("limit", f"{name} = {trial[name]:g} at the start lies outside {low:g} ... {high:g}")
         return None
 
@@ -152,7 +162,7 @@ class Continuation:
         self._refine()
         state = self.state
         try:
-            state, step, trial, distance = self._step(state)
+            segment, distance = self._step(state)
         except ConvergenceError as error:
             self.stop = Stop(
                 "no convergence", f"the step became smaller than min_step = {self.settings.min_step:g} ({error})",
@@ -160,44 +170,34 @@ class Continuation:
             )  # fmt: skip
             yield self._point("MX", "no convergence", Trial(state.system, state.x, state.tangent, state.sign), 0.0)
             return
-        for event in self._segment(state, trial, step).events(self._monitors):
+        state, trial, step = segment.state, segment.trial, segment.step
+        for event in segment.events(self._monitors):
             yield self._point(event.label, event.name, event.trial, event.at, state, event.details, event.monitor)
             if event.stop is not None:
                 self.stop = event.stop
                 return
         self.state = self._accept(state, trial, step, distance)
-        self._factors = (state.system, trial.factors)
+        self._end = trial
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
         yield self._point("EP" if self.stop else "", "max points" if self.stop else "", trial, step, state)
 
     # --- one step ------------------------------------------------------------------------------------------------
 
-    def _step(self, state: State):
+    def _step(self, state: State) -> tuple[Segment, float]:
         """Predict and correct, halving the step until the corrected point can be believed.
 
-        Returns the state as well: at the first failure its tangent is taken anew, right at its point.
+        Returns the step and the distance from prediction to corrected point. At the first failure the state's tangent is taken
+        anew, right at its point.
         """
         step, settings, exact = state.step, self.settings, False
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
-                guess = predict(state, step)
-                trial = corrected(state, guess, step, settings.newton)
-                if not np.all(np.isfinite(state.system.residual(trial.x))):
-                    raise ConvergenceError("the equations are not finite at the corrected point")
-                gap = guess - trial.x
-                distance = np.sqrt(inner(state.system, gap, gap))
-                angle = turn(state, trial)
-                if angle <= settings.angle and distance <= _ASTRAY * settings.accuracy * step:
-                    trial.passed, clear = self._passed(state, trial)
-                    if step < 2 * finest or (trial.passed < 2 and clear and self._connected(state, trial, step)):
-                        return state, step, trial, distance
-                    problem = ConvergenceError("several branch points in one step, or another branch at its end")
-                else:
-                    problem = ConvergenceError(
-                        f"tangents turn by {angle:.2f} rad in one step, the prediction is off by {distance / step:.2f} of it"
-                    )
+                segment, distance = self._attempt(state, step)
+                if self._simple(segment) or step < 2 * finest:
+                    return segment, distance
+                problem = ConvergenceError("several branch points in one step, or another branch at its end")
             except ConvergenceError as error:
                 problem = error
             if not exact and not state.singular:
@@ -206,28 +206,87 @@ class Continuation:
             if step < settings.min_step:
                 raise problem
 
+    def _attempt(self, state: State, step: float) -> tuple[Segment, float]:
+        """One step of a given length, as far as it can be believed by itself."""
+        settings = self.settings
+        guess = predict(state, step)
+        trial = corrected(state, guess, step, settings.newton)
+        residual = state.system.residual(trial.x)
+        if not np.all(np.isfinite(residual)):
+            raise ConvergenceError("the equations are not finite at the corrected point")
+        gap = guess - trial.x
+        distance = np.sqrt(inner(state.system, gap, gap))
+        angle = turn(state, trial)
+        if not (angle <= settings.angle and distance <= _ASTRAY * settings.accuracy * step):
+            raise ConvergenceError(
+                f"tangents turn by {angle:.2f} rad in one step, the prediction is off by {distance / step:.2f} of it"
+            )
+        if hidden_turn(state, trial) > settings.angle:
+            raise ConvergenceError("the corrected point does not lie where the tangents at both ends lead")
+        if self._fold is not None and self._may_turn(trial, residual):
+            trial = sharpened(state, trial)
+        low, before = self._before(state, step)
+        return Segment(state, before, low, trial, step, settings, self.start, self._fold), distance
+
+    def _before(self, state: State, step: float) -> tuple[float, Trial]:
+        """Where a step's monitors start from: its place, and the point.
+
+        That is the state's point, as the step before left it, so that both decide from the same values. At a branch point
+        tangent and determinant say nothing: a point close to it stands in.
+        """
+        if not state.singular:
+            if self._end is None:
+                self._end = Trial(state.system, state.x, state.tangent, state.sign)
+            return 0.0, self._end
+        low = _ASIDE * step
+        aside = corrected(state, state.x + low * state.tangent, low, self.settings.newton, exact=True)
+        if turn(state, aside) > self.settings.angle:
+            raise ConvergenceError("another branch was met right beside the branch point")
+        return low, aside
+
+    def _may_turn(self, trial: Trial, residual) -> bool:
+        """Whether the primary parameter is so near to turning that an approximate tangent may have the wrong sign."""
+        at = trial.system.parameter_index(self.primary)
+        component = abs(trial.tangent[at])
+        return component < _STEEP and not abs(tangent_error(trial, residual)[at]) < _DOUBT * component
+
     def _exact_tangent(self, state: State):
         """The tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""
         row = state.system.weights * state.tangent
         tangent = self._tangent(state.system, state.x, row)
         return tangent if np.all(np.isfinite(tangent)) else state.tangent
 
-    def _connected(self, state: State, trial: Trial, step: float) -> bool:
-        """Whether a change of the determinant's sign comes from a branch point: without one, Newton left the branch."""
-        if state.singular or not self.settings.branch_points or not sign_changed(state.sign, trial.sign):
+    def _simple(self, segment: Segment) -> bool:
+        """Whether a step stays on its branch, and passes one branch point at most, which can be located; notes how many.
+
+        Without one, a change of the determinant's sign means that Newton left the branch.
+        """
+        if not segment.steady():
+            return False
+        if not self.settings.branch_points:
             return True
-        return self._segment(state, trial, step).crossing().name != "possible"
+        trial = segment.trial
+        trial.passed, clear = self._passed(segment)
+        if trial.passed > 1 or not clear:
+            return False
+        return not sign_changed(segment.before.sign, trial.sign) or segment.crossing().name != "possible"
 
-    def _segment(self, state: State, trial: Trial, step: float) -> Segment:
-        return Segment(state, trial, step, self.settings, self.start, self._factors and self._factors[1])
+    def _passed(self, segment: Segment) -> tuple[int, bool]:
+        """How many branch points the step passes, by :func:`crossings` (the determinant sees the parity only).
 
-    def _passed(self, state: State, trial: Trial) -> tuple[int, bool]:
-        """How many branch points the step passes, by :func:`crossings` (the determinant sees the parity only)."""
-        if state.singular or not self.settings.branch_points:
+        Factors from Newton's last iterates do where nothing happens; the rest is decided by those right at both ends.
+        """
+        state, before, trial = segment.state, segment.before, segment.trial
+        system, rows = state.system, (state.system.weights * state.tangent,)
+        if before.factors is None:
+            before.factors = system.linearize(before.x, rows)[1]
+        if before.sign == trial.sign and calm(quotients(before.factors, trial.factors, system.size)):
             return 0, True
-        if self._factors is None or self._factors[0] is not state.system:
-            self._factors = (state.system, state.system.linearize(state.x, (state.system.weights * state.tangent,))[1])
-        return crossings(self._factors[1], trial.factors, state.system.size)
+        before.factors = system.linearize(before.x, rows)[1]
+        if not trial.exact:
+            trial.factors, trial.exact = system.linearize(trial.x, rows)[1], True
+            trial.sign = trial.factors.sign
+        return crossings(quotients(before.factors, trial.factors, system.size))
 
     def _accept(self, state: State, trial: Trial, step: float, distance: float) -> State:
         """The next state, its step chosen so that the predictor's error is ``accuracy`` of it."""
@@ -263,9 +322,13 @@ class Continuation:
         except ConvergenceError:
             return  # the old mesh still serves; the step control will notice if it does not
         _, factors = system.linearize(done.x, (row,))
-        tangent = unit_tangent(system, factors)
+        end = Trial(system, done.x, unit_tangent(system, factors), factors.sign, factors=factors, exact=True)
+        before = self._before(state, state.step)[1]
+        if any(np.sign(before.value(monitor)) != np.sign(end.value(monitor)) for monitor in self._comparable):
+            return  # an event would fall between the meshes; the next point will do as well
+        self._end = end
         self.state = dataclasses.replace(
-            state, system=system, x=done.x, tangent=tangent, previous_tangent=previous, sign=factors.sign
+            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, sign=end.sign
         )
 
     # --- what comes out ------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import numpy as np
 from contin.errors import ConvergenceError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Monitor:
     """A function of a trial point whose sign changes are events.
 
@@ -28,6 +28,8 @@ class Monitor:
         ``confirm(trial) -> bool`` at the located point: False drops the event (a sign change of another cause).
     describe : callable, optional
         ``describe(trial)`` at the located point gives the ``details`` of the event.
+    limit : bool
+        Whether the run must not go where the function is positive: a start on the limit, too, is left inwards only.
     """
 
     label: str
@@ -36,20 +38,32 @@ class Monitor:
     terminal: bool = False
     confirm: Callable[[Trial], bool] | None = None
     describe: Callable[[Trial], object] | None = None
+    limit: bool = False
+
+    def passed(self, before: float, after: float) -> bool:
+        """Whether there is an event between two neighbouring points where the function has these values."""
+        return after >= 0 if self.limit else sign_changed(before, after)
 
 
 class Trial:
     """A corrected point as monitors see it: ``trial["mu"]``, ``trial.tangent``, ``trial.sign`` (of the determinant).
 
-    ``factors`` is the factorization that the tangent came from, ``passed`` the number of branch points since the last point,
-    ``crossing`` the one that was located on the way here.
+    ``factors`` is the factorization that the tangent came from, ``exact`` says that it was taken right at x and not at the
+    iterate before; ``passed`` is the number of branch points since the last point, ``crossing`` the one that was located on
+    the way here.
     """
 
-    def __init__(self, system, x, tangent, sign, iterations=0, newton_error=0.0, factors=None):
-        self.factors, self.passed, self.crossing = factors, 0, None
+    def __init__(self, system, x, tangent, sign, iterations=0, newton_error=0.0, factors=None, exact=False):
+        self.factors, self.exact, self.passed, self.crossing = factors, exact, 0, None
         self.system, self.x, self.tangent, self.sign = system, x, tangent, sign
         self.iterations, self.newton_error = iterations, newton_error
-        self._functionals = None
+        self._functionals, self._values = None, {}
+
+    def value(self, monitor: Monitor) -> float:
+        """The monitor's value here, computed once: a point that two steps share has one value for both."""
+        if monitor not in self._values:
+            self._values[monitor] = float(monitor.function(self))
+        return self._values[monitor]
 
     @property
     def functionals(self) -> dict[str, float]:
@@ -72,9 +86,9 @@ def user_zero(name: str, value: float) -> Monitor:
     return Monitor("UZ", f"{name} = {value:g}", lambda trial: trial[name] - value)
 
 
-def limit(name: str, value: float) -> Monitor:
-    """The end of a run where a parameter or functional reaches a value."""
-    return Monitor("EP", f"{name} = {value:g}", lambda trial: trial[name] - value, terminal=True)
+def limit(name: str, value: float, side: int) -> Monitor:
+    """The end of a run where a parameter or functional rises (``side`` +1) or falls (-1) to a value."""
+    return Monitor("EP", f"{name} = {value:g}", lambda trial: side * (trial[name] - value), terminal=True, limit=True)
 
 
 def fold(name: str) -> Monitor:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +19,20 @@ from contin.switching import MultiplePoint, along, inner, locate_branch_point, s
 
 #: A component of the unit tangent below this at both ends of a step is zero: its sign says nothing.
 _ROUND_OFF = 1e-9
+#: An event of the first step, this close to where it began (as a part of the step), is the first point itself.
+_AT_START = 1e-6
+#: A monitor is zero at the first point of a run where it is smaller by this factor than at the next.
+_ON_ZERO = 1e-8
+#: A change of a parameter below this, relative to 1 + its size, may be round-off.
+_STANDS = 1e-11
+#: A slope that sinks to this part of its values at the ends may pass zero.
+_SHALLOW = 0.5
+#: The search for a smallest slope goes on while it lowers it to this part at least.
+_DEEPER = 0.5
+#: A slope at one end below this part of what it would be at the other, were the parabola's vertex at this one, is near zero.
+_BESIDE = 0.05
+#: How far outside a step a branch point may be found that changes the determinant's sign inside it (as a part of the step).
+_OUTSIDE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,53 +54,49 @@ class Segment:
     Parameters
     ----------
     state : State
+    before : Trial
+        Where monitors start from: the state's point or, where that is a branch point, one close to it.
+    low : float
+        Place of ``before`` along the state's tangent.
     trial : Trial
         The end, at ``step`` along the state's tangent.
     settings : Settings
     start : tuple (system, x, tangent)
         The first point of the run, to recognise a closed branch.
-    factors : optional
-        Factorization at the state, for points where several branch points fall together.
+    fold : Monitor, optional
+        What vanishes where the primary parameter, its name, turns round.
     """
 
-    def __init__(self, state: State, trial: Trial, step: float, settings: Settings, start, factors=None):
-        self.state, self.trial, self.step, self.settings, self.start, self.factors = (
-            state,
-            trial,
-            step,
-            settings,
-            start,
-            factors,
-        )
-        self.before = Trial(state.system, state.x, state.tangent, state.sign)
+    def __init__(self, state, before, low, trial, step, settings, start, fold=None):
+        self.state, self.before, self.low, self.trial, self.step = state, before, low, trial, step
+        self.settings, self.start, self.fold = settings, start, fold
 
     def events(self, monitors) -> list[Event]:
         """What happens in the step, in order."""
         found, state, trial = [], self.state, self.trial
-        if not state.singular:
-            home = self._returned()
-            if home is not None:
-                found.append(home)
-            elif self.settings.branch_points and sign_changed(state.sign, trial.sign):
-                found.append(self.crossing())
-            elif trial.passed > 1:
-                found.append(self._multiple_point())
-            for monitor in monitors:
-                if self._changes(monitor):
-                    event = self._locate(monitor)
-                    if monitor.confirm is None or monitor.confirm(event.trial):
-                        found.append(event)
-            found = [event for event in found if not _same_place(event, found, self.step)]
+        home = None if state.singular else self._returned()
+        if home is not None:
+            found.append(home)
+        elif self.settings.branch_points and sign_changed(self.before.sign, trial.sign):
+            found.append(self.crossing())
+        elif trial.passed > 1:
+            found.append(self._multiple_point())
+        for monitor in monitors:
+            found += self._zeros(monitor)
+        found += [event for event in self.turns if not _same_place(event, found, self.step)]
+        found = [event for event in found if not self._at_the_start(event)]
         closed = self._closed()
         if closed is not None:
             found.append(closed)
         return sorted(found, key=lambda event: event.at)
 
-    def _corrected(self, guess, at, exact) -> Trial:
-        return corrected(self.state, guess, at, self.settings.newton, exact)
+    def _at_the_start(self, event: Event) -> bool:
+        """Whether an event is the first point of the run once more."""
+        return self.state.accepted == 0 and event.stop is None and event.at < _AT_START * self.step
 
-    def _at(self, at, exact=True) -> Trial:
-        return self._corrected(self._between(at), at, exact)
+    def _at(self, at) -> Trial:
+        """The point of the curve at this place along the state's tangent, with its exact tangent and factors."""
+        return corrected(self.state, self._between(at), at, self.settings.newton, exact=True)
 
     def _between(self, at):
         """A guess on the curve by the cubic through both ends and their tangents."""
@@ -95,30 +107,122 @@ class Segment:
         a, b = state.tangent * step, trial.tangent * rate
         return state.x + s * a + s**2 * (3 * ahead - 2 * a - b) + s**3 * (a + b - 2 * ahead)
 
-    def _changes(self, monitor) -> bool:
-        """Whether a monitor passes zero in the step; one of the tangent is looked at again with the exact ones."""
-        if not sign_changed(monitor.function(self.before), monitor.function(self.trial)):
-            return False
-        if monitor.label != "LP":
-            return True
-        ends = self._corrected(self.state.x, 0.0, exact=True), self._corrected(self.trial.x, self.step, exact=True)
-        values = [monitor.function(end) for end in ends]
-        return sign_changed(*values) and max(map(abs, values)) > _ROUND_OFF
+    @functools.cached_property
+    def turns(self) -> list[Event]:
+        """Places inside the step where the primary parameter turns round, in order."""
+        return [] if self.fold is None else self._turns_between((self.low, self.before), (self.step, self.trial))
 
-    def _locate(self, monitor: Monitor):
-        """The zero of a monitor inside a step; where location fails, the nearer end, named "possible"."""
-        trial, step = self.trial, self.step
-        exact = monitor.label == "LP"
-        ends = monitor.function(self.before), monitor.function(trial)
-        name = monitor.name
+    def _turns_between(self, left, right) -> list[Event]:
+        """Turns between two places (s, trial): where the tangent's component changes sign, once or, in a dip, twice."""
+        ends = [trial.value(self.fold) for _, trial in (left, right)]
+        if max(map(abs, ends)) < _ROUND_OFF:
+            return []
+        if sign_changed(*ends):
+            return [self._locate(self.fold, left, right)]
+        dip = self._dip(left, right)
+        return [] if dip is None else self._turns_between(left, dip) + self._turns_between(dip, right)
+
+    def _slope(self, trial: Trial) -> float:
+        """Rate of the primary parameter along the state's tangent."""
+        return trial.value(self.fold) / inner(self.state.system, self.state.tangent, trial.tangent)
+
+    def _dip(self, left, right):
+        """A place (s, trial) between two of equal slopes where the slope has the other sign; None if there is none.
+
+        The smallest slope is looked for, where there is reason to, by parabolas through three places so close together that the
+        slope doubles from one to the next if it is smallest in the first: closer and closer as it sinks.
+        """
+        sense = float(np.sign(self._slope(left[1])) or np.sign(self._slope(right[1])))
+        place, square = self._suspect(left, right, sense)
+        lowest = np.inf
+        while place is not None:
+            there = place[1]
+            value = sense * self._slope(there)
+            if value <= 0:
+                return place
+            if value > _DEEPER * lowest:
+                return None
+            lowest, apart = value, np.sqrt(value / square)
+            if place[0] + 2 * apart >= right[0]:
+                apart = -apart
+            if place[0] + 2 * apart < left[0]:
+                return None
+            near = [(s, self._at(s)) for s in (place[0] + apart, place[0] + 2 * apart)]
+            values = [sense * self._slope(trial) for _, trial in near]
+            if min(values) <= 0:
+                return near[int(np.argmin(values))]
+            bend = values[1] - 2 * values[0] + value
+            if not bend > 0:
+                return None
+            s = place[0] + apart * (0.5 - (values[0] - value) / bend)
+            place = (s, self._at(s)) if left[0] < s < right[0] else None
+        return None
+
+    def _suspect(self, left, right, sense):
+        """A place (s, trial) between two where the slope could come near zero, or None, and half its second derivative.
+
+        Slopes at both ends and the mean slope between them, from the parameter itself, make a parabola: its vertex. Where that
+        lies outside, but the slope at one end is close to zero already: that end.
+        """
+        (a, start), (b, end) = left, right
+        first, last = sense * self._slope(start), sense * self._slope(end)
+        at, width = self.trial.system.parameter_index(self.fold.name), b - a
+        mean = sense * (end.x[at] - start.x[at]) / width
+        linear, square = 6 * mean - 4 * first - 2 * last, 3 * first + 3 * last - 6 * mean
+        smaller = min(first, last)
+        if 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * smaller:
+            s = a - width * linear / (2 * square)
+            return (s, self._at(s)), square / width**2
+        inwards = linear if first < last else -linear - 2 * square
+        beside = smaller < _BESIDE * square and inwards < _SHALLOW * square
+        return (left if first < last else right) if beside else None, square / width**2
+
+    def steady(self) -> bool:
+        """Whether the primary parameter goes, between its turns, the way that the tangents say; if not, the branch was left."""
+        if self.fold is None:
+            return True
+        knots = [self.before, *(turn.trial for turn in self.turns), self.trial]
+        at = self.trial.system.parameter_index(self.fold.name)
+        sense = np.sign(self.before.value(self.fold))
+        for left, right in itertools.pairwise(knots):
+            if sense * (right.x[at] - left.x[at]) < -_STANDS * (1 + abs(right.x[at])):
+                return False
+            sense = -sense
+        return True
+
+    def _zeros(self, monitor: Monitor) -> list[Event]:
+        """Zeros of a monitor inside the step, looked for between the places where the primary parameter turns."""
+        state, found = self.state, []
+        first = Trial(state.system, state.x, state.tangent, state.sign) if state.singular else self.before
+        knots = [(0.0, first), *((event.at, event.trial) for event in self.turns), (self.step, self.trial)]
+        for left, right in itertools.pairwise(knots):
+            before, after = left[1].value(monitor), right[1].value(monitor)
+            if state.accepted == 0 and left[0] == 0 and abs(before) < _ON_ZERO * abs(after):
+                before = 0.0  # the first point lies on the zero
+            if not monitor.passed(before, after):
+                continue
+            event = self._locate(monitor, left, right)
+            if monitor.confirm is None or monitor.confirm(event.trial):
+                found.append(event)
+            if monitor.terminal:
+                break
+        return found
+
+    def _locate(self, monitor: Monitor, left, right) -> Event:
+        """The zero of a monitor between two places (s, trial); where location fails, the further one, named "possible"."""
+        (a, first), (b, last) = left, right
+        ends, name = (first.value(monitor), last.value(monitor)), monitor.name
         try:
-            at = find_zero(lambda s: monitor.function(self._at(s, exact)), 0.0, ends[0], step, ends[1], 1e-12 * step)
-            there = self._at(at)
+            if ends[0] * ends[1] > 0 or ends[0] == 0:  # a limit that the run starts on
+                at, there = a, first
+            else:
+                at = find_zero(lambda s: monitor.function(self._at(s)), a, ends[0], b, ends[1], 1e-12 * self.step)
+                there = self._at(at)
         except ConvergenceError:
-            at, there, name = step, trial, f"possible {monitor.name}"
+            at, there, name = b, last, f"possible {monitor.name}"
         stop = None
         if monitor.terminal:
-            stop = Stop("limit", f"reached {monitor.name}") if monitor.label == "EP" else Stop("event", f"met {monitor.name}")
+            stop = Stop("limit", f"reached {monitor.name}") if monitor.limit else Stop("event", f"met {monitor.name}")
         details = None if monitor.describe is None else monitor.describe(there)
         return Event(at, monitor.label, name, there, stop, details, monitor)
 
@@ -131,24 +235,25 @@ class Segment:
     def _branch_point(self) -> Event:
         """The branch point inside a step, its bracket halved until the locator's answer lies inside it."""
         state, trial, step = self.state, self.trial, self.step
-        low, high = 0.0, step
+        low, high = self.low, step
         for _ in range(12):
             middle = (low + high) / 2
             try:
                 found = locate_branch_point(state.system, self._between(middle), self.settings.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
-                off = found.x - self._between(at)
+                gap = found.x - self._between(at)
+                off = np.sqrt(inner(state.system, gap, gap))
                 found = along(state.system, found, trial.x - state.x)
-                if -1e-9 * step <= at <= step * (1 + 1e-9) and np.sqrt(inner(state.system, off, off)) < 0.1 * step:
+                if self.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE) and off < 0.1 * step:
                     there = Trial(state.system, found.x, np.full_like(found.x, np.nan), np.nan)
                     return Event(at, "BP", "", there, details=found)
             except ConvergenceError:
                 pass
             try:
-                sign = self._at(middle, exact=False).sign
+                sign = self._at(middle).sign
             except ConvergenceError:
                 break
-            low, high = (middle, high) if sign == state.sign else (low, middle)
+            low, high = (middle, high) if sign == self.before.sign else (low, middle)
         return Event(high, "BP", "possible", trial)
 
     def _multiple_point(self):
@@ -164,13 +269,13 @@ class Segment:
 
         at, there = step, trial
         with contextlib.suppress(ConvergenceError, np.linalg.LinAlgError):
-            ends = mean(self.factors), mean(trial.factors)
+            ends = mean(self.before.factors), mean(trial.factors)
             if sign_changed(*ends):
 
                 def inside(s):
                     return mean(self._at(s).factors)
 
-                at = find_zero(inside, 0.0, ends[0], step, ends[1], 1e-9 * step)
+                at = find_zero(inside, self.low, ends[0], step, ends[1], 1e-9 * step)
                 there = self._at(at)
         right, _, response = smallest_directions(there.factors, system.size)
         u, values, _ = np.linalg.svd(response)
@@ -185,10 +290,10 @@ class Segment:
         if name is None or not sign_changed(before[name], trial[name]):
             return None
         stop = Stop("trivial branch", f"returned to the trivial branch ({name} = 0)")
-        event = self.crossing() if self.settings.branch_points else None
-        if event is None or abs(event.trial[name]) > 1e-6 * max(abs(before[name]), abs(trial[name])):
+        event = self.crossing()
+        if abs(event.trial[name]) > 1e-6 * max(abs(before[name]), abs(trial[name])):
             monitor = Monitor("EP", "trivial branch", lambda there: there[name], terminal=True)
-            event = self._locate(monitor)
+            event = self._locate(monitor, (0.0, before), (self.step, trial))
         return dataclasses.replace(event, label="EP", name="trivial branch", stop=stop)
 
     def _closed(self):

@@ -12,6 +12,8 @@ from contin.switching import inner
 
 #: Share of the states in a tangent below which their direction says nothing.
 _STILL = 0.01
+#: Distance over which a difference of residuals stands for the product of Jacobian and tangent.
+_NEAR = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +60,35 @@ def corrected(state: State, guess, step: float, newton: Newton, exact: bool = Fa
     system = state.system
     row = system.weights * state.tangent
     done = correct(system, guess, row, row @ state.x + step, newton)
-    factors = system.linearize(done.x, (row,))[1] if exact else done.factors
+    tangent = unit_tangent(system, done.factors)
+    trial = Trial(system, done.x, tangent, done.factors.sign, done.iterations, done.error, done.factors)
+    return sharpened(state, trial) if exact else trial
+
+
+def sharpened(state: State, trial: Trial) -> Trial:
+    """The same point with factors and tangent taken right there (Newton leaves those of an iterate before)."""
+    system = state.system
+    factors = system.linearize(trial.x, (system.weights * state.tangent,))[1]
     tangent = unit_tangent(system, factors)
-    return Trial(system, done.x, tangent, factors.sign, done.iterations, done.error, factors)
+    return Trial(system, trial.x, tangent, factors.sign, trial.iterations, trial.newton_error, factors, exact=True)
+
+
+def tangent_error(trial: Trial, residual):
+    """About by how much a trial's tangent misses the one right at its x, where the residual is this: shape (size,).
+
+    One step of iterative refinement, with the product of Jacobian and tangent by a difference.
+    """
+    system = trial.system
+    bent = (system.residual(trial.x + _NEAR * trial.tangent) - residual) / _NEAR
+    return trial.factors.solve(np.append(bent, 0.0))
+
+
+def hidden_turn(state: State, trial: Trial) -> float:
+    """The angle by which the cubic through both ends of a step, along their tangents, turns away from them in its middle."""
+    system = state.system
+    chord, mean = trial.x - state.x, state.tangent + trial.tangent
+    across = chord - (inner(system, chord, mean) / inner(system, mean, mean)) * mean
+    return float(1.5 * np.sqrt(inner(system, across, across) / inner(system, chord, chord)))
 
 
 def turn(state: State, trial: Trial) -> float:

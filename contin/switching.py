@@ -133,28 +133,45 @@ def smallest_directions(factors, size, count: int = _WATCHED):
     return right, left, right.T @ solved
 
 
-#: Factor by which a watched singular value may shrink in one step without passing zero.
+#: Factor by which a watched singular value may shrink in one step without passing zero, ...
 _SHRINKS = 3.5
+#: ... with passing zero (beyond it the zero lies at the very end, on neither side for certain), ...
+_VANISHES = 1e4
+#: ... and so that factors from a nearby iterate cannot mistake the one for the other.
+_CALM = 2.0
 
 
-def crossings(before, after, size) -> tuple[int, bool]:
-    """How many singular values pass zero between two neighbouring matrices, from their factors, and whether that is clear.
+def quotients(before, after, size):
+    """How the smallest singular values change between two neighbouring matrices, from their factors: shape (watched,), complex.
 
-    In the directions in which ``after`` is nearest to singular, J^-1 of the two is compared: each passage turns one eigenvalue
-    of the quotient negative. A determinant sees the parity only; two modes that cross together, or two branch points in one
-    step, are seen here. Where a watched value shrinks by a large factor, others may have passed behind it: that is not clear.
+    In the directions in which ``after`` is nearest to singular, J^-1 of the two is compared: each passage of a singular value
+    through zero turns one eigenvalue of the quotient negative. A determinant sees the parity only; two modes that cross
+    together, or two branch points in one step, are seen here. NaN where a matrix is exactly singular.
     """
     with np.errstate(all="ignore"):
         right, left, response = smallest_directions(after, size)
         earlier = right.T @ np.array([before.solve(w) for w in left.T]).T
         if not (np.all(np.isfinite(response)) and np.all(np.isfinite(earlier))):
-            return 0, True
+            return np.full(len(response), np.nan)
         try:
-            values = np.linalg.eigvals(np.linalg.solve(earlier, response))
-        except np.linalg.LinAlgError:  # exactly singular: nothing can be told, smaller steps will
-            return 0, False
+            return np.linalg.eigvals(np.linalg.solve(earlier, response))
+        except np.linalg.LinAlgError:
+            return np.full(len(response), np.nan)
+
+
+def calm(values) -> bool:
+    """Whether no singular value comes anywhere near zero, so that quotients of approximate factors are good enough."""
+    return bool(np.all((values.real > 0) & (np.abs(values) < _CALM)))
+
+
+def crossings(values) -> tuple[int, bool]:
+    """How many singular values pass zero, from their :func:`quotients`, and whether that is clear.
+
+    Where a watched value shrinks by a large factor, others may have passed behind it: that is not clear.
+    """
     passed = (values.real < 0) & (np.abs(values.imag) < np.abs(values.real))
-    return int(np.count_nonzero(passed)), not np.any(~passed & (np.abs(values) > _SHRINKS))
+    clear = np.abs(values) < np.where(passed, _VANISHES, _SHRINKS)
+    return int(np.count_nonzero(passed)), bool(np.all(clear))
 
 
 def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: int = 12) -> BranchPoint:
