@@ -10,6 +10,7 @@ another file is never missed.
 from __future__ import annotations
 
 import builtins
+import dis
 import hashlib
 import importlib.util
 import inspect
@@ -141,10 +142,10 @@ class _Prepared:
     def _copy(self, function: types.FunctionType) -> types.FunctionType:
         """The function with everything that it refers to made ready, its fingerprint taken on the way."""
         code = function.__code__
-        names = self._code(code)
+        names, loaded = self._code(code)
         self.note(function.__defaults__, function.__kwdefaults__)
         globals_ = {"__name__": __name__, "__builtins__": __builtins__}  # numba imports the module of that name
-        for name in sorted(names):
+        for name in sorted(loaded):
             if name in function.__globals__:
                 globals_[name] = self._value(function.__globals__[name], names)
             elif name in ("abs", "max", "min"):
@@ -154,16 +155,27 @@ class _Prepared:
         copy.__kwdefaults__ = function.__kwdefaults__
         return copy
 
-    def _code(self, code: types.CodeType) -> set[str]:
-        """Take the fingerprint of a code object and of those inside it; the names that they use."""
+    def _code(self, code: types.CodeType) -> tuple[set[str], set[str]]:
+        """Take the fingerprint of a code object and of those inside it; the attributes and the globals that they use.
+
+        A state may have the name of a global (``u.f`` in a function ``f``): the instructions tell the two apart. Attributes of
+        local variables are states and parameters and do not count.
+        """
         self.note(code.co_code, code.co_names, code.co_varnames)
-        names = set(code.co_names)
+        names, loaded, before = set(), set(), ""
+        for step in dis.get_instructions(code):
+            if step.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+                loaded.add(step.argval)
+            elif step.opname in ("LOAD_ATTR", "LOAD_METHOD") and not before.startswith("LOAD_FAST"):
+                names.add(step.argval)
+            before = step.opname
         for constant in code.co_consts:
             if isinstance(constant, types.CodeType):
-                names |= self._code(constant)
+                inner_names, inner_loaded = self._code(constant)
+                names, loaded = names | inner_names, loaded | inner_loaded
             else:
                 self.note(constant)
-        return names
+        return names, loaded
 
     def _value(self, value: object, names: set[str]) -> object:
         """The stand-in for a global or closure value inside the compiled code."""

@@ -191,3 +191,16 @@ def test_a_function_that_calls_itself_is_refused():
 
     with pytest.raises(ProblemError, match="calls itself"):
         BoundaryValueProblem(rhs, boundary, ["u", "v"], {"k": 1.0}).batch("field")
+
+
+def f(t, u, p):
+    return u.f * p.helper, helper(u.math) + math.exp(p.np)
+
+
+def test_states_and_parameters_may_have_the_names_of_globals():
+    """A state named like the function itself, parameters named like a function and a module that it uses."""
+    problem = BoundaryValueProblem(
+        f, lambda a, b, p: (a.f - 1, a.math), ["f", "math"], {"helper": 2.0, "np": 0.0}, functionals={"g": lambda t, u, p: u.f}
+    )
+    values = problem.batch("field").values(np.zeros(1), np.array([[3.0, 0.0]]), np.empty((0, 2)), np.array([2.0, 0.0]))
+    assert values[0].tolist() == [6.0, 2.0]
