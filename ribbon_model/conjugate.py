@@ -1,15 +1,15 @@
 """The index of an equilibrium by conjugate points: Jacobi fields integrated along the loop, no basis functions.
 
-Rigid motions do not matter, so E = (theta, w) may be fixed to zero at S = 0, and then also at S = L: what is left is the index of
-a problem with fixed ends, which is the number of conjugate points in (0, L) (Morse). With p the momentum of E, Jacobi fields
+Rigid motions do not matter, so E = (theta, w) may be fixed to zero at S = 0, and then also at S = L: what is left is the index
+of a problem with fixed ends, which is the number of conjugate points in (0, L) (Morse). With p the momentum of E, Jacobi fields
 obey the Hamiltonian system
 
     E' = A pi,   p' = N A pi / 2,   pi = p + N E / 2,   A = G G^T,
 
 and a conjugate point is where the plane of the six fields with E(0) = 0 has a vector with E = 0. That plane is Lagrangian: the
-eigenvalues exp(2 i alpha_k) of W = (p + i E)(p - i E)^-1 lie on the unit circle, begin at alpha_k = 0, leave upwards, and pass a
-multiple of pi upwards at each conjugate point and nowhere else. So the index is the sum of ceil(alpha_k(L) / pi) - 1, got from
-one continuous angle, the sum of the alpha_k = arg det(p + i E), and the eigenvalues of W at the end. The plane is made
+eigenvalues exp(2 i alpha_k) of W = (p + i E)(p - i E)^-1 lie on the unit circle. They begin at alpha_k = 0, leave upwards, and
+pass a multiple of pi upwards at each conjugate point and nowhere else. So the index is the sum of ceil(alpha_k(L)/pi) - 1, got
+from one continuous angle, the sum of the alpha_k = arg det(p + i E), and the eigenvalues of W at the end. The plane is made
 orthonormal again on the way, which changes neither.
 """
 
@@ -34,8 +34,8 @@ class ConjugatePoints:
     distance : float
         How far alpha_k(L) stays from a multiple of pi, the shift of phase left out: zero where a further mode is neutral.
     defect : float
-        The largest of: distance of the count from a whole number, of the shift of phase from the plane of Jacobi fields, gap
-        of the frame and centreline at the end.
+        The largest of: distance of the count from a whole number, of the shift of phase from the plane of Jacobi fields, gaps
+        of the frame between segments and of the centreline at the end.
     decided : bool
         Whether ``distance`` exceeds a hundred times the defect.
     """
@@ -49,7 +49,8 @@ class ConjugatePoints:
 def conjugate_index(equilibrium: Equilibrium, tolerance: float = 1e-10) -> ConjugatePoints:
     """Number of negative directions of the energy of a closed equilibrium, by conjugate points.
 
-    The equilibrium is integrated anew from its frame, moment and force at S = 0.
+    The equilibrium is integrated along with the Jacobi fields, in segments that begin with its own frame, lest the instability
+    of the initial value problem should carry it away.
 
     Parameters
     ----------
@@ -64,19 +65,17 @@ def conjugate_index(equilibrium: Equilibrium, tolerance: float = 1e-10) -> Conju
     from scipy.integrate import solve_ivp
 
     flow = _Flow(equilibrium)
-    frame, centreline, plane, angle = equilibrium.directors(np.zeros(1))[0], np.zeros(3), np.eye(12)[:, 6:], 0.0
-    start = frame.copy()
-    segments = 8 * max(2, equilibrium.symmetry.order)
-    for k in range(segments):
-        y = np.concatenate([frame.ravel(), centreline, plane.ravel(), [angle]])
-        span = (LENGTH * k / segments, LENGTH * (k + 1) / segments)
+    centreline, plane, angle, gap = np.zeros(3), np.eye(12)[:, 6:], 0.0, 0.0
+    ends = np.linspace(0, LENGTH, 8 * max(2, equilibrium.symmetry.order) + 1)
+    frames = equilibrium.directors(ends)
+    for span, start, end in zip(zip(ends[:-1], ends[1:]), frames[:-1], frames[1:]):
+        y = np.concatenate([start.ravel(), centreline, plane.ravel(), [angle]])
         done = solve_ivp(flow, span, y, method="DOP853", rtol=tolerance, atol=tolerance / 10, first_step=span[1] - span[0])
         if not done.success:
             raise RuntimeError(f"the Jacobi fields could not be integrated: {done.message}")
         frame, centreline, plane, angle = _split(done.y[:, -1])
-        plane = np.linalg.qr(plane)[0]
-    gap = max(np.abs(frame - start).max(), np.abs(centreline).max())
-    return _count(plane, angle, flow.phase_shift(start), gap)
+        plane, gap = np.linalg.qr(plane)[0], max(gap, np.abs(frame - end).max())
+    return _count(plane, angle, flow.phase_shift(frames[0]), max(gap, np.abs(centreline).max()))
 
 
 def _split(y):
@@ -104,7 +103,10 @@ class _Flow:
         return np.concatenate([(frame @ spin.T).ravel(), frame[2], rate.ravel(), momentum_rate.ravel(), [turning]])
 
     def phase_shift(self, frame):
-        """Momentum at S = L of the Jacobi field theta = omega, E = (omega, omega x x - d3) up to a rigid motion; zero on circles."""
+        """Momentum at S = L of the Jacobi field of the shift of phase: E = (omega, omega x x - d3) and a rigid motion.
+
+        It is zero on circles, where the shift is a rigid motion itself.
+        """
         strain, compliance = self.equilibrium.response((frame @ self.moment)[None])
         E = np.concatenate([strain[0] @ frame, -frame[2]])
         return self.coupling @ E

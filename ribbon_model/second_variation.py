@@ -2,8 +2,8 @@
 
 The frame is perturbed by a rotation theta(S), components on the lab axes, periodic because a closed frame is: whether the
 quaternion comes back to itself or to its negative plays no part. With u = theta', the strains change by u on the directors, so
-omega_2 = 0 asks for u . d2 = 0, and the loop stays closed if the means of u and of w' = u x x vanish (w is minus the displacement,
-up to theta x x). With K = D2H = C C^T, u = sum of d_a (C v)_a, E = (theta, w) in R^6, and the constant
+omega_2 = 0 asks for u . d2 = 0; x changes by theta x x - w with w' = u x x, so the loop stays closed if the means of u and w'
+vanish. With K = D2H = C C^T, u = sum of d_a (C v)_a, E = (theta, w) in R^6, and the constant
 
     N = [[mu x, -R x], [-R x, 0]],   mu = M + x x R,
 
@@ -98,7 +98,13 @@ def cross_matrix(a) -> np.ndarray:
 
 
 def circle(law: Law, nu: float, m: int, kappa_n: float) -> Equilibrium:
-    """The planar m-covered circle."""
+    """The planar m-covered circle.
+
+    Raises
+    ------
+    ValueError
+        The law does not give the strain omega_1 = m there: the ribbon at kappa_n >= m / nu, nu > 0.
+    """
 
     def directors(stations):
         angle, zero, one = m * np.asarray(stations), np.zeros(len(stations)), np.ones(len(stations))
@@ -107,7 +113,13 @@ def circle(law: Law, nu: float, m: int, kappa_n: float) -> Equilibrium:
         return np.array([[zero, zero, one], normal, tangent]).transpose(2, 0, 1)
 
     moment = np.array([0.0, 0.0, m - kappa_n])
-    return Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), Symmetry(order=m, mirror=True))
+    found = Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), Symmetry(order=m, mirror=True))
+    strain = found.response(directors(np.zeros(1)) @ moment)[0][0]
+    if not np.abs(strain - [m, 0, 0]).max() < 1e-9 * m:
+        raise ValueError(
+            f"{law.name}: no {m}-covered circle at kappa_n = {kappa_n:g}, nu = {nu:g} on the root that the law takes"
+        )
+    return found
 
 
 def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:

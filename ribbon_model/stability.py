@@ -2,12 +2,12 @@
 
 The second variation (`ribbon_model.second_variation`) is the identity plus a compact form: in Fourier coefficients on the loop,
 
-    Q = sum over l of |v_l|^2 + sum over p != 0 of (1/p) e_p . (i N) e_p,     e = G v,   e_0 = 0.
+    Q = sum over l of |v_l|^2 + sum over p != 0 of (1/p) e_p . (i N) e_p,    e = G v,   e_0 = 0.
 
-It is taken on the v with |l| up to a cutoff. High wavenumbers cannot lower the energy, and raising the cutoff can only raise the
-count. A loop of ``order`` equal parts couples only wavenumbers that are equal modulo ``order``: one small matrix for each class
-j = 0 ... order/2, real if there is a mirror, in two where the mirror keeps the class. The six conditions e_0 = 0 and the shift of
-phase, whose vector C^T M' is known, are projected out. So no eigenvalue is zero but at a bifurcation.
+It is taken on the v with |l| up to a cutoff. High wavenumbers cannot lower the energy, and raising the cutoff can only raise
+the count. A loop of ``order`` equal parts couples only wavenumbers that are equal modulo ``order``: one small matrix for each
+class j = 0 ... order/2, real if there is a mirror, in two where the mirror keeps the class. The six conditions e_0 = 0 and the
+shift of phase, whose vector C^T M' is known, are projected out. So no eigenvalue is zero but at a bifurcation.
 
 Instead of S the variable is a tau that runs faster where the strip is more curved; that changes nothing but the cutoff needed.
 """
@@ -37,8 +37,8 @@ class SymmetryClass:
     Attributes
     ----------
     wavenumber : int
-        j: from one part of the loop to the next the perturbation gains the factor exp(2 pi i j / order), besides the motion that
-        takes one part to the next. j = 0 keeps the symmetry.
+        j: from one part of the loop to the next the perturbation gains the factor exp(2 pi i j / order), besides the motion
+        that takes one part to the next. j = 0 keeps the symmetry.
     parity : str
         'even' or 'odd' under the mirror at S = 0; '' where the mirror takes j to another class, or there is none.
     multiplicity : int
@@ -67,6 +67,11 @@ class SymmetryClass:
     def negative(self) -> int:
         """Number of negative eigenvalues, not multiplied."""
         return int(np.sum(self.eigenvalues < 0))
+
+    @property
+    def determinant(self) -> float:
+        """The product of the eigenvalues, which converges: analytic along a branch, also where eigenvalues cross each other."""
+        return float(np.prod(self.eigenvalues))
 
     @property
     def nearest(self) -> int:
@@ -113,7 +118,8 @@ def index(equilibrium: Equilibrium, accuracy: float | None = None) -> Stability:
     """Number of negative directions of the energy of a closed equilibrium.
 
     The cutoff is raised until, in every class, the eigenvalue nearest to zero moves by less than a quarter of its distance from
-    zero, and the known null vector leaves a residual below 1e-4.
+    zero and the count stays; the known null vector leaves a residual below 1e-3; and the wavenumbers left out are those that a
+    local estimate says cannot be unstable. Where that cannot be reached, or an eigenvalue is zero, the result is not decided.
 
     Parameters
     ----------
@@ -127,9 +133,9 @@ def index(equilibrium: Equilibrium, accuracy: float | None = None) -> Stability:
         without end, and there is no index.
     """
     form = _transformed(equilibrium)
-    levels = [a for a in _CUTOFFS if a >= form.bandwidth / 2][:-1] or _CUTOFFS[-2:]
-    coarse = form.classes(levels[0])
-    for cutoff in _CUTOFFS[_CUTOFFS.index(levels[0]) + 1 :]:
+    start = min(np.searchsorted(_CUTOFFS, max(form.bandwidth / 2, form.reach)), len(_CUTOFFS) - 2)
+    coarse = form.classes(_CUTOFFS[start])
+    for cutoff in _CUTOFFS[start + 1 :]:
         fine = form.classes(cutoff)
         result, settled = _compared(form, coarse, fine, cutoff, accuracy)
         if settled:
@@ -158,6 +164,8 @@ def _compared(form: _Form, coarse, fine, cutoff, accuracy) -> tuple[Stability, b
         classes.append(entry)
     if residual > _RESIDUAL:
         doubts.append(f"the shift of phase leaves a residual of {residual:.1e}")
+    if cutoff < form.reach:
+        doubts.append(f"wavenumbers up to {form.reach * form.order:.0f} may be unstable")
     if form.rank != 6:
         neutral.append(f"{form.rank} of the six conditions of closure are independent")
     total = sum(entry.multiplicity * entry.negative for entry in classes)
@@ -170,10 +178,11 @@ class _Form:
     """The second variation in Fourier coefficients, and its matrices.
 
     A coefficient of G from column c to row r, at the wavenumber r_shift - c_shift + order * k, is ``generator[k, r, c]``.
+    ``reach`` is the largest wavenumber, over order, at which a local estimate finds instability.
     """
 
-    def __init__(self, symmetry, generator, motion, coupling, rows, columns, signs, closure):
-        self.symmetry, self.order, self.closure = symmetry, symmetry.order, closure
+    def __init__(self, symmetry, generator, motion, coupling, rows, columns, signs, closure, reach):
+        self.symmetry, self.order, self.closure, self.reach = symmetry, symmetry.order, closure, reach / symmetry.order
         self.generator, self.motion, self.coupling = generator, motion, coupling
         self.rows, self.columns, self.signs = rows, columns, signs
         self.coupled = np.flatnonzero(np.abs(coupling).max(axis=0) > 1e-13 * np.abs(coupling).max())
@@ -181,6 +190,8 @@ class _Form:
         large = np.flatnonzero(size > 1e-3 * size.max())
         self.bandwidth = int(np.minimum(large, len(size) - large).max())
         self.rank = 0
+        if np.any(np.abs(coupling[(rows[:, None] - rows) % self.order != 0]) > 1e-6 * (1 + np.abs(coupling).max())):
+            raise ValueError("the moment and force do not have the symmetry that the frame has")
 
     def classes(self, cutoff):
         """(j, parity, multiplicity, eigenvalues, residual) of every class; counts the conditions of closure in ``rank``."""
@@ -355,4 +366,16 @@ def _form(equilibrium: Equilibrium, at: _Samples) -> _Form:
         generator = (row_phase[:, None] * generator * phase).real
         motion = (1j * motion / phase).real
         form = (row_phase[:, None] * form / row_phase).real
-    return _Form(symmetry, generator, motion, form, rows, columns, np.array([1, 1, -1])[free], at.closure)
+    return _Form(symmetry, generator, motion, form, rows, columns, np.array([1, 1, -1])[free], at.closure, _reach(at))
+
+
+def _reach(at: _Samples) -> float:
+    """The wavenumber above which waves on a short piece of the strip cost energy: from |M| and the compliance K there.
+
+    A wave of wavenumber l has theta ~ u/l, so N contributes M_2 |K| / l of the stiffness, and |M| |omega| |K| / l^2 in the next
+    order, which on a circle gives the threshold of the linear theory.
+    """
+    moment, curvature = np.linalg.norm(at.moment, axis=1), np.linalg.norm(at.strain, axis=1)
+    softness = np.linalg.norm(at.compliance, axis=(1, 2))
+    local = curvature**2 + moment * curvature * softness + (at.moment[:, 1] * softness) ** 2
+    return float((at.speed * np.sqrt(local)).max())
