@@ -29,7 +29,8 @@ class Point:
     iterations, newton_error : int, float
         Newton iterations taken, and the estimated error that they left (the largest, relative to 1 + |x|).
     errors : mapping of str to float
-        Estimated discretization error of the free parameters, where it was asked for.
+        Estimated error of the free parameters, where it was asked for: of the discretization or, without a mesh, of the
+        location alone. NaN where the point was not found again, and at points of higher codimension.
     details : object
         What the location found besides: the :class:`contin.switching.BranchPoint` of a BP.
     """

@@ -15,7 +15,7 @@ from contin.errors import ConvergenceError
 from contin.events import Monitor, Trial, find_zero, sign_changed
 from contin.settings import Settings
 from contin.steps import State, corrected
-from contin.switching import MultiplePoint, along, inner, locate_branch_point, smallest_directions
+from contin.switching import BranchPoint, MultiplePoint, along, inner, locate_branch_point, smallest_directions
 
 #: A component of the unit tangent below this at both ends of a step is zero: its sign says nothing.
 _ROUND_OFF = 1e-9
@@ -31,6 +31,10 @@ _SHALLOW = 0.5
 _DEEPER = 0.5
 #: A slope at one end below this part of what it would be at the other, were the parabola's vertex at this one, is near zero.
 _BESIDE = 0.05
+#: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
+_FAR = 0.05
+#: Cosine between the kernels of a branch point on two meshes, below which they are two points.
+_SAME_KERNEL = 0.9
 #: How far outside a step a branch point may be found that changes the determinant's sign inside it (as a part of the step).
 _OUTSIDE = 1e-6
 
@@ -338,34 +342,58 @@ def _same_place(event: Event, found: list[Event], step: float) -> bool:
 def refined(label: str, trial: Trial, details, monitor: Monitor | None, settings: Settings):
     """The same special point on a mesh halved until its free parameters agree to the mesh tolerance.
 
+    Without a mesh the point is found once more from where it is: what then changes is the error of its location. A point that
+    is not the coarse one again (far from it, another kernel, or further off than the mesh before) is dropped.
+
     Returns
     -------
     trial, errors, details
-        The last solution, by how much its free parameters differ from the one before, and its details.
+        The last solution, by how much its free parameters differ from the one before (NaN where it could not be found again),
+        and its details.
     """
     errors = dict.fromkeys(trial.system.free, np.nan)
     if isinstance(details, MultiplePoint):
         return trial, errors, details
+    singular = isinstance(details, BranchPoint) or (label == "BP" and monitor is None)
+    last = np.inf
     for _ in range(4):
-        coarse, finer = trial.system, trial.system.refined()
-        if finer is None:
-            return trial, dict.fromkeys(coarse.free, 0.0), details
-        system, carry = finer
+        coarse = trial.system
+        finer = coarse.refined()
+        system, carry = finer or (coarse, np.array)
         try:
-            if label == "BP" or not np.all(np.isfinite(trial.tangent)):
-                found = locate_branch_point(system, carry(trial.x), settings.newton)
-                details = along(system, found, carry(details.tangents[0])) if details and details.tangents else found
-                better = Trial(system, details.x, carry(trial.tangent), np.nan)
+            if singular:
+                better, found = _branch_point_again(system, carry, trial, details, settings)
             else:
-                better = _again(system, carry(trial.x), carry(trial.tangent), monitor, settings)
+                better, found = _again(system, carry(trial.x), carry(trial.tangent), monitor, settings), details
         except ConvergenceError:
             break
         steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
-        steps = np.maximum(steps, 16 * np.finfo(float).eps * (1 + np.abs(better.x[system.state_size :]).max()))
-        errors, trial = dict(zip(system.free, map(float, steps))), better
-        if np.all(steps <= settings.mesh.tolerance * (1 + np.abs(trial.x[system.state_size :]))):
+        size = 1 + np.abs(better.x[system.state_size :])
+        steps = np.maximum(steps, 16 * np.finfo(float).eps * size.max())
+        if np.any(steps > _FAR * size) or np.max(steps / size) > last:
+            break
+        errors, last = dict(zip(system.free, map(float, steps))), np.max(steps / size)
+        if finer is None:
+            break
+        trial, details = better, found
+        if np.all(steps <= settings.mesh.tolerance * size):
             break
     return trial, errors, details
+
+
+def _branch_point_again(system, carry, trial: Trial, details: BranchPoint | None, settings: Settings):
+    """The branch point with the same kernel on another mesh, and its details; the nearest one where none are known."""
+    if details is None:
+        found = locate_branch_point(system, carry(trial.x), settings.newton)
+        return Trial(system, found.x, carry(trial.tangent), np.nan), found
+    kernel = np.array([carry(vector) for vector in details.kernel])
+    found = locate_branch_point(system, carry(trial.x), settings.newton, kernel)
+    overlap = found.kernel @ (system.weights * kernel[:, : system.size]).T
+    if np.linalg.svd(overlap, compute_uv=False)[-1] < _SAME_KERNEL:
+        raise ConvergenceError("another branch point was found on the finer mesh")
+    if details.tangents:
+        found = along(system, found, carry(details.tangents[0]))
+    return Trial(system, found.x, carry(trial.tangent), np.nan), found
 
 
 def _again(system, x, tangent, monitor: Monitor | None, settings: Settings) -> Trial:

@@ -174,8 +174,19 @@ def crossings(values) -> tuple[int, bool]:
     return int(np.count_nonzero(passed)), bool(np.all(clear))
 
 
-def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: int = 12) -> BranchPoint:
+def locate_branch_point(
+    system, x, newton: Newton = Newton(), kernel: np.ndarray | None = None, max_iterations: int = 12
+) -> BranchPoint:
     """The branch point near x.
+
+    Parameters
+    ----------
+    system : Collocation or alike
+    x : ndarray, shape (size,)
+    newton : Newton
+    kernel : ndarray, shape (2, size), optional
+        About the kernel that it has, where several branch points are near by.
+    max_iterations : int
 
     Raises
     ------
@@ -183,7 +194,7 @@ def locate_branch_point(system, x, newton: Newton = Newton(), max_iterations: in
         None was found near x.
     """
     random = np.random.default_rng(20240501)
-    phi = _orthonormal(system, random.standard_normal((2, system.size)))
+    phi = _orthonormal(system, random.standard_normal((2, system.size)) if kernel is None else kernel)
     psi = random.standard_normal(system.equations) / np.sqrt(system.equations)
     x, beta, hessian, last = np.array(x, dtype=float), 0.0, None, np.inf
     with np.errstate(all="ignore"):
