@@ -30,6 +30,9 @@ class Monitor:
         ``describe(trial)`` at the located point gives the ``details`` of the event.
     limit : bool
         Whether the run must not go where the function is positive: a start on the limit, too, is left inwards only.
+    several : callable, optional
+        ``several(before, after) -> bool`` of two neighbouring trials: whether more than one event must lie between them. Such
+        steps are cut, and the function's sign is also looked at inside every step.
     """
 
     label: str
@@ -39,6 +42,7 @@ class Monitor:
     confirm: Callable[[Trial], bool] | None = None
     describe: Callable[[Trial], object] | None = None
     limit: bool = False
+    several: Callable[[Trial, Trial], bool] | None = None
 
     def passed(self, before: float, after: float) -> bool:
         """Whether there is an event between two neighbouring points where the function has these values."""
@@ -100,7 +104,8 @@ def hopf() -> Monitor:
     """The event that a pair of complex eigenvalues of F_u crosses the imaginary axis (AUTO's HB), for u' = F.
 
     The product of all sums of two eigenvalues changes sign there, and where two real ones are opposite (a neutral saddle, which
-    is not confirmed). Its details are the frequency of the pair.
+    is not confirmed). The number of unstable eigenvalues tells more than a sign: a pair changes it by two, a real eigenvalue
+    that passes zero by one. Details are the frequency of the pair.
     """
 
     def sums(trial):
@@ -122,7 +127,15 @@ def hopf() -> Monitor:
     def complex_pair(trial):
         return frequency(trial) > 1e-8
 
-    return Monitor("HB", "Hopf", function, confirm=complex_pair, describe=lambda trial: {"frequency": frequency(trial)})
+    def unstable(trial):
+        return np.count_nonzero(trial.system.eigenvalues(trial.x).real > 0)
+
+    def several(before, after):
+        change = abs(unstable(after) - unstable(before))
+        return change > 3 or (change > 1 and function(before) * function(after) > 0)
+
+    describe = {"confirm": complex_pair, "describe": lambda trial: {"frequency": frequency(trial)}}
+    return Monitor("HB", "Hopf", function, several=several, **describe)
 
 
 def find_zero(function: Callable[[float], float], a, fa, b, fb, tolerance) -> float:

@@ -35,6 +35,8 @@ _BESIDE = 0.05
 _FAR = 0.05
 #: Cosine between the kernels of a branch point on two meshes, below which they are two points.
 _SAME_KERNEL = 0.9
+#: Into how many parts a step is divided to look inside it, and how often parts with several events are halved.
+_PARTS, _CUTS = 4, 20
 #: How far outside a step a branch point may be found that changes the determinant's sign inside it (as a part of the step).
 _OUTSIDE = 1e-6
 
@@ -197,9 +199,7 @@ class Segment:
     def _zeros(self, monitor: Monitor) -> list[Event]:
         """Zeros of a monitor inside the step, looked for between the places where the primary parameter turns."""
         state, found = self.state, []
-        first = Trial(state.system, state.x, state.tangent, state.sign) if state.singular else self.before
-        knots = [(0.0, first), *((event.at, event.trial) for event in self.turns), (self.step, self.trial)]
-        for left, right in itertools.pairwise(knots):
+        for left, right in itertools.pairwise(self._knots(monitor)):
             before, after = left[1].value(monitor), right[1].value(monitor)
             if state.accepted == 0 and left[0] == 0 and abs(before) < _ON_ZERO * abs(after):
                 before = 0.0  # the first point lies on the zero
@@ -211,6 +211,35 @@ class Segment:
             if monitor.terminal:
                 break
         return found
+
+    def _knots(self, monitor: Monitor) -> list:
+        """The places (s, trial) between which a monitor has one zero at most, as far as can be told."""
+        state = self.state
+        first = Trial(state.system, state.x, state.tangent, state.sign) if state.singular else self.before
+        knots = [(0.0, first), *((event.at, event.trial) for event in self.turns), (self.step, self.trial)]
+        if monitor.several is None:
+            return knots
+        inside = [self.step * part / _PARTS for part in range(1, _PARTS)]
+        values = [first.value(monitor), *(monitor.function(self._guess(s)) for s in inside), self.trial.value(monitor)]
+        if np.count_nonzero(np.diff(np.sign(values))) > 1:
+            knots = sorted([*knots, *((s, self._near(s)) for s in inside)], key=lambda knot: knot[0])
+        for _ in range(_CUTS):
+            crowded = [pair for pair in itertools.pairwise(knots) if monitor.several(pair[0][1], pair[1][1])]
+            if not crowded:
+                break
+            middles = [(left[0] + right[0]) / 2 for left, right in crowded]
+            knots = sorted([*knots, *((s, self._near(s)) for s in middles)], key=lambda knot: knot[0])
+        return knots
+
+    def _guess(self, at) -> Trial:
+        return Trial(self.state.system, self._between(at), self.state.tangent, np.nan)
+
+    def _near(self, at) -> Trial:
+        """The point of the curve at a place or, where Newton fails (close to a singular one), the guess."""
+        try:
+            return self._at(at)
+        except ConvergenceError:
+            return self._guess(at)
 
     def _locate(self, monitor: Monitor, left, right) -> Event:
         """The zero of a monitor between two places (s, trial); where location fails, the further one, named "possible"."""

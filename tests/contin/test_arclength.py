@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from contin import (
+    AlgebraicProblem,
     BoundaryValueProblem,
     Collocation,
     Continuation,
@@ -19,6 +20,8 @@ from contin import (
     Settings,
     follow,
     locate_branch_point,
+    solve,
+    trace,
 )
 
 
@@ -157,6 +160,36 @@ def test_a_run_can_be_continued_from_its_state():
             break
     rest = list(Continuation(None or run.state.system, run.state.x, settings, state=run.state, start=run.start))
     assert [point["lam"] for point in points + rest] == whole.column("lam").tolist()
+
+
+def test_every_state_continues_to_the_same_points():
+    """Also where factors of the last step are not at hand: past branch points, and past one with a kernel of dimension two."""
+    double = BoundaryValueProblem(
+        lambda t, u, p: (u.b, -p.lam * math.sin(u.a), u.d, -p.lam * math.sin(u.c)),
+        lambda a, b, p: (a.b, b.b, a.d, b.d), ["a", "b", "c", "d"], {"lam": 5.0},
+    )  # fmt: skip
+    for problem in (elastica(), double):
+        system = Collocation(problem, np.linspace(0, 1, 13), 6, ["lam"], {})
+        settings, x = Settings(limits={"lam": (1, 50)}, step=1.0, errors=False), np.append(np.zeros(system.size - 1), 5.0)
+        run, states, whole = Continuation(system, x, settings), [], []
+        for point in run:
+            whole.append(point["lam"])
+            if not point.label:
+                states.append((run.state, len(whole)))
+        assert len(states) > 5
+        for state, count in states[:-1]:
+            rest = Continuation(state.system, state.x, settings, state=state, start=run.start)
+            assert [point["lam"] for point in rest] == whole[count:]
+
+
+def test_the_end_on_the_trivial_branch_is_located_without_a_search_for_branch_points():
+    """x (mu - x^2 + x / 2): the branch leaves the origin, turns and meets x = 0 at mu = 0."""
+    problem = AlgebraicProblem(lambda u, p: (u.x * (p.mu - u.x**2 + u.x / 2),), ["x"], {"mu": 0.5}, {"X": lambda u, p: u.x})
+    start = solve(problem, [1.0])
+    for search in (True, False):
+        branch = trace(start, free=["mu"], direction=-1, trivial="X", branch_points=search)
+        assert branch.stop.reason == "trivial branch"
+        assert abs(branch.points[-1]["mu"]) < 1e-12 and abs(branch.points[-1]["X"]) < 1e-12
 
 
 def test_a_right_hand_side_that_is_nan_beyond_a_wall_stops_with_advice():

@@ -161,3 +161,33 @@ def test_errors_of_algebraic_points_are_those_of_their_location():
     case = abc.CASES[0]
     for point, special in zip([p for p in case.run().points[1:] if p.label], case.specials):
         assert abs(point["d"] - special.values["d"]) < 4 * point.errors["d"] and 0 < point.errors["d"] < 1e-12
+
+
+def oscillators(*rates):
+    """Independent pairs of eigenvalues rate(mu) -+ i (1 + k), rates of degree two: Hopf points where one vanishes."""
+    n = 2 * len(rates)
+
+    def residual(u, p, out):
+        for k in range(n // 2):
+            rate = table[k, 0] + table[k, 1] * p[0] + table[k, 2] * p[0] ** 2
+            out[2 * k] = rate * u[2 * k] - (1 + k) * u[2 * k + 1]
+            out[2 * k + 1] = (1 + k) * u[2 * k] + rate * u[2 * k + 1]
+
+    table = np.array(rates, dtype=float)
+    return AlgebraicProblem(residual, n, {"mu": -1.0})
+
+
+@pytest.mark.parametrize(
+    ("rates", "places"),
+    [
+        ([(0.0, 1.0, 0.0), (-0.1, 1.0, 0.0)], [0.0, 0.1]),  # two pairs, one after the other
+        ([(0.0, 1.0, 0.0), (0.6, -1.0, 0.0)], [0.0, 0.6]),  # one comes, another goes
+        ([(0.0, 1.0, 0.0), (-0.1, 1.0, 0.0), (-0.2, 1.0, 0.0)], [0.0, 0.1, 0.2]),
+        ([(0.16, 0.0, -1.0)], [-0.4, 0.4]),  # the same pair, out and back
+    ],
+)
+def test_several_hopf_points_in_one_step(rates, places):
+    start = solve(oscillators(*rates))
+    branch = trace(start, free=["mu"], limits={"mu": (-2, 1)}, step=1.7, change=1.4)
+    assert len(branch) <= 4 + len(places)  # really one or two steps
+    assert [point["mu"] for point in branch.labelled("HB")] == pytest.approx(places, abs=1e-10)
