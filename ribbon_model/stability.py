@@ -124,7 +124,7 @@ def index(equilibrium: Equilibrium, accuracy: float | None = None) -> Stability:
     Parameters
     ----------
     accuracy : float, optional
-        Besides, in every class the eigenvalue nearest to zero moves by less than this: to find roots.
+        Besides, in every class the eigenvalue nearest to zero, if below 1/2, moves by less than this: to find roots.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def _compared(form: _Form, coarse, fine, cutoff, accuracy) -> tuple[Stability, b
             neutral.append(f"{label}: an eigenvalue {high[k]:.1e} cannot be told from zero")
         elif distance <= max(4 * errors[k], floor) or np.sum(low < 0) != entry.negative:
             doubts.append(f"{label}: an eigenvalue {high[k]:.1e} is not known better than {max(errors[k], floor):.1e}")
-        if accuracy is not None and errors[k] > accuracy:
+        if accuracy is not None and errors[k] > accuracy and distance < 0.5:
             doubts.append(f"{label}: an eigenvalue {high[k]:.1e} still moves by {errors[k]:.1e}")
         classes.append(entry)
     if residual > _RESIDUAL:
@@ -309,11 +309,11 @@ def _uniform(count):
 
 
 def _stretched(equilibrium: Equilibrium, count: int = 512, modes: int = 40):
-    """A smooth S(tau), stretch(count) = (S - tau, dS/dtau), with dtau/dS about |omega| / mean + 1/4."""
+    """A smooth S(tau), stretch(count) = (S - tau, dS/dtau), with dtau/dS about |omega|^2 over its mean + 0.1."""
     at = _sampled(equilibrium, count, _uniform)
     part = LENGTH / equilibrium.symmetry.order
-    density = np.linalg.norm(at.strain, axis=1)
-    density = density / density.mean() + 0.25
+    density = np.sum(at.strain**2, axis=1)
+    density = density / density.mean() + 0.1
     tau = np.concatenate([[0.0], np.cumsum((density + np.roll(density, -1)) / 2)])
     inverse = np.interp(at.tau, part * tau / tau[-1], np.append(at.tau, part))
     series = np.fft.rfft(inverse - at.tau)[:modes] / count * np.exp(-36 * (np.arange(modes) / modes) ** 8)

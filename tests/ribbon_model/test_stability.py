@@ -121,7 +121,7 @@ def test_a_hard_state():
 
 
 def test_more_resolution_changes_nothing():
-    for point in between_ends(branch(1, 2))[13:26:4]:
+    for point in between_ends(branch(1, 4))[24:64:8]:
         coarse, fine = index(equilibrium(point)), index(equilibrium(point), accuracy=1e-10)
         assert fine.cutoff >= 2 * coarse.cutoff
         assert fine.index == coarse.index
