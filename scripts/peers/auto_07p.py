@@ -1,0 +1,133 @@
+"""AUTO-07p, as distributed (Debian: ``apt-get install auto-07p gfortran``): the equations compiled and run without its Python front end.
+
+The Fortran files in ``auto/`` state the ribbon three times, with analytic Jacobians: ``half`` and ``loop`` in all thirteen
+components of equations (1)-(4) of Audoly & Seffen (2015), ``cell`` in the four of the quarter wave. A study is two runs: the
+planar circle up to its bifurcation at kappa_n = 2.5, then the branch that leaves there.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+SOURCES = Path(__file__).parent / "auto"
+LIBRARY = Path(os.environ.get("AUTO_DIR", "/usr/lib/auto-07p")) / "lib"
+
+#: NDIM, NBC and the free parameters of each statement; PAR(3) is printed with half and loop, free on the cell.
+SHAPES = {"half": (13, 13, "1, 3"), "loop": (13, 13, "1, 3"), "cell": (4, 6, "1, 4, 3")}
+
+CONSTANTS = """\
+NDIM={ndim}, IPS=4, IRS={restart}, ISW={switch}, ICP=[{free}], NBC={nbc}, NINT=0, JAC=1
+NTST={intervals}, NCOL={degree}, IAD=3, ILP={folds}, ISP={branch_points}, NMX=2000, NPR=0, MXBF=0, IID=2, IPLT=0
+ITMX=9, ITNW=7, NWTN=3, EPSL={tolerance}, EPSU={tolerance}, EPSS={event_tolerance}
+DS=0.05, DSMIN=1e-6, DSMAX={longest_step}, IADS=1, SP=['{stop}']
+"""
+
+
+def missing() -> str | None:
+    """Why AUTO-07p cannot be run here, or None."""
+    if shutil.which("gfortran") is None:
+        return "gfortran is not on the path"
+    if not (LIBRARY / "main.o").exists():
+        return f"no AUTO-07p in {LIBRARY} (apt-get install auto-07p, or set AUTO_DIR)"
+    return None
+
+
+@functools.cache
+def build(statement: str) -> tuple[Path, float]:
+    """The executable of one statement, and the seconds that compiling took. Removed when the process ends."""
+    folder = tempfile.TemporaryDirectory(prefix="bench-auto-")
+    _FOLDERS.append(folder)
+    program = Path(folder.name) / "program"
+    sources = [str(SOURCES / "ribbon.f90"), str(SOURCES / f"{statement}.f90")]
+    objects = [str(path) for path in sorted(LIBRARY.glob("*.o"))]
+    began = time.perf_counter()
+    command = ["gfortran", "-O3", "-march=native", "-fopenmp", "-J", folder.name, *sources, *objects, "-o", str(program)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"gfortran failed on {statement}.f90:\n{done.stderr}")
+    return program, time.perf_counter() - began
+
+
+_FOLDERS: list[tempfile.TemporaryDirectory] = []
+
+
+def study(statement: str, stop: str = "BP", intervals=40, degree=4, tolerance=1e-10, longest_step=0.5, events=True) -> dict:
+    """From the circle through its bifurcation along the branch to the first fold (``stop`` LP) or to its end (BP).
+
+    ``seconds`` is AUTO's own "Total Time" of the second run, ``circle_seconds`` of the first, ``process_seconds`` the wall clock
+    of both processes. ``fold`` and ``end`` are in full precision. ``events=False`` leaves out, on the branch, the branch
+    points, and with them the end.
+    """
+    program, _ = build(statement)
+    ndim, nbc, free = SHAPES[statement]
+    values = dict(ndim=ndim, nbc=nbc, free=free, intervals=intervals, degree=degree, tolerance=tolerance,
+                  event_tolerance=10 * tolerance, longest_step=longest_step)  # fmt: skip
+    first = dict(restart=0, switch=1, folds=0, branch_points=1, stop="BP1")
+    second = dict(restart=2, switch=-1, folds=1, branch_points=1 if events else 0, stop=f"{stop}1")
+    with tempfile.TemporaryDirectory(prefix="bench-auto-") as name:
+        folder = Path(name)
+        circle = _run(program, folder, CONSTANTS.format(**values, **first))
+        (folder / "fort.8").replace(folder / "fort.3")
+        branch = _run(program, folder, CONSTANTS.format(**values, **second))
+    kappa = [row[0] for row in branch["trace"]]
+    folds = [value for label, value in branch["labels"] if label == "LP"]
+    ends = [value for label, value in branch["labels"] if label == "BP"]
+    return {
+        "seconds": branch["seconds"], "circle_seconds": circle["seconds"],
+        "process_seconds": circle["process_seconds"] + branch["process_seconds"],
+        "points": branch["points"], "iterations": branch["iterations"], "labels": branch["labels"],
+        "fold": min(kappa, key=lambda value: abs(value - folds[0])) if folds else None,
+        "end": min(kappa, key=lambda value: abs(value - ends[-1])) if ends else None,
+        "circle": circle["labels"][-1][1], "kappa": kappa,
+    }  # fmt: skip
+
+
+def _run(program: Path, folder: Path, constants: str) -> dict:
+    """One run of AUTO in a folder that may hold a restart file."""
+    (folder / "fort.2").write_text(constants)
+    (folder / "fort.97").unlink(missing_ok=True)
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    began = time.perf_counter()
+    done = subprocess.run([str(program)], cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
+    elapsed = time.perf_counter() - began
+    if done.returncode:
+        raise RuntimeError(f"AUTO-07p failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+    trace = [tuple(map(float, line.split())) for line in (folder / "fort.97").read_text().splitlines()]
+    parsed = parse((folder / "fort.7").read_text(), (folder / "fort.9").read_text(), done.stdout)
+    return parsed | {"process_seconds": elapsed, "trace": trace}
+
+
+#: AUTO's codes of special points in the branch file.
+LABELS = {1: "BP", 2: "LP", 3: "HB", 4: "UZ", 5: "LP", 6: "BP", 9: "EP", -4: "UZ", -9: "MX"}
+
+
+def parse(branch_file: str, diagnostics: str, printed: str) -> dict:
+    """Seconds, number of points, Newton iterations (all of them, location of special points included) and labels of a run.
+
+    Parameters
+    ----------
+    branch_file, diagnostics, printed : str
+        AUTO's fort.7, fort.9 and standard output.
+
+    Raises
+    ------
+    ValueError
+        No "Total Time", or no points.
+    """
+    times = re.findall(r"Total Time\s+(\S+)", printed)
+    rows = [line.split() for line in branch_file.splitlines()]
+    rows = [row for row in rows if len(row) > 5 and row[0] not in ("0", "BR")]
+    if not times or not rows:
+        raise ValueError("AUTO-07p printed no total time or no points")
+    iterations = len(re.findall(r"^\s+\d+\s+-?\d+\s+[1-9]\d*\s+[-+.\dE]+\s+[-+.\dE]+\s*$", diagnostics, re.MULTILINE))
+    labels = [
+        (LABELS.get(int(row[2]) % 10 if int(row[2]) > 0 else int(row[2]), "?"), float(row[4])) for row in rows if row[2] != "0"
+    ]
+    return {"seconds": float(times[-1]), "points": len(rows), "iterations": iterations, "labels": labels}
