@@ -307,7 +307,8 @@ class Continuation:
     def _refine(self):
         """Adapt the mesh now and then, and correct the point on it."""
         control, state = self.settings.mesh, self.state
-        if state.singular or not control.every or state.accepted % control.every:
+        due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
+        if state.singular or not due or state.accepted % due:
             return
         adapted = state.system.adapted(state.x, control)
         if adapted is None:

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bank import abc, bru, enz, pp2
+from bank import abc, bru, enz, opt, pp2
 
-from contin import AlgebraicProblem, BoundaryValueProblem, Monitor, Settings, location, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, Monitor, Settings, curve, location, solve, trace
 from contin.events import Trial
 
 
@@ -191,3 +191,10 @@ def test_several_hopf_points_in_one_step(rates, places):
     branch = trace(start, free=["mu"], limits={"mu": (-2, 1)}, step=1.7, change=1.4)
     assert len(branch) <= 4 + len(places)  # really one or two steps
     assert [point["mu"] for point in branch.labelled("HB")] == pytest.approx(places, abs=1e-10)
+
+
+def test_borders_follow_a_curve_of_folds_that_turns_fast():
+    """Stale borders make monitors jump: "possible" events where nothing happens."""
+    fold = opt.circle().labelled("LP")[0]
+    folds = curve(fold, "x3", primary="omega", limits={"omega": (0, 3)}, step=0.01, angle=0.7, accuracy=0.1)
+    assert labels(folds) == ["LP", "BP", "EP"]
