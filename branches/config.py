@@ -88,6 +88,7 @@ class Config(_Strict):
     )
     mesh: MeshConfig = MeshConfig()
     steps: StepConfig = StepConfig()
+    stability: bool = Field(False, description="compute the index of every point, and where it changes")
     stride: int = Field(1, ge=1, description="the full solution is kept at every stride-th point and at labelled ones")
 
     @model_validator(mode="after")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this 
 _HEADER = "   PT  TY  LAB         kappa_n      kappa_star          energy      step   N  it"
 #: Every that many regular points one is printed between the labelled ones.
 _EVERY = 5
-_KINDS = {b"LP": "fold", b"BP": "branch point", b"UZ": "user value"}
+_KINDS = {b"LP": "fold", b"BP": "branch point", b"SB": "secondary bifurcation", b"UZ": "user value"}
 
 
 def survive_any_encoding() -> None:

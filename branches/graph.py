@@ -15,6 +15,7 @@ from pathlib import Path
 
 #: Columns of a branch that an edge carries.
 COLUMNS = ("arclength", "kappa_n", "kappa_star", "energy")
+_SPECIAL = (b"LP", b"BP", b"SB", b"EP", b"MX")
 _TOLERANCE = 1e-7
 
 
@@ -42,11 +43,20 @@ def add_branch(graph, branch, name: str) -> bool:
     """
     config = branch.config
     family = {"law": config["law"], "nu": config["nu"], "m": config["m"], "n": config["n"]}
-    special = [event for event in branch.events if event["label"] in (b"LP", b"BP", b"EP", b"MX")]
+    special = [event for event in branch.events if event["label"] in _SPECIAL]
     nodes = [_node_of(event, family, branch.reason) for event in special]
     rows = [branch.points[first["point"] : last["point"] + 1] for first, last in pairwise(special)]
     pieces = [{column: piece[column].tolist() for column in COLUMNS} for piece in rows]
+    if "index" in branch.points.dtype.names:
+        for piece, values in zip(pieces, rows):
+            piece["index"] = _common_index(values["index"])
     return connect(graph, family, nodes, pieces, file=name)
+
+
+def _common_index(values) -> int:
+    """The index on a piece between special points: one number, or -1 where it is undecided or changes unexplained."""
+    decided = set(values[1:-1][values[1:-1] >= 0].tolist())
+    return decided.pop() if len(decided) == 1 else -1
 
 
 def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dict], **attributes) -> bool:
@@ -85,7 +95,7 @@ def _node_of(event, family, reason):
     """The node of a labelled point of a branch file."""
     values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
     values |= {"error": float(event["error_kappa_n"]), "what": event["name"].decode()}
-    kind = {b"LP": "fold", b"BP": "branch point", b"MX": "lost"}.get(event["label"], "end")
+    kind = {b"LP": "fold", b"BP": "branch point", b"SB": "secondary bifurcation", b"MX": "lost"}.get(event["label"], "end")
     if kind == "end" and reason == "limit":
         kind = "leaves"
     if values["what"] in ("start", "trivial branch"):

@@ -18,12 +18,13 @@ from ribbon_model.seeds import half_loop_branch, primary_branch
 _CHANGEABLE = ("title", "limits", "zeros", "stride")
 
 
-def settings_of(config: Config) -> Settings:
-    """The engine's settings for a scene."""
+def settings_of(config: Config, monitors=()) -> Settings:
+    """The engine's settings for a scene, with further events."""
     mesh, steps = config.mesh, config.steps
     return Settings(
         primary="kappa_n", step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
         max_points=steps.max_points, angle=steps.angle, limits=config.limits, zeros=config.zeros, trivial="M2", errors=True,
+        monitors=monitors,
         mesh=MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every),
     )  # fmt: skip
 
@@ -70,10 +71,8 @@ def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=F
         display.note(f"{path} is complete already ({done}); nothing to do")
         return "complete"
     prepare(path)
-    run, image = _resumed(config, path) if resume else (_begun(config), None)
-    system = run.state.system
-    writer = BranchWriter(path, dump(config), system.problem, system.free, config.stride, image)
-    with contextlib.closing(writer):
+    (run, watch), image = _resumed(config, path) if resume else (_begun(config), None)
+    with contextlib.closing(_writer(path, config, run, watch, image)) as writer:
         display.begin(config, writer.count, len(writer.events()))
         outcome = _follow(run, writer, display)
         seconds = time.perf_counter() - began
@@ -83,21 +82,37 @@ def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=F
 
 def compute_branch(config: Config, display) -> tuple[bytes, str]:
     """The branch of ``config`` as the image of its file, and how it ended; nothing touches a disk here."""
-    run = _begun(config)
-    system = run.state.system
-    with contextlib.closing(BranchWriter(None, dump(config), system.problem, system.free, config.stride)) as writer:
+    run, watch = _begun(config)
+    with contextlib.closing(_writer(None, config, run, watch)) as writer:
         outcome = _follow(run, writer, display)
         return writer.image(), outcome
 
 
-def _begun(config: Config) -> Continuation:
+def _writer(path, config: Config, run: Continuation, watch, image=None) -> BranchWriter:
+    system = run.state.system
+    return BranchWriter(path, dump(config), system.problem, system.free, config.stride, image, watch and watch.index)
+
+
+def _watch(config: Config, system, x):
+    """What computes the index along the branch, where the scene asks for it."""
+    if not config.stability:
+        return None
+    from branches.stability import Watch
+
+    return Watch(LAWS[config.law], system, x)
+
+
+def _begun(config: Config):
+    """The run from the branch's first point, and its watch."""
     system, x, tangent = seed(config)
-    return Continuation(system, x, settings_of(config), tangent)
+    watch = _watch(config, system, x)
+    return Continuation(system, x, settings_of(config, watch.monitors if watch else ()), tangent), watch
 
 
-def _resumed(config: Config, path: Path) -> tuple[Continuation, bytes]:
-    """The run that goes on where the file ends, and the image of the file."""
-    system, _, _ = seed(config)
+def _resumed(config: Config, path: Path):
+    """The run that goes on where the file ends with its watch, and the image of the file."""
+    system, x, _ = seed(config)
+    watch = _watch(config, system, x)
     state, start, last, image = read_state(path, system.problem, system.free)
     if state.accepted >= config.steps.max_points:
         raise ConfigError(f"steps.max_points: {config.steps.max_points} must exceed the {state.accepted} points taken already")
@@ -106,7 +121,8 @@ def _resumed(config: Config, path: Path) -> tuple[Continuation, bytes]:
             raise ConfigError(
                 f"limits: {name}: {low:g}, {high:g} must contain the place to go on from, {name} = {last[name]:.6g}"
             )
-    return Continuation(state.system, state.x, settings_of(config), state=state, start=start), image
+    settings = settings_of(config, watch.monitors if watch else ())
+    return (Continuation(state.system, state.x, settings, state=state, start=start), watch), image
 
 
 def _follow(run: Continuation, writer: BranchWriter, display) -> str:

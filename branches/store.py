@@ -25,7 +25,11 @@ FORMAT_VERSION = 1
 #: Columns of /points and /events that are not parameters or functionals: name, type, meaning.
 _BOOKKEEPING = (
     ("point", "i4", "running number of the point along the branch, labelled points included"),
-    ("label", "S2", "AUTO's label: BP branch point, LP fold, UZ user value, EP end, MX failed; empty for a regular point"),
+    (
+        "label",
+        "S2",
+        "AUTO's label: BP branch point, LP fold, SB secondary bifurcation, UZ user value, EP end, MX failed; empty for others",
+    ),
     ("arclength", "f8", "distance from the first point in the continuation norm"),
     ("intervals", "i4", "mesh intervals N of this point's solution"),
     ("iterations", "i4", "Newton iterations"),
@@ -58,12 +62,13 @@ def versions() -> dict[str, str]:
     return result
 
 
-def _columns(problem, free) -> dict[str, tuple]:
+def _columns(problem, free, watched: bool) -> dict[str, tuple]:
     """Name, type and meaning of the columns of both tables."""
+    watch = [("index", "i4", "number of negative directions of the energy; -1 where one is neutral (undecided)")] * watched
     values = [(name, "f8", MEANINGS.get(name, name)) for name in (*problem.parameters, *problem.functionals)]
     errors = [(f"error_{name}", "f8", f"estimated discretization error of {name}") for name in free]
     named = [("name", "S64", "what the label refers to")]
-    return {"points": (*_BOOKKEEPING, *values), "events": (*_BOOKKEEPING, *named, *values, *errors)}
+    return {"points": (*_BOOKKEEPING, *values, *watch), "events": (*_BOOKKEEPING, *named, *values, *errors, *watch)}
 
 
 def _kind(columns) -> np.dtype:
@@ -87,13 +92,15 @@ class BranchWriter:
         The full solution is kept of every stride-th point, and of labelled ones.
     image : bytes, optional
         An unfinished file to go on with.
+    index : callable, optional
+        ``index(point)``, the value of the column of that name; no such column without.
     """
 
     #: Seconds between checkpoints while a run goes.
     INTERVAL = 0.5
 
-    def __init__(self, path: Path | None, config_text: str, problem, free, stride: int, image: bytes | None = None):
-        self.path, self._stride, self._free = path and Path(path), stride, tuple(free)
+    def __init__(self, path: Path | None, config_text: str, problem, free, stride: int, image: bytes | None = None, index=None):
+        self.path, self._stride, self._free, self._index = path and Path(path), stride, tuple(free), index
         self._buffer: list[tuple[Point, int]] = []
         self._mark: tuple[State, int] | None = None
         with _damage_told(path):
@@ -112,7 +119,7 @@ class BranchWriter:
             "units": "bending modulus B = 1, length L = 2 pi", "platform": platform.platform(),
             "versions": json.dumps(versions()), "states": list(problem.states), "free_parameters": list(free),
         })  # fmt: skip
-        for table, columns in _columns(problem, free).items():
+        for table, columns in _columns(problem, free, self._index is not None).items():
             data = file.create_dataset(table, (0,), _kind(columns), maxshape=(None,), chunks=(256,))
             for name, _, meaning in columns:
                 data.attrs[name] = meaning
@@ -206,6 +213,8 @@ class BranchWriter:
             "iterations": point.iterations, "newton_error": point.newton_error,
             **{f"error_{name}": point.errors.get(name, np.nan) for name in self._free},
         }  # fmt: skip
+        if self._index is not None:
+            values["index"] = self._index(point)
         return tuple(values[name] for name in self._types[table].names)
 
     # --- what a resumed run needs --------------------------------------------------------------------------------
@@ -227,7 +236,7 @@ class BranchWriter:
 
         What came after them is computed again: a limit that ended the run, say, need not end the one resumed.
         """
-        for table, columns in _columns(problem, self._free).items():
+        for table, columns in _columns(problem, self._free, self._index is not None).items():
             if self._file[table].dtype != _kind(columns):
                 raise StoreError(f"cannot go on with {str(self.path)!r}: its columns are not those of this version")
         points, solutions = int(self._file["resume"].attrs["points"]), self._file["solutions"]

@@ -1,0 +1,70 @@
+"""The index along a branch: a column, and the events where it changes other than at a fold."""
+
+from __future__ import annotations
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from contin import Monitor
+from ribbon_model.laws import Law
+from ribbon_model.second_variation import from_solution
+from ribbon_model.stability import Stability, index
+
+#: Label of a secondary bifurcation: one that breaks a symmetry of the domain, which its own equations cannot see.
+LABEL = "SB"
+#: The column's value where the index could not be decided (on a bifurcation, an eigenvalue is zero).
+UNDECIDED = -1
+#: An eigenvalue this close to zero is wanted to this part of itself, so that its zero can be located; but no better than that.
+_NEAR_ZERO, _PART, _FINEST = 1e-4, 1e-3, 1e-11
+_ON_CIRCLE = 1e-6
+#: The class that keeps all symmetry: an eigenvalue of it passes zero at folds, which the engine finds by itself.
+_FULL = (0, "even")
+
+
+class Watch:
+    """Evaluates the index of points of one branch, each once.
+
+    Parameters
+    ----------
+    law : Law
+    system, x :
+        The first point: what symmetry the branch has.
+    """
+
+    def __init__(self, law: Law, system, x):
+        self._law, self._known, self._blas = law, [], ThreadpoolController()
+        names = [entry.name for entry in self.at(system, x).classes]
+        self.monitors = [self._monitor(name) for name in names if name != _FULL]
+
+    def at(self, system, x) -> Stability:
+        """The stability of a point; with sharp eigenvalues where one is close to zero."""
+        for known, result in self._known:
+            if known is x:
+                return result
+        parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+        equilibrium = from_solution(self._law, system.nodes, system.states(x), system.degree, parameters)
+        with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
+            result = index(equilibrium)
+            smallest = min(abs(entry.eigenvalues[entry.nearest]) for entry in result.classes if entry.name != _FULL)
+            if smallest < _NEAR_ZERO:
+                result = index(equilibrium, max(_PART * smallest, _FINEST))
+        self._known = [*self._known[-3:], (x, result)]
+        return result
+
+    def index(self, point) -> int:
+        """The index of a point, or `UNDECIDED`."""
+        result = self.at(point.system, point.x)
+        return result.index if result.decided else UNDECIDED
+
+    def _monitor(self, name) -> Monitor:
+        """The determinant of one symmetry class, whose zeros are bifurcations that break the symmetry."""
+
+        def determinant(trial):
+            entry = self.at(trial.system, trial.x)[name]
+            values = entry.eigenvalues
+            if name[0] == 0 and abs(trial["M2"]) < _ON_CIRCLE:  # of a circle, rotations that the branch's own phase replaces
+                values = values[np.abs(values) > _ON_CIRCLE]
+            return float(np.prod(values))
+
+        wavenumber, parity = name
+        return Monitor(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant)
