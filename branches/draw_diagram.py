@@ -8,25 +8,40 @@ import numpy as np
 
 from branches.graph import families
 
-STABLE, UNSTABLE, FOLD, DOT, BRANCH_POINT = "#000000", "#9a9a9a", "#D55E00", "#000000", "#CC79A7"
+STABLE, UNSTABLE, FOLD, DOT, SECONDARY = "#000000", "#9a9a9a", "#D55E00", "#000000", "#CC79A7"
 #: Okabe-Ito colours and a line style for each wavenumber: told apart without colour too.
 STYLES = {
     1: ("#CC79A7", (0, (1, 1))), 2: ("#0072B2", "-"), 3: ("#009E73", "-"), 4: ("#D55E00", (0, (6, 1.5))),
     5: ("#56B4E9", (0, (6, 1.5))), 6: ("#E69F00", (0, (4, 1, 1, 1))), 7: ("#882255", (0, (4, 1, 1, 1))),
 }  # fmt: skip
 _OTHER = ("#444444", ":")
-_MARKS = {"fold": ("*", FOLD, 90), "circle": ("o", DOT, 16), "branch point": ("D", BRANCH_POINT, 30)}
+_MARKS = {"fold": ("*", FOLD, 90), "circle": ("o", DOT, 16), "secondary bifurcation": ("D", SECONDARY, 26)}
 #: Shapes of the way of a branch from one circle to the other in the disentangled picture, sigma -> sigma ** power.
 _POWERS = (1.0, 1.7, 0.6, 3.0, 0.35)
 
 
 @dataclass(frozen=True)
 class Line:
-    """A branch to draw: wavenumber, columns from end to end (K,), and its special points (kappa_n, kappa_star, kind)."""
+    """A branch to draw.
+
+    Attributes
+    ----------
+    n : int
+        Wavenumber.
+    kappa_n, kappa_star : ndarray, shape (K,)
+        From end to end.
+    stable : ndarray of bool, shape (K,)
+        Where the index is known to be 0.
+    marks : list
+        Its special points (kappa_n, kappa_star, kind).
+    returns : bool
+        Whether both ends are circles.
+    """
 
     n: int
     kappa_n: np.ndarray
     kappa_star: np.ndarray
+    stable: np.ndarray
     marks: list[tuple[float, float, str]]
     returns: bool
 
@@ -94,6 +109,8 @@ def schematic(axes, graph, law: str, nu: float, window) -> None:
 def _draw(axes, line, height, at):
     colour, dashes = STYLES.get(line.n, _OTHER)
     axes.plot(line.kappa_n, height, color=colour, linestyle=dashes, lw=1.3, zorder=2)
+    if line.stable.any():
+        axes.plot(line.kappa_n, np.where(line.stable, height, np.nan), color=colour, lw=4, zorder=2, solid_capstyle="butt")
     for (x, _, kind), y in zip(line.marks, at):
         if kind in _MARKS:
             marker, colour, size = _MARKS[kind]
@@ -139,10 +156,12 @@ def legend(graph, law: str, nu: float) -> list:
         Line2D([], [], marker="o", color=DOT, ls="", ms=5, label="bifurcation of a circle"),
     ]
     kinds = {data["kind"] for _, data in graph.nodes(data=True) if (data["law"], data["nu"]) == (law, nu)}
+    if any(data.get("index") == 0 for _, _, data in graph.edges(data=True) if (data["law"], data["nu"]) == (law, nu)):
+        handles.append(Line2D([], [], color="#666666", lw=4, label="buckled, stable (index 0)"))
     if "fold" in kinds:
         handles.append(Line2D([], [], marker="*", color=FOLD, ls="", ms=11, label="fold"))
-    if "branch point" in kinds:
-        handles.append(Line2D([], [], marker="D", color=BRANCH_POINT, ls="", ms=6, label="secondary bifurcation"))
+    if "secondary bifurcation" in kinds:
+        handles.append(Line2D([], [], marker="D", color=SECONDARY, ls="", ms=6, label="secondary bifurcation"))
     return handles
 
 
@@ -162,7 +181,9 @@ def lines(graph, law: str, nu: float) -> list[Line]:
         nodes = [graph.nodes[name] for name in names]
         marks = [(node["kappa_n"], node["kappa_star"], node["kind"]) for node in nodes]
         kappa_n, kappa_star = (np.concatenate([curve[i] for curve in curves]) for i in (0, 1))
-        result.append(Line(family[3], kappa_n, kappa_star, marks, sum(node["kind"] == "circle" for node in nodes) > 1))
+        stable = np.concatenate([np.full(len(c[0]), d.get("index") == 0) for c, (_, _, d) in zip(curves, pieces)])
+        returns = sum(node["kind"] == "circle" for node in nodes) > 1
+        result.append(Line(family[3], kappa_n, kappa_star, stable, marks, returns))
     return result
 
 
