@@ -38,14 +38,14 @@ class Domain:
         """The collocation system on a uniform mesh."""
         return Collocation(self.problem, np.linspace(0, 1, intervals + 1), degree, self.free, parameters)
 
-    def circle(self, system: Collocation, m: int, kappa_n: float) -> np.ndarray:
-        """The unknowns of the planar m-covered circle, shape (system.size,)."""
+    def circle(self, system: Collocation, m: int, kappa_n: float, moment: float | None = None) -> np.ndarray:
+        """The unknowns of the planar m-covered circle, shape (system.size,); its moment is m - kappa_n if it is not given."""
         half_angle = m * system.parameters[list(self.problem.parameters).index("length")] * system.nodes / 2
         zero = np.zeros_like(half_angle)
         states = [np.cos(half_angle), np.sin(half_angle), zero, zero]
         if "x1" in self.problem.states:
             states += [zero, (np.cos(2 * half_angle) - 1) / m, np.sin(2 * half_angle) / m]
-        values = dict.fromkeys(self.free, 0.0) | {"kappa_n": kappa_n, "M1": m - kappa_n}
+        values = dict.fromkeys(self.free, 0.0) | {"kappa_n": kappa_n, "M1": m - kappa_n if moment is None else moment}
         return system.pack(np.array(states).T, values)
 
 
@@ -77,12 +77,12 @@ def on_directors(q0, q1, q2, q3, a1, a2, a3):
 
 def cell(law: Law) -> Domain:
     """Quarter wave with R = 0; parameters ``turn`` (2 pi m / 4n) and ``sense`` (the sign of the moment on the circle)."""
-    response = law.response
+    response = law.response_at
 
     def local(u, p):
         q0, q1, q2, q3 = u
         M1, M2, M3 = on_directors(q0, q1, q2, q3, p.M1, p.M2, 0.0)
-        return response(M1, M2, M3, p.kappa_n, p.nu)
+        return response(M1, M2, M3, p)
 
     def rhs(t, u, p):
         q0, q1, q2, q3 = u
@@ -99,7 +99,7 @@ def cell(law: Law) -> Domain:
         )  # fmt: skip
 
     problem = BoundaryValueProblem(
-        rhs, boundary, FRAME, {"kappa_n": 0.0, "nu": 0.3, "M1": 0.0, "M2": 0.0, "length": 1.0, "turn": 1.0, "sense": 1.0},
+        rhs, boundary, FRAME, {**_material(law), "M1": 0.0, "M2": 0.0, "length": 1.0, "turn": 1.0, "sense": 1.0},
         functionals=_functionals(response, lambda u, p: on_directors(u.q0, u.q1, u.q2, u.q3, p.M1, p.M2, 0.0)),
     )  # fmt: skip
     return Domain(problem, ("kappa_n", "M1", "M2"))
@@ -130,9 +130,14 @@ def loop(law: Law) -> Domain:
     return Domain(_with_force(law, boundary, LENGTH), ("kappa_n", "M1", "M2", "R1", "R2", "R3", "unfold"))
 
 
+def _material(law: Law) -> dict[str, float]:
+    """kappa_n and the law's parameters, at default values."""
+    return {"kappa_n": 0.0, **{name: {"nu": 0.3, "Gamma": 1.0}[name] for name in law.parameters}}
+
+
 def _with_force(law: Law, boundary: Callable, length: float) -> BoundaryValueProblem:
     """Frame and centreline as states, moment and force at S = 0 as parameters."""
-    response = law.response
+    response = law.response_at
 
     def moment(u, p):
         return on_directors(
@@ -143,7 +148,7 @@ def _with_force(law: Law, boundary: Callable, length: float) -> BoundaryValuePro
     def rhs(t, u, p):
         M1, M2, M3 = moment(u, p)
         R1, R2, R3 = on_directors(u.q0, u.q1, u.q2, u.q3, p.R1, p.R2, p.R3)
-        H, w1, w2, w3, conjugate = response(M1, M2, M3, p.kappa_n, p.nu)
+        H, w1, w2, w3, conjugate = response(M1, M2, M3, p)
         v1 = w1 + p.unfold * (M2 * w3 - M3 * w2 + R2)
         v2 = w2 + p.unfold * (M3 * w1 - M1 * w3 - R1)
         v3 = w3 + p.unfold * (M1 * w2 - M2 * w1)
@@ -153,7 +158,7 @@ def _with_force(law: Law, boundary: Callable, length: float) -> BoundaryValuePro
 
     values = dict.fromkeys(("M1", "M2", "M3", "R1", "R2", "R3", "unfold"), 0.0)
     return BoundaryValueProblem(
-        rhs, boundary, (*FRAME, *CENTRELINE), {"kappa_n": 0.0, "nu": 0.3, **values, "length": length},
+        rhs, boundary, (*FRAME, *CENTRELINE), {**_material(law), **values, "length": length},
         functionals=_functionals(response, moment),
     )  # fmt: skip
 
@@ -163,12 +168,12 @@ def _functionals(response, moment):
 
     def kappa_star(t, u, p):
         M1, M2, M3 = moment(u, p)
-        H, w1, w2, w3, conjugate = response(M1, M2, M3, p.kappa_n, p.nu)
+        H, w1, w2, w3, conjugate = response(M1, M2, M3, p)
         return conjugate
 
     def energy(t, u, p):
         M1, M2, M3 = moment(u, p)
-        H, w1, w2, w3, conjugate = response(M1, M2, M3, p.kappa_n, p.nu)
+        H, w1, w2, w3, conjugate = response(M1, M2, M3, p)
         return M1 * w1 + M2 * w2 + M3 * w3 - H
 
     return {"kappa_star": kappa_star, "energy": energy}

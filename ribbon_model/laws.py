@@ -1,5 +1,6 @@
 """Material laws: each is one scalar function, the complementary energy H(M1, M2, M3; kappa_n, nu); the strains, the
-conjugate curvature kappa*, the tangent moduli and every Jacobian follow from its derivatives.
+conjugate curvature kappa*, the tangent moduli and every Jacobian follow from its derivatives. (Or one that is given by its
+strain energy, with H as Legendre transform: `ribbon_model.finite_width`. Nothing else need know which.)
 
 Units: bending modulus B = 1, total length L = 2 pi (so kappa_n stands for the paper's kappa_n L / 2 pi). The strain
 energy is U(omega) = max over M of M.omega - H; a constant kappa_n^2/2 is left out of U in all laws, as in equation (7) of
@@ -13,6 +14,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ribbon_model import finite_width
+
 
 @dataclass(frozen=True)
 class Law:
@@ -22,21 +25,54 @@ class Law:
     ----------
     name : str
     hamiltonian : callable
-        H(M1, M2, M3, kappa_n, nu), with arithmetic and ``math`` only.
+        H(M1, M2, M3, kappa_n, *parameters), with arithmetic and ``math`` only, unless ``gradient`` is given.
     constrained : bool
         Whether omega_2 = 0 (then H does not depend on M2, which is a reaction).
+    parameters : tuple of str
+        The law's own parameters, in the order in which they are passed: ``nu``, and for some laws more.
+    gradient : callable, optional
+        The response, where H is no expression that can be differentiated; made for compilation by `contin`.
     """
 
     name: str
     hamiltonian: Callable[..., float]
     constrained: bool
+    parameters: tuple[str, ...] = ("nu",)
+    gradient: Callable[..., tuple] | None = None
 
     @functools.cached_property
     def response(self) -> Callable[..., tuple]:
-        """``response(M1, M2, M3, kappa_n, nu)`` = (H, omega_1, omega_2, omega_3, dH/dkappa_n), plain Python."""
+        """``response(M1, M2, M3, kappa_n, *parameters)`` = (H, omega_1, omega_2, omega_3, dH/dkappa_n), plain Python."""
+        if self.gradient:
+            return self.gradient
         from contin.derivatives import gradient  # the engine is slow to load, and a law can be had without
 
         return gradient(self.hamiltonian, ("M1", "M2", "M3", "kappa_n"))
+
+    @functools.cached_property
+    def response_at(self) -> Callable[..., tuple]:
+        """``response_at(M1, M2, M3, p)``: the response, kappa_n and the law's parameters looked up in p, a named tuple."""
+        response = self.response
+        if "Gamma" in self.parameters:
+            return lambda M1, M2, M3, p: response(M1, M2, M3, p.kappa_n, p.nu, p.Gamma)
+        return lambda M1, M2, M3, p: response(M1, M2, M3, p.kappa_n, p.nu)
+
+    def values(self, nu: float, Gamma: float | None = None) -> dict[str, float]:
+        """The law's parameters by name.
+
+        Raises
+        ------
+        ValueError
+            Gamma is missing, negative, or given to a law that has none.
+        """
+        if ("Gamma" in self.parameters) != (Gamma is not None):
+            there = "is missing" if Gamma is None else f"= {Gamma:g} stands beside a law without it"
+            raise ValueError(f"Gamma {there}: it is a parameter of the law 'finite width', and of no other")
+        if Gamma is None:
+            return {"nu": nu}
+        if not 0 <= Gamma < math.inf:
+            raise ValueError(f"Gamma = {Gamma:g} must be a finite number from 0; the limit of a wide strip is the law 'ribbon'")
+        return {"nu": nu, "Gamma": Gamma}
 
 
 def ribbon_hamiltonian(M1, M2, M3, kappa_n, nu):
@@ -64,6 +100,9 @@ def isotropic_rod_hamiltonian(M1, M2, M3, kappa_n, nu):
 RIBBON = Law("ribbon", ribbon_hamiltonian, constrained=True)
 FLAT_ROD = Law("flat rod", flat_rod_hamiltonian, constrained=True)
 ISOTROPIC_ROD = Law("isotropic rod", isotropic_rod_hamiltonian, constrained=False)
+FINITE_WIDTH = Law("finite width", finite_width.hamiltonian, True, parameters=("nu", "Gamma"), gradient=finite_width.response)
 
+#: The laws of the paper by name, each a closed expression for H in which nu is the one parameter.
+PAPER_LAWS = {law.name: law for law in (RIBBON, FLAT_ROD, ISOTROPIC_ROD)}
 #: All laws by name.
-LAWS = {law.name: law for law in (RIBBON, FLAT_ROD, ISOTROPIC_ROD)}
+LAWS = PAPER_LAWS | {FINITE_WIDTH.name: FINITE_WIDTH}

@@ -7,29 +7,34 @@ because for the isotropic rod they disagree:
 - of the energy: its second variation has no negative direction. The balance (16c) has no rotational inertia, so where gc, the
   stiffness of a pure twist, is negative the published root can come out positive although the energy is not a minimum.
 
-For the ribbon and the flat rod g is infinite, c = 1, and both say the same.
+For the ribbon, the flat rod and the law 'finite width' g is infinite, c = 1, and both say the same. Gamma, the last argument of
+the functions here, is for the law 'finite width' only.
 """
 
 from __future__ import annotations
 
 import math
 
-from ribbon_model.dispersion import coefficients, tangent_moduli
-from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
+from ribbon_model import finite_width
+from ribbon_model.dispersion import coefficients, prestress, tangent_moduli
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
 
 
-def thresholds(law: Law, m: int, n: int, nu: float) -> tuple[float, ...]:
+def thresholds(law: Law, m: int, n: int, nu: float, Gamma: float | None = None) -> tuple[float, ...]:
     """The values of kappa_n (L = 2 pi) where the mode of wavenumber n leaves the m-covered circle: m K, b = 0 in (25b).
 
-    One value for the ribbon (equation (27)) and the flat rod, two for the isotropic rod (nearer to kappa_n = m first).
+    One value for the ribbon (equation (27)), the flat rod and the law 'finite width', two for the isotropic rod (nearer to
+    kappa_n = m first).
     With k = n/m, M = 1 - K and g infinite, b = 0 reads 1 - K = t (1 - k^2); nu -> 0 is a removable singularity of (27).
 
     Raises
     ------
     ValueError
         n = m, a rigid rotation; or, for nu < 0, a mode whose threshold lies beyond kappa_n = m / nu, where the ribbon's
-        tangent twisting modulus t = 2 (1 - nu K) is not positive and the law's regular root ends.
+        tangent twisting modulus t = 2 (1 - nu K) is not positive and the law's regular root ends. Finite width: no threshold
+        where the law is convex. Gamma: see `Law.values`.
     """
+    law.values(nu, Gamma)
     if n == m:
         raise ValueError(f"n = m = {m} is a rigid rotation, not a bifurcation")
     s = (n / m) ** 2 - 1
@@ -44,10 +49,52 @@ def thresholds(law: Law, m: int, n: int, nu: float) -> tuple[float, ...]:
         root = math.sqrt((1 + t) ** 2 + 4 * t * s)
         values = (m * (1 - (1 + t - root) / 2), m * (1 - (1 + t + root) / 2))
         return tuple(sorted(values, key=lambda value: abs(value - m)))
+    if law is FINITE_WIDTH:
+        return (_finite_width_threshold(m, n, nu, Gamma),)
     raise ValueError(f"the law {law.name!r} has no closed formula here")
 
 
-def stability_interval(law: Law, m: int, nu: float) -> tuple[float, float]:
+def _finite_width_threshold(m, n, nu, Gamma):
+    """kappa_n = m (1 - y): with M and t of `finite_width.on_circle`, M = t (1 - k**2) is quadratic in y.
+
+    A y**2 + B y + C = 0 with A = -nu**2 G'/4 >= 0, which vanishes in both limits: the threshold is the root that stays.
+    """
+    s = (n / m) ** 2 - 1
+    straight, bent = (finite_width.on_circle(ratio, nu, m * Gamma) for ratio in (1.0, 0.0))  # y = 0 and y = 1
+    opposite = finite_width.on_circle(2.0, nu, m * Gamma)[0]  # y = -1
+    A = (bent[0] + opposite) / 2
+    B, C = (bent[0] - opposite) / 2 + s * (bent[1] - straight[1]), s * straight[1]
+    radicand = B * B - 4 * A * C
+    if radicand >= 0 and B > 0:
+        y = -2 * C / (B + math.sqrt(radicand))
+        _, t, bending = finite_width.on_circle(1 - y, nu, m * Gamma)
+        if t > 0 and bending > 0:
+            return float(m * (1 - y))
+    raise ValueError(
+        f"m = {m}, n = {n}, nu = {nu:g}, Gamma = {Gamma:g}: no threshold where the strain energy of a circle is convex"
+    )
+
+
+def circle(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = None) -> dict[str, float]:
+    """M1, kappa_star (28) and energy (over 2 pi B / L, without the constant kappa_n**2/2) of the planar m-covered circle."""
+    if law is not FINITE_WIDTH:
+        return {"M1": m - kappa_n, "kappa_star": m, "energy": m * m / 2 - m * kappa_n}
+    U, U1, _, _, _, _, Uk, _, _ = finite_width.strain_energy(m, 0.0, kappa_n, nu, Gamma)
+    return {"M1": U1, "kappa_star": kappa_n - Uk, "energy": U - kappa_n * kappa_n / 2}
+
+
+def covering(kappa_n: float, kappa_star: float, energy: float) -> int:
+    """Covering index of the circle that has these values, of any law.
+
+    The energy of a planar circle is a multiple of (omega_1 - kappa_n)**2, without kappa_n**2 / 2, so kappa_n**2 + 2 energy is
+    (m - kappa_n) (kappa_star - kappa_n). Negative where the circle is curled against its natural curvature.
+    """
+    if kappa_star == kappa_n:  # the natural state
+        return round(kappa_n)
+    return round(kappa_n + (kappa_n * kappa_n + 2 * energy) / (kappa_star - kappa_n))
+
+
+def stability_interval(law: Law, m: int, nu: float, Gamma: float | None = None) -> tuple[float, float]:
     """The kappa_n r0 around the natural state 1 for which the m-covered circle is linearly stable, as published (Fig. 10).
 
     On either side it ends at the threshold of n = m - 1 or m + 1: thresholds move away from 1 as n moves away from m.
@@ -69,29 +116,33 @@ def stability_interval(law: Law, m: int, nu: float) -> tuple[float, float]:
         if n == 0:
             continue
         try:
-            ends += [value / m for value in thresholds(law, m, n, nu)]
+            ends += [value / m for value in thresholds(law, m, n, nu, Gamma)]
         except ValueError:
-            if law is not RIBBON:
+            if law not in (RIBBON, FINITE_WIDTH):
                 raise
             # nu away from 0, beyond the modes that have a threshold where t > 0: the limit below comes first
     if law is RIBBON and nu != 0:
         ends.append(1 / nu)
+    if law is FINITE_WIDTH:
+        ends += finite_width.convex_limits(nu, m * Gamma)
     return max([-math.inf, *(end for end in ends if end < 1)]), min([math.inf, *(end for end in ends if end > 1)])
 
 
-def energy_interval(law: Law, m: int, nu: float) -> tuple[float, float]:
+def energy_interval(law: Law, m: int, nu: float, Gamma: float | None = None) -> tuple[float, float]:
     """The kappa_n r0 around 1 for which the energy of the m-covered circle is a minimum; raises as `stability_interval`.
 
     `stability_interval`, cut at kappa_n r0 = 1 - g: below it the moment of the circle, 1 - kappa_n r0, exceeds g and the strip
     gains by turning over about its own centreline (n = 0, not among the modes of (26): it moves no mass). It matters for the
     isotropic rod, g = 1, at m = 1: a ring cannot be stable inside out.
     """
-    low, high = stability_interval(law, m, nu)
+    low, high = stability_interval(law, m, nu, Gamma)
+    if law is FINITE_WIDTH:  # g is infinite
+        return low, high
     g, _ = tangent_moduli(law, 1.0, nu)
     return max(low, 1 - g), high
 
 
-def index(law: Law, m: int, kappa_n: float, nu: float) -> float:
+def index(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = None) -> float:
     """Number of negative directions of the energy of the m-covered circle, closed loops only; kappa_n for L = 2 pi.
 
     Each wavenumber n counts twice, cosine and sine. With b, c of (25) the quadratic form of (psi_2, psi_3) has the determinant
@@ -101,12 +152,14 @@ def index(law: Law, m: int, kappa_n: float, nu: float) -> float:
     - n = m: one where c < 0 (the other is the rigid rotation);
     - n = 0: one, once, where c < 0: turning over about the centreline (uniform psi_2 would open the loop).
 
-    For g infinite c = 1 and only the sign of b (1 - k**2) counts. In-plane perturbations never lower the energy.
+    For g infinite c = 1 and only the sign of b (1 - k**2) counts. In-plane perturbations never lower the energy while the
+    tangent bending modulus is positive, which it is for the laws of the paper.
 
     Returns
     -------
     int or float
-        ``math.inf`` where the ribbon's tangent twisting modulus is negative (zero, if kappa_n > m): all high n are unstable.
+        ``math.inf`` where a tangent modulus of twisting (zero too, if kappa_n > m) or of bending is negative: all high n are
+        unstable.
 
     Raises
     ------
@@ -114,9 +167,12 @@ def index(law: Law, m: int, kappa_n: float, nu: float) -> float:
         As `stability_interval`. On a bifurcation itself the zero directions are not counted.
     """
     _check(m, nu)
-    moment = 1 - kappa_n / m
-    g, t = tangent_moduli(law, kappa_n / m, nu)
+    width = m * law.values(nu, Gamma).get("Gamma", 0.0)
+    moment = prestress(law, kappa_n / m, nu, width)
+    g, t = tangent_moduli(law, kappa_n / m, nu, width)
     if t < 0 or (t == 0 and moment < 0):
+        return math.inf
+    if law is FINITE_WIDTH and finite_width.on_circle(kappa_n / m, nu, width)[2] < 0:
         return math.inf
     count = 0 if moment <= g else 1
     n = 0

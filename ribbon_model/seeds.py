@@ -10,11 +10,11 @@ import numpy as np
 from contin import Collocation, locate_branch_point
 from ribbon_model.equilibrium import LENGTH, cell, half_loop, loop
 from ribbon_model.laws import Law
-from ribbon_model.linear import thresholds
+from ribbon_model.linear import circle, thresholds
 from ribbon_model.shape import closed_strip, quaternions
 
 
-def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, degree: int = 4, root: int = 0):
+def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, degree: int = 4, root: int = 0, Gamma=None):
     """Where the branch (m, n) leaves the m-covered circle, on the cell.
 
     The linear theory gives kappa_n; the discrete equations then give their own branch point there, and the tangent of the
@@ -35,19 +35,20 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
     """
     if m % n == 0 and (m // n) % 2 == 0:
         raise ValueError(f"m = {m}, n = {n}: with m / n even the symmetry of the mode does not close the loop")
-    kappa_n = thresholds(law, m, n, nu)[root]
+    kappa_n = thresholds(law, m, n, nu, Gamma)[root]
     sense = math.copysign(1.0, m - kappa_n)
-    values = {"nu": nu, "length": LENGTH / (4 * n), "turn": math.pi * m / (2 * n), "sense": sense}
+    values = {**law.values(nu, Gamma), "length": LENGTH / (4 * n), "turn": math.pi * m / (2 * n), "sense": sense}
     domain = cell(law)
     system = domain.discretize(intervals, degree, values)
-    return _leave(system, domain.circle(system, m, kappa_n))
+    return _leave(system, domain.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
 
 
-def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, degree: int = 4, root: int = 0):
+def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, degree: int = 4, root: int = 0, Gamma=None):
     """Like :func:`primary_branch`, on the half loop, where all wavenumbers live together."""
     domain = half_loop(law)
-    system = domain.discretize(intervals, degree, {"nu": nu})
-    return _leave(system, domain.circle(system, m, thresholds(law, m, n, nu)[root]))
+    system = domain.discretize(intervals, degree, law.values(nu, Gamma))
+    kappa_n = thresholds(law, m, n, nu, Gamma)[root]
+    return _leave(system, domain.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
 
 
 def whole_loop(law: Law, t, states, degree: int, parameters: Mapping[str, float]):
@@ -67,7 +68,7 @@ def whole_loop(law: Law, t, states, degree: int, parameters: Mapping[str, float]
     q = quaternions(shape.directors @ first.T)
     x = (shape.centreline - origin) @ first.T
     values = dict(zip(("M1", "M2", "M3", "R1", "R2", "R3"), (*(first @ moment), *(first @ force))))
-    values |= {"kappa_n": parameters["kappa_n"], "nu": parameters["nu"], "unfold": 0.0}
+    values |= {"kappa_n": parameters["kappa_n"], "unfold": 0.0, **{name: parameters[name] for name in law.parameters}}
     domain, mesh = loop(law), shape.arclength[::degree] / shape.arclength[-1]
     system = Collocation(domain.problem, mesh, degree, domain.free, values)
     return system, system.pack(np.hstack([q, x]), values)

@@ -85,7 +85,8 @@ def quadrature_centreline(t, states, degree: int, length: float) -> np.ndarray:
 def invariants(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> dict[str, np.ndarray]:
     """What equilibrium keeps constant, at the nodes: ``norm`` |q|^2 and ``hamiltonian`` H(M) + R3, shape (K,) each."""
     moment, force = _loads(states, parameters)
-    values = [law.response(*m, parameters["kappa_n"], parameters["nu"])[0] for m in moment]
+    material = parameters["kappa_n"], *(parameters[name] for name in law.parameters)
+    values = [law.response(*m, *material)[0] for m in moment]
     return {"norm": np.sum(states[:, :4] ** 2, axis=1), "hamiltonian": np.array(values) + force[:, 2]}
 
 
@@ -119,7 +120,8 @@ def closed_strip(law: Law, t, states, degree: int, parameters: Mapping[str, floa
     d = frames(states)
     x = states[:, 4:7] if states.shape[1] > 4 else quadrature_centreline(t, states, degree, length)
     moment, _ = _loads(states, p)
-    omega = np.array([law.response(*m, p["kappa_n"], p["nu"])[1:4] for m in moment])
+    material = p["kappa_n"], *(p[name] for name in law.parameters)
+    omega = np.array([law.response(*m, *material)[1:4] for m in moment])
     eta = omega[:, 2] / omega[:, 0]
     s = length * np.asarray(t)
     part = Shape(s, x, d, eta)

@@ -14,7 +14,7 @@ from contin import Settings, correct, follow, trace
 from ribbon_model import linear
 from ribbon_model.conjugate import conjugate_index
 from ribbon_model.equilibrium import LENGTH
-from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, LAWS, RIBBON
+from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON
 from ribbon_model.second_variation import circle, coupling, from_solution
 from ribbon_model.seeds import half_loop_branch, primary_branch, whole_loop
 from ribbon_model.stability import index
@@ -47,7 +47,7 @@ def between_ends(found):
 
 
 def test_circles_against_the_linear_theory():
-    for law in LAWS.values():
+    for law in PAPER_LAWS.values():
         for m in (1, 3, 5, 7):
             for kappa_n in (-3.7, -1.3, 0.2, 0.9, 2.2, 2.7, 3.3, 7.9, 15.3):
                 if law is RIBBON and kappa_n >= m / NU:
@@ -57,7 +57,7 @@ def test_circles_against_the_linear_theory():
                 assert found.index == linear.index(law, m, kappa_n, NU), (law.name, m, kappa_n)
 
 
-@pytest.mark.parametrize("law", LAWS.values(), ids=list(LAWS))
+@pytest.mark.parametrize("law", PAPER_LAWS.values(), ids=list(PAPER_LAWS))
 def test_circles_by_conjugate_points(law):
     for m, kappa_n in ((1, 2.7), (1, 3.25), (3, -1.3), (3, 2.2), (3, -7.1)):
         found = conjugate_index(circle(law, NU, m, kappa_n))

@@ -1,0 +1,231 @@
+"""A strip of finite width, between the flat rod and the ribbon: the law "finite width", given by its strain energy.
+
+The paper (Audoly & Seffen 2015) compares two limits. With Gamma = w**2/(h L/2pi), w the width and h the thickness, one law
+joins them. A strip that is bent to omega_1 and twisted by omega_3 chooses the profile zeta(y) of its cross-section: plate
+bending with the curvatures omega_1 - kappa_n, zeta'' and omega_3, and stretching by epsilon_0 + omega_3**2 y**2/2 - omega_1
+zeta along the strip. (Audoly & Neukirch 2021, "A one-dimensional model for elastic ribbons: a little stretching makes a big
+difference", here with kappa_n.) The best profile is a beam on an elastic foundation, and leaves, in units of the plate
+modulus times w,
+
+    U = (1 - nu**2) (omega_1 - kappa_n)**2 / 2 + (1 - nu) omega_3**2 + C g(C omega_1**2) Q**2 / 2 - kappa_n**2 / 2,
+    Q = omega_3**2 + nu omega_1 (omega_1 - kappa_n),    C = 3 (1 - nu**2) Gamma**2,    omega_2 = 0,
+    g(x**4) = (1 - G)/x**4,    G = 2 (cosh x - cos x) / (x (sinh x + sin x)):
+
+the flat rod, and a penalty on Q, the Gaussian curvature that the section would have to carry. U is even in omega_3 and smooth
+for every omega_1, zero included. g falls from 1/180 to 1/x**4.
+
+Normalisation: B is the modulus of the PLATE times w, for every Gamma. Then Gamma -> infinity is the ribbon (7) as it stands,
+and Gamma = 0 is the flat rod (11) with all moments and energies times 1 - nu**2, the ratio of a beam's to a plate's modulus.
+Equilibria do not feel that factor: kappa_n and the strains agree as they are. kappa* = -dU/dkappa_n is (1 - nu**2) times the
+flat rod's, plus nu**2 kappa_n.
+
+H is the Legendre transform of U. Where D2U is not positive definite it has several values or none: the law ends there, and
+`response` is not a number.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+#: Below this x**4 the series of g is used: the closed form cancels. (Its radius of convergence is 4.730**4/4 = 125.)
+SERIES_LIMIT = 16.0
+_STEPS = 80
+#: Relative size of the last Newton step in real numbers: the error left is its square, and one more step follows.
+_TOLERANCE = 1e-7
+
+
+def _series(terms: int) -> tuple[float, ...]:
+    """Coefficients of g(z) about z = 0: 1 - G by division of power series in z = x**4, exact until rounded."""
+    numerator = [Fraction(4, math.factorial(4 * k + 2)) for k in range(terms + 1)]
+    denominator = [Fraction(2, math.factorial(4 * k + 1)) for k in range(terms + 1)]
+    quotient = []
+    for k in range(terms + 1):
+        quotient.append((numerator[k] - sum(quotient[j] * denominator[k - j] for j in range(k))) / denominator[0])
+    return tuple(-float(value) for value in quotient[1:])
+
+
+_COEFFICIENTS = _series(20)
+_TERMS = len(_COEFFICIENTS)
+
+
+def membrane(z):
+    """g, g' and g'' at z = x**4 >= 0; free of overflow and of cancellation in g."""
+    if z < SERIES_LIMIT:
+        g, slope, half_curvature = 0.0, 0.0, 0.0
+        for i in range(_TERMS):
+            half_curvature = half_curvature * z + slope
+            slope = slope * z + g
+            g = g * z + _COEFFICIENTS[_TERMS - 1 - i]
+        return g, slope, 2 * half_curvature
+    G, first, second = foundation(math.sqrt(math.sqrt(z)))
+    g = (1 - G) / z
+    a = -g - first / (4 * z)  # z d/dz g, as x d/dx = 4 z d/dz
+    b = -a - (second / 16 - first / 4) / z  # once more
+    return g, a / z, (b - a) / (z * z)
+
+
+def foundation(x):
+    """G and its first two derivatives by log x, for x of at least about 1; hyperbolic functions divided by exp(x)."""
+    e = math.exp(-x)
+    sine, cosine = 2 * math.sin(x) * e, 2 * math.cos(x) * e
+    below = 1 - e * e + sine
+    F = (1 + e * e - cosine) / below  # (cosh x - cos x) / (sinh x + sin x)
+    E = (1 + e * e + cosine) / below
+    J = (1 - e * e - sine) / below
+    slope = 1 - F * E
+    curvature = -E + 2 * F * E * E - F * J
+    G = 2 * F / x
+    first = 2 * slope - G
+    return G, first, 2 * x * curvature - first
+
+
+def on_circle(ratio, nu, width) -> tuple:
+    """Moment M, torsional modulus t and tangent bending modulus of a planar circle, lengths in units of its radius r0.
+
+    ``ratio`` is kappa_n r0, ``width`` is w**2/(h r0); floats or arrays. With y = 1 - ratio and G' = dG/dlog x,
+
+        M = (1 - nu**2 G) y - nu**2 G' y**2 / 4,    t = 2 (1 - nu) + 2 nu (1 - G) y.
+
+    The term with G in t is the membrane stress of the anticlastic profile, Wagner's effect.
+    """
+    y = 1 - ratio
+    G, first, second = _foundation_by_series(3 * (1 - nu * nu) * width * width)
+    moment = (1 - nu * nu * G) * y - nu * nu * first * y * y / 4
+    bending = 1 - nu * nu * G - nu * nu * first * y - nu * nu * y * y * (second / 8 - first / 4)
+    return moment, 2 * (1 - nu) + 2 * nu * (1 - G) * y, bending
+
+
+def convex_limits(nu, width) -> list[float]:
+    """The values of kappa_n r0 where the torsional or the tangent bending modulus of a planar circle vanishes, in any order."""
+    t0, slope = on_circle(1.0, nu, width)[1], on_circle(0.0, nu, width)[1] - on_circle(1.0, nu, width)[1]
+    zeros = [-float(t0 / slope)] if slope else []
+    b0, b1, b2 = (on_circle(1 - y, nu, width)[2] for y in (0.0, 1.0, -1.0))
+    A, B = (b1 + b2) / 2 - b0, (b1 - b2) / 2
+    radicand = B * B - 4 * A * b0
+    if A and radicand >= 0:
+        zeros += [float(2 * b0 / (-B - math.sqrt(radicand))), float(2 * b0 / (-B + math.sqrt(radicand)))]
+    return [1 - y for y in zeros]
+
+
+def _foundation_by_series(z):
+    """`foundation` for every x**4 = z >= 0, numbers or arrays: from g where x is small."""
+    import numpy as np
+
+    g, slope, curvature = np.vectorize(membrane, otypes=[float] * 3)(z)
+    first = -4 * z * (g + z * slope)
+    return 1 - z * g, first, -16 * z * (g + 3 * z * slope + z * z * curvature)
+
+
+def strain_energy(w1, w3, kappa_n, nu, Gamma):
+    """U and its derivatives: (U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k), k for kappa_n; without the term -kappa_n**2/2.
+
+    Arguments may be complex, for complex steps: first derivatives of U, U_1, U_3 and U_k then are exact. (Only the membrane
+    function of real numbers is called; what the imaginary parts add is its linear term.)
+    """
+    plane, C = 1 - nu * nu, 3 * (1 - nu * nu) * Gamma * Gamma
+    z = C * w1 * w1
+    g, slope, curvature = membrane(z.real)
+    dz = z - z.real
+    P = C * (g + slope * dz)
+    P1 = 2 * C * C * w1 * (slope + curvature * dz)
+    P11 = 2 * C * C * (slope + 2 * z * curvature)
+    bent = w1 - kappa_n
+    Q, Q1, Q3, Qk = w3 * w3 + nu * w1 * bent, nu * (w1 + bent), 2 * w3, -nu * w1
+    PQ, slope1 = P * Q, P1 * Q + P * Q1
+    return (
+        plane * bent * bent / 2 + (1 - nu) * w3 * w3 + PQ * Q / 2,
+        plane * bent + P1 * Q * Q / 2 + PQ * Q1,
+        2 * (1 - nu) * w3 + PQ * Q3,
+        plane + P11 * Q * Q / 2 + 2 * P1 * Q * Q1 + P * Q1 * Q1 + 2 * nu * PQ,
+        slope1 * Q3,
+        2 * (1 - nu) + P * Q3 * Q3 + 2 * PQ,
+        -plane * bent + PQ * Qk,
+        -plane + slope1 * Qk - nu * PQ,
+        P * Q3 * Qk,
+    )
+
+
+def _region(nu, Gamma):
+    """The |omega_1| up to which the strip is like a flat rod, x < 1."""
+    return 1 / (math.sqrt(3 * (1 - nu * nu)) * Gamma + 1e-100)
+
+
+def _start(M1, M3, kappa_n, nu, Gamma):
+    """Strains to start from: the ribbon's or the flat rod's closed form, whichever makes U - M.omega smaller.
+
+    Not the flat rod's where that lies beyond the concave region along omega_1 = 0: there is another minimum there. And out of
+    that region towards omega_1 > 0, on which side the branches begin.
+    """
+    flat1, flat3 = kappa_n + M1 / (1 - nu * nu), M3 / (2 * (1 - nu))
+    p = M1 + (1 - nu) * kappa_n
+    root = math.sqrt(p * p + M3 * M3)
+    a = (p + root) / 2 if p > 0 else M3 * M3 / (2 * (root - p) + 1e-300)
+    if a < 1e-12 * root or nu * kappa_n + a <= 0:
+        return flat1, flat3
+    eta = M3 / (2 * a)
+    w1 = (nu * kappa_n + a) / (1 + eta * eta)
+    w3 = eta * w1
+    if flat1 > -_region(nu, Gamma):
+        ribbon = strain_energy(w1, w3, kappa_n, nu, Gamma)[0] - M1 * w1 - M3 * w3
+        flat = strain_energy(flat1, flat3, kappa_n, nu, Gamma)[0] - M1 * flat1 - M3 * flat3
+        if flat < ribbon:
+            return flat1, flat3
+    for _ in range(20):
+        _, _, _, U11, U13, U33, _, _, _ = strain_energy(w1, w3, kappa_n, nu, Gamma)
+        if U11 > 0 and U11 * U33 > U13 * U13:
+            break
+        w1 = 1.2 * w1 + _region(nu, Gamma)
+    return w1, w3
+
+
+def _strains(M1, M3, kappa_n, nu, Gamma):
+    """omega_1 and omega_3 at a moment, all real: a minimum of U - M.omega, by Newton's method; nan where none is found.
+
+    Steps are halved until they go down, and never leave the convex region once they are in it (a concave one lies along
+    omega_1 = 0 at large twist, and another minimum beyond). Where D2U is indefinite, it is shifted.
+    """
+    w1, w3 = _start(M1, M3, kappa_n, nu, Gamma)
+    region = _region(nu, Gamma)
+    best, d1, d3, size, convex = math.inf, 0.0, 0.0, math.inf, False
+    for _ in range(_STEPS):
+        U, U1, U3, U11, U13, U33, _, _, _ = strain_energy(w1 + d1, w3 + d3, kappa_n, nu, Gamma)
+        value = U - M1 * (w1 + d1) - M3 * (w3 + d3)
+        mean, spread = (U11 + U33) / 2, math.sqrt((U11 - U33) * (U11 - U33) / 4 + U13 * U13)
+        was_convex, convex = convex, mean - spread > 1e-9 * (mean + spread)
+        if value > best + 1e-11 * (abs(U) + abs(best)) or (was_convex and not convex):
+            d1, d3, size, convex = d1 / 2, d3 / 2, math.inf, was_convex
+            continue
+        w1, w3, best = w1 + d1, w3 + d3, value
+        if convex and size < _TOLERANCE * (1e-3 + abs(w1) + abs(w3)):
+            return w1, w3
+        shift = 0.0 if convex else 1.2 * spread - mean + 0.1
+        A, B = U11 + shift, U33 + shift
+        determinant = A * B - U13 * U13
+        d1 = (B * (M1 - U1) - U13 * (M3 - U3)) / determinant
+        d3 = (A * (M3 - U3) - U13 * (M1 - U1)) / determinant
+        size = abs(d1) + abs(d3) if convex else math.inf
+        largest = 0.7 * abs(w1) + region
+        if abs(d1) > largest:
+            d1, d3, size = d1 * largest / abs(d1), d3 * largest / abs(d1), math.inf
+    return math.nan, math.nan
+
+
+def response(M1, M2, M3, kappa_n, nu, Gamma):
+    """H, omega_1, omega_2, omega_3, dH/dkappa_n: the Legendre transform of U.
+
+    Newton's method runs on real parts. One more step, on the numbers as they come, carries imaginary parts along: by the
+    theorem on implicit functions that is the exact derivative.
+    """
+    w1, w3 = _strains(M1.real, M3.real, kappa_n.real, nu.real, Gamma.real)
+    U, U1, U3, U11, U13, U33, Uk, U1k, U3k = strain_energy(w1, w3, kappa_n, nu, Gamma)
+    determinant = U11 * U33 - U13 * U13
+    d1 = (U33 * (M1 - U1) - U13 * (M3 - U3)) / determinant
+    d3 = (U11 * (M3 - U3) - U13 * (M1 - U1)) / determinant
+    H = M1 * w1 + M3 * w3 - U + kappa_n * kappa_n / 2  # stationary in the strains: d1, d3 add nothing
+    return H, w1 + d1, 0.0 * M2, w3 + d3, kappa_n - Uk - U1k * d1 - U3k * d3
+
+
+def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
+    """H alone."""
+    return response(M1, M2, M3, kappa_n, nu, Gamma)[0]
