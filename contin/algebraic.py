@@ -182,12 +182,12 @@ class DenseFactors:
 
     def _solve(self, matrix, b):
         try:
-            return np.linalg.solve(matrix, b)
+            return np.ascontiguousarray(np.linalg.solve(matrix, np.asarray(b).T).T)
         except np.linalg.LinAlgError:
-            return np.full(len(b), np.nan)
+            return np.full(np.shape(b), np.nan)
 
     def solve(self, b):
-        """The x with J x = b; NaN where J is singular."""
+        """The x with J x = b, or for rows of b the rows x; NaN where J is singular."""
         return self._solve(self._matrix, b)
 
     def solve_transposed(self, c):

@@ -335,8 +335,11 @@ _NO_JACOBIAN = np.empty((0, 0, 0))
 
 
 def _module(key: str, dispatchers: dict[str, Dispatcher], name: str, source: str) -> types.ModuleType:
-    """The generated module of this key, loaded (compiled machine code from the cache where it is there)."""
+    """The generated module of this key, loaded once (compiled machine code from the cache where it is there)."""
     path = cache_directory() / f"f{key[:32]}.py"
+    known = sys.modules.get(f"contin_{path.stem}")
+    if known is not None:
+        return known
     if not path.exists() or path.read_text() != source:
         write_text(path, source)
     spec = importlib.util.spec_from_file_location(f"contin_{path.stem}", path)
@@ -345,8 +348,11 @@ def _module(key: str, dispatchers: dict[str, Dispatcher], name: str, source: str
     sys.modules[spec.name] = module  # numba looks it up by name when it loads the compiled code
     try:
         spec.loader.exec_module(module)
-    except numba.core.errors.NumbaError as error:
-        raise ProblemError(_explain(name, error)) from error
+    except BaseException as error:
+        del sys.modules[spec.name]
+        if isinstance(error, numba.core.errors.NumbaError):
+            raise ProblemError(_explain(name, error)) from error
+        raise
     return module
 
 

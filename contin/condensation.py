@@ -248,6 +248,17 @@ def solve(n, local, border, chain, chain_border, dense, piv_local, piv_chain, pi
         _copy_vector(x[j * rows + n : (j + 1) * rows], b[j * rows : j * rows + inner])
 
 
+@njit(
+    "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],i8[:,::1], i8[:,::1], i8[::1], f8[:,::1],"
+    "f8[:,::1])",
+    **_OPTIONS,
+)
+def solve_rows(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, b, x):
+    """The same for each row of b (m, equations) and x (m, unknowns)."""
+    for i in range(b.shape[0]):
+        solve(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, b[i], x[i])
+
+
 @njit(inline="never", **_OPTIONS)
 def _forward_transposed(block, columns, x, rest):
     """Solve U^T z = x for the eliminated columns, in place; subtract what z contributes to the columns after them."""
@@ -324,6 +335,17 @@ def solve_transposed(n, local, border, chain, chain_border, dense, piv_local, pi
         _backward_transposed(local[j], inner, piv_local[j], border[j], y[j * rows : (j + 1) * rows], edge)
 
 
+@njit(
+    "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],i8[:,::1], i8[:,::1], i8[::1], f8[:,::1],"
+    "f8[:,::1])",
+    **_OPTIONS,
+)
+def solve_transposed_rows(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, c, y):
+    """The same for each row of c (m, unknowns) and y (m, equations)."""
+    for i in range(c.shape[0]):
+        solve_transposed(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, c[i], y[i])
+
+
 class Factorization:
     """A factored bordered almost-block-diagonal matrix: solves, transposed solves, sign of the determinant.
 
@@ -368,13 +390,15 @@ class Factorization:
         self.sign = sign if np.isfinite(dense[-1, -1]) else np.nan
 
     def solve(self, b):
-        """The x (unknowns,) with J x = b (equations,)."""
-        x = np.empty(self._unknowns)
-        solve(*self._factors, np.array(b, dtype=float), x)
+        """The x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""
+        b = np.array(b, dtype=float)
+        x = np.empty((*b.shape[:-1], self._unknowns))
+        (solve if b.ndim == 1 else solve_rows)(*self._factors, b, x)
         return x
 
     def solve_transposed(self, c):
-        """The y (equations,) with J^T y = c (unknowns,)."""
-        y = np.empty(self._unknowns)
-        solve_transposed(*self._factors, np.array(c, dtype=float), y)
+        """The y (equations,) with J^T y = c (unknowns,); for several, rows of y and c (m, ...)."""
+        c = np.array(c, dtype=float)
+        y = np.empty((*c.shape[:-1], self._unknowns))
+        (solve_transposed if c.ndim == 1 else solve_transposed_rows)(*self._factors, c, y)
         return y

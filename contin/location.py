@@ -296,7 +296,7 @@ class Segment:
         right, left, _ = smallest_directions(trial.factors, system.size)
 
         def mean(factors):
-            response = right.T @ np.array([factors.solve(w) for w in left.T]).T
+            response = right @ factors.solve(left).T
             values = np.linalg.eigvals(np.linalg.inv(response))
             return float(np.sort_complex(values[np.argsort(np.abs(values))[:2]]).real.mean())
 
@@ -313,7 +313,7 @@ class Segment:
         right, _, response = smallest_directions(there.factors, system.size)
         u, values, _ = np.linalg.svd(response)
         dimension = max(2, int(np.count_nonzero(values > 1e-3 * values[0])))
-        kernel = (right @ u[:, :dimension]).T
+        kernel = u[:, :dimension].T @ right
         return Event(at, "BP", f"kernel of dimension {dimension}", there, details=MultiplePoint(dimension, kernel))
 
     def _returned(self):

@@ -14,6 +14,7 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from contin.corrector import Newton
 from contin.errors import ConvergenceError
@@ -67,9 +68,8 @@ class _Bordered:
     def __init__(self, system, x, phi, psi):
         self.rows = np.pad(phi * system.weights, ((0, 0), (0, 1)))
         self.residual, self.factors = system.linearize(x, self.rows, psi[None, :])
-        zeros = np.zeros(system.equations)
-        solutions = [self.factors.solve(np.concatenate([zeros, unit])) for unit in np.eye(2)]
-        self.kernel, self.g = np.array([s[:-1] for s in solutions]), np.array([s[-1] for s in solutions])
+        solutions = self.factors.solve(np.hstack([np.zeros((2, system.equations)), np.eye(2)]))
+        self.kernel, self.g = solutions[:, :-1], solutions[:, -1]
 
     def left(self, system):
         unit = np.zeros(system.size + 1)
@@ -107,30 +107,48 @@ _WATCHED = 3
 
 
 @functools.lru_cache(maxsize=8)
-def _random_block(size, count):
-    block = np.random.default_rng(5).standard_normal((size, count))
+def _random_block(count, size):
+    block = np.random.default_rng(5).standard_normal((count, size))
     block.flags.writeable = False
     return block
 
 
+@njit("void(f8[:,::1])", cache=True, error_model="numpy", nogil=True)
+def _orthonormalize(rows):
+    """Make the rows orthonormal, in place: Gram-Schmidt, twice."""
+    count, size = rows.shape
+    for i in range(count):
+        largest = 0.0
+        for k in range(size):
+            largest = max(largest, abs(rows[i, k]))
+        for k in range(size):  # near a bifurcation solutions are huge
+            rows[i, k] /= largest
+        for turn in range(2 * i + 1):
+            j = turn % i if turn < 2 * i else i
+            product = 0.0
+            for k in range(size):
+                product += rows[j, k] * rows[i, k]
+            for k in range(size):
+                rows[i, k] = rows[i, k] - product * rows[j, k] if j < i else rows[i, k] / np.sqrt(product)
+
+
 def smallest_directions(factors, size, count: int = _WATCHED):
-    """Right and left singular vectors, as columns, of the smallest singular values: inverse iteration on a block.
+    """Right and left singular vectors, as rows, of the smallest singular values: inverse iteration on a block.
 
     Returns
     -------
-    right, left : ndarray, shape (size, count)
+    right, left : ndarray, shape (count, size)
     response : ndarray, shape (count, count)
-        right^T J^-1 left: about the reciprocals of the singular values.
+        right J^-1 left^T: about the reciprocals of the singular values.
     """
-    count = min(count, size)
-    right = _random_block(size, count)
+    right = _random_block(min(count, size), size)
     for _ in range(2):
-        left = np.array([factors.solve_transposed(v) for v in right.T]).T
-        left = np.linalg.qr(left / np.abs(left).max(axis=0))[0]
-        solved = np.array([factors.solve(w) for w in left.T]).T
-        right = solved / np.abs(solved).max(axis=0)
-    right = np.linalg.qr(right)[0]
-    return right, left, right.T @ solved
+        left = factors.solve_transposed(right)
+        _orthonormalize(left)
+        solved = factors.solve(left)
+        right = solved.copy()
+        _orthonormalize(right)
+    return right, left, right @ solved.T
 
 
 #: Factor by which a watched singular value may shrink in one step without passing zero, ...
@@ -150,7 +168,7 @@ def quotients(before, after, size):
     """
     with np.errstate(all="ignore"):
         right, left, response = smallest_directions(after, size)
-        earlier = right.T @ np.array([before.solve(w) for w in left.T]).T
+        earlier = right @ before.solve(left).T
         if not (np.all(np.isfinite(response)) and np.all(np.isfinite(earlier))):
             return np.full(len(response), np.nan)
         try:
