@@ -1,4 +1,4 @@
-"""AUTO-07p, as distributed (Debian: ``apt-get install auto-07p gfortran``): the equations compiled and run without its Python front end.
+"""AUTO-07p, as distributed (``apt-get install auto-07p gfortran``), run without its Python front end.
 
 The Fortran files in ``auto/`` state the ribbon three times, with analytic Jacobians: ``half`` and ``loop`` in all thirteen
 components of equations (1)-(4) of Audoly & Seffen (2015), ``cell`` in the four of the quarter wave. A study is two runs: the
@@ -24,7 +24,7 @@ SHAPES = {"half": (13, 13, "1, 3"), "loop": (13, 13, "1, 3"), "cell": (4, 6, "1,
 
 CONSTANTS = """\
 NDIM={ndim}, IPS=4, IRS={restart}, ISW={switch}, ICP=[{free}], NBC={nbc}, NINT=0, JAC=1
-NTST={intervals}, NCOL={degree}, IAD=3, ILP={folds}, ISP={branch_points}, NMX=2000, NPR=0, MXBF=0, IID=2, IPLT=0
+NTST={intervals}, NCOL={degree}, IAD=3, ILP={folds}, ISP={branch_points}, NMX=2000, NPR=0, MXBF=0, IID={diagnostics}, IPLT=0
 ITMX=9, ITNW=7, NWTN=3, EPSL={tolerance}, EPSU={tolerance}, EPSS={event_tolerance}
 DS=0.05, DSMIN=1e-6, DSMAX={longest_step}, IADS=1, SP=['{stop}']
 """
@@ -58,19 +58,19 @@ def build(statement: str) -> tuple[Path, float]:
 _FOLDERS: list[tempfile.TemporaryDirectory] = []
 
 
-def study(statement: str, stop: str = "BP", intervals=40, degree=4, tolerance=1e-10, longest_step=0.5, events=True) -> dict:
+def study(statement: str, stop: str = "BP", intervals=40, degree=4, tolerance=1e-10, longest_step=1.0, count=False) -> dict:
     """From the circle through its bifurcation along the branch to the first fold (``stop`` LP) or to its end (BP).
 
-    ``seconds`` is AUTO's own "Total Time" of the second run, ``circle_seconds`` of the first, ``process_seconds`` the wall clock
-    of both processes. ``fold`` and ``end`` are in full precision. ``events=False`` leaves out, on the branch, the branch
-    points, and with them the end.
+    ``seconds`` is AUTO's own "Total Time" of the second run, ``circle_seconds`` of the first, ``process_seconds`` the wall
+    clock of both processes. ``fold`` and ``end`` are in full precision. ``iterations`` are known with ``count`` only, which
+    makes AUTO write its diagnostics.
     """
     program, _ = build(statement)
     ndim, nbc, free = SHAPES[statement]
-    values = dict(ndim=ndim, nbc=nbc, free=free, intervals=intervals, degree=degree, tolerance=tolerance,
-                  event_tolerance=10 * tolerance, longest_step=longest_step)  # fmt: skip
-    first = dict(restart=0, switch=1, folds=0, branch_points=1, stop="BP1")
-    second = dict(restart=2, switch=-1, folds=1, branch_points=1 if events else 0, stop=f"{stop}1")
+    values = {"ndim": ndim, "nbc": nbc, "free": free, "intervals": intervals, "degree": degree, "tolerance": tolerance,
+              "event_tolerance": 10 * tolerance, "longest_step": longest_step, "diagnostics": 2 if count else 0}  # fmt: skip
+    first = {"restart": 0, "switch": 1, "folds": 0, "branch_points": 1, "stop": "BP1"}
+    second = {"restart": 2, "switch": -1, "folds": 1, "branch_points": 1 if stop == "BP" else 0, "stop": f"{stop}1"}
     with tempfile.TemporaryDirectory(prefix="bench-auto-") as name:
         folder = Path(name)
         circle = _run(program, folder, CONSTANTS.format(**values, **first))
@@ -85,7 +85,7 @@ def study(statement: str, stop: str = "BP", intervals=40, degree=4, tolerance=1e
         "points": branch["points"], "iterations": branch["iterations"], "labels": branch["labels"],
         "fold": min(kappa, key=lambda value: abs(value - folds[0])) if folds else None,
         "end": min(kappa, key=lambda value: abs(value - ends[-1])) if ends else None,
-        "circle": circle["labels"][-1][1], "kappa": kappa,
+        "circle": circle["labels"][-1][1],
     }  # fmt: skip
 
 

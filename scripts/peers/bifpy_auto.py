@@ -1,4 +1,4 @@
-"""bifpy (pip; needs gfortran and make): AUTO-07p driven from Python, the functions transpiled to Fortran and compiled in every run.
+"""bifpy (pip; needs gfortran, make): AUTO-07p driven from Python, functions transpiled to Fortran and compiled in every run.
 
     python bifpy_auto.py half|cell BP|LP INTERVALS DEGREE TOLERANCE LONGEST_STEP
 
@@ -103,12 +103,13 @@ def study(statement, stop, intervals, degree, tolerance, longest_step):
 
     imported = time.perf_counter()
     rates, start, conditions, ndim, nbc, icu = STATEMENTS[statement]
-    settings = dict(
-        ips=auto.IPS_GENERAL_BVP, ndim=ndim, npar=len(icu), nbc=nbc, nint=0, nmx=2000, ntst=intervals, ncol=degree, iad=3, ilp=0,
-        isp=1, mxbf=0, iads=1, itmx=9, itnw=7, nwtn=3, jac=1, ds=0.05, dsmin=1e-6, dsmax=longest_step, rl0=-1e300, rl1=1e300,
-        a0=-1e300, a1=1e300, epsl=tolerance, epsu=tolerance, epss=10 * tolerance, iid=0, iplt=0,
-    )  # fmt: skip
-    options = dict(icu=icu, bcnd=conditions, transpile=True, jac=auto.AUTO_JACOBIAN, bcnd_jac=auto.AUTO_JACOBIAN)
+    settings = {
+        "ips": auto.IPS_GENERAL_BVP, "ndim": ndim, "npar": len(icu), "nbc": nbc, "nint": 0, "nmx": 2000, "ntst": intervals,
+        "ncol": degree, "iad": 3, "ilp": 0, "isp": 1, "mxbf": 0, "iads": 1, "itmx": 9, "itnw": 7, "nwtn": 3, "jac": 1,
+        "ds": 0.05, "dsmin": 1e-6, "dsmax": longest_step, "rl0": -1e300, "rl1": 1e300, "a0": -1e300, "a1": 1e300, "epsl": tolerance,
+        "epsu": tolerance, "epss": 10 * tolerance, "iid": 0, "iplt": 0,
+    }  # fmt: skip
+    options = {"icu": icu, "bcnd": conditions, "transpile": True, "jac": auto.AUTO_JACOBIAN, "bcnd_jac": auto.AUTO_JACOBIAN}
     circle = auto.run(rates, start, settings, sp=["BP1"], **options).branches[0]
     point = next(point for point in circle.points if point.point_type == auto.PointType.BRANCH_POINT)
     branch = auto.restart(rates, settings | {"ilp": 1}, restart_point=point, isw=-1, sp=[f"{stop}1"], **options).branches[0]

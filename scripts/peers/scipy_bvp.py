@@ -1,9 +1,9 @@
 """SciPy's ``solve_bvp`` on the cell of the branch (1, 2), driven by a pseudo-arclength loop, with analytic Jacobians.
 
 ``solve_bvp`` has no continuation and no folds, so both are here, in the way that costs it least: arclength is measured in the
-three parameters (one boundary condition, no further state), each solution starts from the mesh of the last one, the loop runs at
-a coarse tolerance until kappa_n turns, and only then the fold is taken to the wanted tolerance, as the maximum of kappa_n over
-M2 by interpolation. States (q0 q1 q2 q3), parameters (kappa_n, M1, M2); the same equations as ``auto/cell.f90``.
+three parameters (one boundary condition, no further state), each solution starts from the mesh of the last one, the loop runs
+at a coarse tolerance until kappa_n turns, and only then the fold is taken to the wanted tolerance, as the maximum of kappa_n
+over M2 by interpolation. States (q0 q1 q2 q3), parameters (kappa_n, M1, M2); the same equations as ``auto/cell.f90``.
 """
 
 from __future__ import annotations
@@ -152,8 +152,8 @@ class Loop:
 def fold(tolerance: float) -> dict:
     """kappa_n at the fold of (1, 2) with ``tol`` of solve_bvp, and the seconds it took.
 
-    Near the fold kappa_n is a smooth function of M2: the maximum of the polynomial through the last points is where the next one
-    is computed, until that moves kappa_n by less than round-off allows or the tolerance asks for.
+    Near the fold kappa_n is a smooth function of M2: the next point is where the polynomial through the last ones has its
+    maximum, until that moves kappa_n by less than the tolerance asks for.
     """
     began = time.perf_counter()
     loop, fixed = Loop(), np.array([0.0, 0.0, 1.0])

@@ -1,0 +1,154 @@
+"""Pictures of the results, and the Markdown that goes with them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from benchmarks import cost, fold, like_for_like, startup
+
+TITLES = {
+    "like-for-like": "Like for like",
+    "fold": "Tool for tool: the fold of (1, 2)",
+    "cost": "Cost laws",
+    "startup": "Start-up",
+}
+TABLES = {"like-for-like": like_for_like.table, "fold": fold.table, "cost": cost.table, "startup": startup.table}
+
+
+def markdown(results: dict) -> dict[str, str]:
+    """A block of Markdown for the machine and for every part that was run."""
+    machine = dict(results["machine"])
+    load = machine.pop("load_at_start")
+    text = ", ".join(f"{name} {value}" for name, value in machine.items())
+    blocks = {"machine": f"{text}; one thread; load when it began {load:.1f}." if load is not None else f"{text}; one thread."}
+    for part, table in TABLES.items():
+        if part in results:
+            blocks[part] = table(results[part])
+            skipped = results[part].get("skipped", {})
+            if skipped:
+                blocks[part] += "\n\nNot run: " + "; ".join(f"{name} ({reason})" for name, reason in skipped.items()) + "."
+    if blocks.get("like-for-like") and (ratio := like_for_like.ratio(results["like-for-like"])) is not None:
+        blocks["like-for-like"] += f"\n\nRatio per point, AUTO-07p / contin: {ratio:.2f}."
+    return blocks
+
+
+def page(results: dict) -> str:
+    """The whole as one Markdown document."""
+    blocks = markdown(results)
+    parts = [f"## {TITLES[part]}\n\n{text}\n" for part, text in blocks.items() if part != "machine"]
+    return "\n".join([f"# Benchmark\n\n{blocks['machine']}\n", *parts])
+
+
+def update(path: Path, results: dict) -> None:
+    """Put the blocks into a document, between ``<!-- bench: PART -->`` and ``<!-- end -->``.
+
+    Raises
+    ------
+    ValueError
+        The document has no place for a block.
+    """
+    text = path.read_text(encoding="utf-8")
+    for part, block in markdown(results).items():
+        pattern = re.compile(rf"(<!-- bench: {part} -->\n).*?(\n<!-- end -->)", re.DOTALL)
+        if not pattern.search(text):
+            raise ValueError(f"{path}: has no place for {part} (<!-- bench: {part} --> ... <!-- end -->)")
+        text = pattern.sub(lambda match, block=block: match[1] + block + match[2], text)
+    path.write_text(text, encoding="utf-8")
+
+
+def pictures(results: dict, folder: Path) -> list[Path]:
+    """Draw what was run; the files."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    folder.mkdir(parents=True, exist_ok=True)
+    drawers = {"fold": ("bench-fold.png", _fold), "cost": ("bench-cost.png", _cost)}
+    paths = []
+    for part, (name, draw) in drawers.items():
+        if part in results:
+            paths.append(_saved(draw(results[part]), folder / name))
+    if "cost" in results:
+        paths.append(_saved(_errors(results["cost"]["errors"]), folder / "bench-errors.png"))
+    return paths
+
+
+def _saved(figure, path: Path) -> Path:
+    figure.savefig(path, dpi=130, bbox_inches="tight")
+    return path
+
+
+def _fold(results):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    tools = list(dict.fromkeys(row["tool"] for row in results["rows"]))
+    for axes, key, title in zip(
+        figure.subplots(1, 2, sharey=True), ("seconds", "process_seconds"), ("in the process, warm", "whole processes")
+    ):
+        for tool in tools:
+            rows = sorted((row for row in results["rows"] if row["tool"] == tool), key=lambda row: row[key])
+            axes.loglog([row[key] for row in rows], [max(row["error"], 1e-16) for row in rows], "o-", label=tool, markersize=4)
+        axes.set(xlabel=f"seconds, {title}", title=title)
+        axes.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("error of $\\kappa_n$ at the fold of (1, 2)")
+    figure.axes[1].legend(fontsize=8)
+    return figure
+
+
+def _cost(results):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 3.8), layout="constrained")
+    time, size, degree, rate = figure.subplots(1, 4)
+    for axes, rows, key, power, label in (
+        (time, results["intervals"], "intervals", 1, "intervals (n = 7, degree 4)"),
+        (size, results["components"], "n", 3, "components n (20 intervals, degree 4)"),
+        (degree, results["degree"], "degree", 3, "degree (40 intervals, n = 7)"),
+    ):
+        x = [row[key] for row in rows]
+        axes.loglog(x, [1e3 * row["linearize"] for row in rows], "o-", label="linearize")
+        axes.loglog(x, [1e3 * row["solve"] for row in rows], "s-", label="solve")
+        axes.loglog(x, [row["bytes_held"] / 1e6 for row in rows], "^:", label="memory, MB", color="gray")
+        guide = [1e3 * rows[-1]["linearize"] * (value / x[-1]) ** power for value in x]
+        axes.loglog(x, guide, "k--", linewidth=0.8, label=f"power {power}")
+        axes.set(xlabel=label)
+        axes.legend(fontsize=7)
+    time.set_ylabel("ms")
+    rows = results["components"]
+    rate.loglog(
+        [row["n"] * row["degree"] for row in rows], [row["gflops"] for row in rows], "o-", label="contin, one linearization"
+    )
+    for name in ("dgetrf", "dgemm"):
+        rate.loglog(
+            [row["size"] for row in results["blas"]],
+            [row[f"{name}_gflops"] for row in results["blas"]],
+            "--",
+            label=f"LAPACK {name}",
+        )
+    rate.set(xlabel="size of a block, n × degree", ylabel="GFlop/s")
+    rate.legend(fontsize=7)
+    return figure
+
+
+def _errors(cases):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 3.8), layout="constrained")
+    for axes, case in zip(figure.subplots(1, len(cases), sharey=True), cases):
+        for colour, degree in enumerate(range(2, 9)):
+            for adapted, style in ((False, ":"), (True, "-")):
+                rows = [row for row in case["rows"] if row["degree"] == degree and row["adapted"] == adapted]
+                label = f"degree {degree}" if adapted else None
+                axes.loglog(
+                    [row["intervals"] for row in rows],
+                    [max(row["error"], 1e-16) for row in rows],
+                    style,
+                    color=f"C{colour}",
+                    label=label,
+                )
+        axes.set(xlabel="intervals", title=case["name"])
+        axes.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("error of $\\kappa^*$ (dotted: uniform mesh)")
+    figure.axes[0].legend(fontsize=7)
+    return figure
