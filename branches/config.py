@@ -77,8 +77,9 @@ class Config(_Strict):
     """One primary branch: the mode of wavenumber n on the m-covered circle, followed to its end."""
 
     title: str = ""
-    law: Literal["ribbon", "flat rod", "isotropic rod"] = "ribbon"
+    law: Literal["ribbon", "flat rod", "isotropic rod", "finite width"] = "ribbon"
     nu: float = Field(0.3, gt=-1, le=0.5, description="Poisson's ratio")
+    Gamma: float | None = Field(None, ge=0, le=1e12, description="w^2 / (h L/2pi), width and thickness; law finite width only")
     m: int = Field(ge=1, le=1000, description="covering index of the circle that the branch leaves")
     n: int = Field(ge=1, le=1000, description="wavenumber of the mode")
     domain: Literal["cell", "half loop"] = "cell"
@@ -112,15 +113,23 @@ class Config(_Strict):
             The mode has no bifurcation; see :func:`ribbon_model.linear.thresholds`.
         """
         from ribbon_model.laws import LAWS
-        from ribbon_model.linear import thresholds
+        from ribbon_model.linear import circle, thresholds
 
-        m, kappa_n = self.m, thresholds(LAWS[self.law], self.m, self.n, self.nu)[0]
-        return {"kappa_n": kappa_n, "kappa_star": m, "energy": m * m / 2 - m * kappa_n, "M1": m - kappa_n, "M2": 0.0}
+        law, material = LAWS[self.law], (self.nu, self.Gamma)
+        kappa_n = thresholds(law, self.m, self.n, *material)[0]
+        return {"kappa_n": kappa_n, "M2": 0.0, **circle(law, self.m, kappa_n, *material)}
+
+    @property
+    def material(self) -> str:
+        """The law with its Gamma, if it has one, as one name."""
+        from ribbon_model.laws import label
+
+        return label(self.law, self.Gamma)
 
 
 @dataclass(frozen=True)
 class DiagramConfig:
-    """A scene of many branches: lists in place of ``law``, ``nu``, ``m`` or ``n``, or ``pairs`` of (m, n).
+    """A scene of many branches: lists in place of ``law``, ``nu``, ``Gamma``, ``m`` or ``n``, or ``pairs`` of (m, n).
 
     Attributes
     ----------
@@ -140,7 +149,7 @@ class DiagramConfig:
 
 
 #: Fields that may hold a list; a scene that has one, or ``pairs``, is a diagram.
-_SWEPT = ("law", "nu", "m", "n")
+_SWEPT = ("law", "nu", "Gamma", "m", "n")
 #: More branches than anybody wants in one scene.
 _MOST_BRANCHES = 10_000
 
@@ -156,27 +165,36 @@ def _diagram(values: dict, name: str, settings: list[str]) -> DiagramConfig:
         if not entries:
             raise ConfigError(f"{name}: {key}: the list is empty")
     pairs = _pairs(values, lists, name)
-    families = list(itertools.product(lists.get("law", ["ribbon"]), lists.get("nu", [0.3])))
+    families = _families(lists)
     if len(families) * len(pairs) > _MOST_BRANCHES:
         raise ConfigError(f"{name}: {len(families) * len(pairs)} branches are more than {_MOST_BRANCHES}")
     shared = {key: value for key, value in values.items() if key not in (*_SWEPT, "pairs", "title")}
     found, absent = [], {}
-    for (law, nu), (m, n) in itertools.product(families, pairs):
+    for (law, nu, Gamma), (m, n) in itertools.product(families, pairs):
         whole = type(m) is int and type(n) is int and m > 0 and n > 0
         if whole and (m == n or (shared.get("domain", "cell") == "cell" and m % (2 * n) == 0)):
             continue
         try:
-            found.append(Config.model_validate({**shared, "law": law, "nu": nu, "m": m, "n": n}))
+            found.append(Config.model_validate({**shared, "law": law, "nu": nu, "Gamma": Gamma, "m": m, "n": n}))
         except ValidationError as error:
             if error.errors()[0]["loc"]:  # a field is wrong in itself, whatever the combination
                 raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
-            absent[f"{law}, nu = {nu:g}, ({m}, {n})"] = _sentence(error)
+            gamma = "" if Gamma is None else f", Gamma = {Gamma:g}"
+            absent[f"{law}{gamma}, nu = {nu:g}, ({m}, {n})"] = _sentence(error)
     if not found:
         reason = next(iter(absent.values()), "n = m is a rigid rotation")
         raise ConfigError(f"{name}: none of its branches can be run ({reason})")
-    if len(set(found_keys := [(c.law, c.nu, c.m, c.n) for c in found])) < len(found_keys):
+    if len(set(found_keys := [(c.material, c.nu, c.m, c.n) for c in found])) < len(found_keys):
         raise ConfigError(f"{name}: a branch stands twice in the lists")
     return DiagramConfig(str(values.get("title", "")), values, tuple(found), absent)
+
+
+def _families(lists: dict) -> list[tuple]:
+    """All (law, nu, Gamma) of a diagram; beside the law that has a Gamma, the others stand without."""
+    laws, Gammas = lists.get("law", ["ribbon"]), lists.get("Gamma", [None])
+    without = [None] if "finite width" in laws else Gammas
+    kinds = [(law, Gamma) for law in laws for Gamma in (Gammas if law == "finite width" else without)]
+    return [(law, nu, Gamma) for law, Gamma in kinds for nu in lists.get("nu", [0.3])]
 
 
 def _pairs(values: dict, lists: dict, name: str) -> list[tuple]:

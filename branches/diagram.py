@@ -25,6 +25,8 @@ def compute(text: str) -> tuple[bytes, str]:
 def file_name(config: Config) -> str:
     """The file of a branch inside the folder of its diagram."""
     law = config.law.replace(" ", "_")
+    if config.Gamma is not None:
+        law += f"_Gamma{config.Gamma:.12g}"
     return f"{law}_nu{config.nu:g}_m{config.m}_n{config.n}.h5"
 
 
@@ -44,7 +46,7 @@ class _Plan:
 
     @staticmethod
     def _key(config):
-        return config.law, config.nu, config.m, config.n
+        return config.material, config.nu, config.m, config.n
 
     @staticmethod
     def _partner(key):
@@ -59,7 +61,7 @@ class _Plan:
             if other in busy:
                 continue
             self._open.remove(config)
-            if other and diagram_graph.holds_circle(self._graph, config.law, config.nu, config.m, config.n):
+            if other and diagram_graph.holds_circle(self._graph, config.material, config.nu, config.m, config.n):
                 self.left_out.append(config)
                 continue
             return config
@@ -101,7 +103,7 @@ def run_diagram(
                 problem = _take(folder, one, result, graph)
                 if problem:
                     failed[file_name(one)] = problem
-                place = "" if problem else diagram_graph.describe(graph, one.m, one.n, one.law, one.nu)
+                place = "" if problem else diagram_graph.describe(graph, one.m, one.n, one.material, one.nu)
                 display.branch_done(one, problem, place)
     graph.graph.update({"config": dump(config), "failed": json.dumps(failed), "absent": json.dumps(config.absent)})
     diagram_graph.save(graph, folder)

@@ -137,7 +137,7 @@ class Display:
 
 def name_of(config) -> str:
     """The branch in words."""
-    return f"{config.law}, (m, n) = ({config.m}, {config.n}), nu = {config.nu:g}"
+    return f"{config.material}, (m, n) = ({config.m}, {config.n}), nu = {config.nu:g}"
 
 
 def _describe(config, event) -> str:
@@ -149,8 +149,10 @@ def _describe(config, event) -> str:
     if name == "start":
         return f"leaves the {config.m}-covered circle at {place}{certain}"
     if name == "trivial branch":
-        covering = round(event["kappa_star"])
-        inside_out = ", curled against its natural curvature" if covering < 0 else ""
-        return f"ends on the {abs(covering)}-covered circle{inside_out} at {place}{certain}"
+        from ribbon_model.linear import covering
+
+        index = covering(event["kappa_n"], event["kappa_star"], event["energy"])
+        inside_out = ", curled against its natural curvature" if index < 0 else ""
+        return f"ends on the {abs(index)}-covered circle{inside_out} at {place}{certain}"
     what = f" ({name})" if name and label != b"LP" else ""
     return f"{_KINDS.get(label, 'end')}{what} at {place}{certain}, kappa* = {event['kappa_star']:.10f}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from branches.draw_diagram import smooth
+from ribbon_model.laws import label as name_law
 
 # Okabe-Ito colours: told apart by the colour-blind, and in print
 CURVE, FOLD, END, SHAPE, BACK = "#0072B2", "#D55E00", "#000000", "#E8A33D", "#7A5195"
@@ -71,7 +72,8 @@ def curve(axes, branch, chosen) -> None:
             axes.annotate(f"{event['kappa_n']:.4f}", place, (9, -3), textcoords="offset points", fontsize=9)
     axes.set_xlabel(r"natural curvature $\kappa_n L/2\pi$")
     axes.set_ylabel(r"conjugate curvature $\bar\kappa^*$")
-    axes.set_title(f"{config['law']}, (m, n) = ({config['m']}, {config['n']}), $\\nu$ = {config['nu']:g}", fontsize=11)
+    material = name_law(config["law"], config["Gamma"])
+    axes.set_title(f"{material}, (m, n) = ({config['m']}, {config['n']}), $\\nu$ = {config['nu']:g}", fontsize=11)
     axes.grid(alpha=0.25)
     axes.margins(0.1)
     axes.legend(frameon=False)

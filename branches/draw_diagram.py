@@ -131,16 +131,21 @@ def _coverings(graph, law, nu):
 
 def circles(axes, graph, law: str, nu: float, window) -> None:
     """The planar circles: thick where the published linear theory has them stable, thin elsewhere."""
-    from ribbon_model.laws import LAWS
-    from ribbon_model.linear import stability_interval
+    from ribbon_model.laws import from_label
+    from ribbon_model.linear import circle, stability_interval
+
+    material, Gamma = from_label(law)
+
+    def plot(m, ends, **style):
+        axes.plot(ends, [circle(material, m, kappa_n, nu, Gamma)["kappa_star"] for kappa_n in ends], zorder=1, **style)
 
     for m in _coverings(graph, law, nu):
-        axes.plot(window, [m, m], color=UNSTABLE, lw=0.8, zorder=1)
+        plot(m, window, color=UNSTABLE, lw=0.8)
         if m < 1:  # curled against its natural curvature: the published intervals do not speak of these
             continue
-        low, high = stability_interval(LAWS[law], m, nu)
+        low, high = stability_interval(material, m, nu, Gamma)
         ends = [max(window[0], m * low), min(window[1], m * high)]
-        axes.plot(ends, [m, m], color=STABLE, lw=2.6, zorder=1, solid_capstyle="butt")
+        plot(m, ends, color=STABLE, lw=2.6, solid_capstyle="butt")
 
 
 def legend(graph, law: str, nu: float) -> list:

@@ -13,6 +13,9 @@ from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 
+from ribbon_model.laws import from_label, label
+from ribbon_model.linear import circle, covering
+
 #: Columns of a branch that an edge carries.
 COLUMNS = ("arclength", "kappa_n", "kappa_star", "energy")
 _SPECIAL = (b"LP", b"BP", b"SB", b"EP", b"MX")
@@ -42,7 +45,7 @@ def add_branch(graph, branch, name: str) -> bool:
         False if it is in the diagram already, computed from its other end.
     """
     config = branch.config
-    family = {"law": config["law"], "nu": config["nu"], "m": config["m"], "n": config["n"]}
+    family = {"law": label(config["law"], config["Gamma"]), "nu": config["nu"], "m": config["m"], "n": config["n"]}
     special = [event for event in branch.events if event["label"] in _SPECIAL]
     nodes = [_node_of(event, family, branch.reason) for event in special]
     rows = [branch.points[first["point"] : last["point"] + 1] for first, last in pairwise(special)]
@@ -86,8 +89,8 @@ def node(family: dict, kind: str, values: dict, number: int) -> tuple[str, dict]
     """
     attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
     if kind == "circle":
-        covering = round(attributes["kappa_star"])
-        return _circle(family, covering), attributes | {"covering": covering, "mode": family["n"]}
+        index = covering(attributes["kappa_n"], attributes["kappa_star"], attributes["energy"])
+        return _circle(family, index), attributes | {"covering": index, "mode": family["n"]}
     return f"{family['law']} nu={family['nu']:g} ({family['m']},{family['n']}) {kind} {number}", attributes
 
 
@@ -163,12 +166,19 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
             d["covering"] for _, d in graph.nodes(data=True) if d["kind"] == "circle" and (d["law"], d["nu"]) == (law_, nu_)
         }
         for m in sorted(coverings):
-            found.append({"law": law_, "nu": nu_, "circle": m, "kappa_star": float(m), "energy": m * m / 2 - m * kappa_n})
+            found.append({"law": law_, "nu": nu_, "circle": m, **_planar(law_, nu_, m, kappa_n)})
     for _, _, data in graph.edges(data=True):
         if law in (None, data["law"]) and nu in (None, data["nu"]):
             for place in _crossings(data, kappa_n):
                 found.append({"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **place})
     return sorted(found, key=lambda state: (state["law"], state["nu"], state["energy"]))
+
+
+def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
+    """kappa* and energy of a planar circle."""
+    material, Gamma = from_label(law)
+    values = circle(material, m, kappa_n, nu, Gamma)
+    return {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
 
 
 def _crossings(data, kappa_n):

@@ -43,7 +43,9 @@ def seed(config: Config):
         f"(m, n) = ({config.m}, {config.n}) on the {config.domain}; take more intervals"
     )
     try:
-        system, x, tangent = start(LAWS[config.law], config.m, config.n, config.nu, config.mesh.intervals, config.mesh.degree)
+        system, x, tangent = start(
+            LAWS[config.law], config.m, config.n, config.nu, config.mesh.intervals, config.mesh.degree, Gamma=config.Gamma
+        )
     except (ConvergenceError, ValueError) as error:
         raise coarse from error
     expected = config.at_bifurcation()["kappa_n"]

@@ -37,13 +37,13 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
     single = isinstance(config, Config)
     graph, failed = diagram.new_graph(config.title), {}
     for one in sorted([config] if single else config.branches, key=lambda one: one.n * one.m):
-        family = {"law": one.law, "nu": one.nu, "m": one.m, "n": one.n}
-        if diagram.holds_circle(graph, one.law, one.nu, one.m, one.n):
+        family = {"law": one.material, "nu": one.nu, "m": one.m, "n": one.n}
+        if diagram.holds_circle(graph, one.material, one.nu, one.m, one.n):
             continue  # there already, from its other end
         try:
             points = exact.curve(one.m, one.n, one.nu, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law)
         except (ValueError, RuntimeError) as error:
-            failed[f"{one.law}, nu = {one.nu:g}, ({one.m}, {one.n})"] = str(error)
+            failed[f"{one.material}, nu = {one.nu:g}, ({one.m}, {one.n})"] = str(error)
             continue
         _add(graph, family, points)
     graph.graph |= {"source": SOURCE, "failed": json.dumps(failed), "absent": json.dumps({} if single else config.absent)}

@@ -40,6 +40,7 @@ MEANINGS = {
     "kappa_star": "conjugate curvature of equation (28), mean of dH/dkappa_n (dimensionless)",
     "energy": "strain energy / (2 pi B / L), without the constant kappa_n^2 / 2",
     "nu": "Poisson's ratio",
+    "Gamma": "w^2 / (h L / 2 pi) of the law finite width, w the width and h the thickness",
     "M1": "moment about d1 at S = 0, in units of B 2 pi / L",
     "M2": "moment about d2 at S = 0; zero on a planar circle",
     "M3": "moment about d3 at S = 0",

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import math
+import types
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -56,6 +57,22 @@ class Law:
         if "Gamma" in self.parameters:
             return lambda M1, M2, M3, p: response(M1, M2, M3, p.kappa_n, p.nu, p.Gamma)
         return lambda M1, M2, M3, p: response(M1, M2, M3, p.kappa_n, p.nu)
+
+    def linearized(self, moments, kappa_n: float, *parameters: float):
+        """Strains (K, 3) and compliance D2H (K, 3, 3) at components of the moment on the directors (K, 3), by complex steps."""
+        import numpy as np
+
+        step = 1e-30
+        arguments = np.repeat(np.asarray(moments).T[:, None].astype(complex), 3, axis=1)  # component, direction, place
+        arguments[range(3), range(3)] += 1j * step
+        shape = arguments.shape[1:]
+        if self.gradient:  # has loops and decisions: a place at a time
+            places = [self.response(*moment, kappa_n, *parameters)[1:4] for moment in arguments.reshape(3, -1).T]
+            strain = np.array(places, dtype=complex).T.reshape(3, *shape)
+        else:  # the same code as plain Python's, on arrays
+            response = types.FunctionType(self.response.__code__, {"math": np})
+            strain = np.array([np.broadcast_to(w, shape) for w in response(*arguments, kappa_n, *parameters)[1:4]])
+        return strain[:, 0].real.T, strain.imag.transpose(2, 0, 1) / step
 
     def values(self, nu: float, Gamma: float | None = None) -> dict[str, float]:
         """The law's parameters by name.
@@ -106,3 +123,14 @@ FINITE_WIDTH = Law("finite width", finite_width.hamiltonian, True, parameters=("
 PAPER_LAWS = {law.name: law for law in (RIBBON, FLAT_ROD, ISOTROPIC_ROD)}
 #: All laws by name.
 LAWS = PAPER_LAWS | {FINITE_WIDTH.name: FINITE_WIDTH}
+
+
+def label(law: str, Gamma: float | None = None) -> str:
+    """A law with its Gamma, if it has one, as one name."""
+    return law if Gamma is None else f"{law}, Gamma = {Gamma:.12g}"
+
+
+def from_label(name: str) -> tuple[Law, float | None]:
+    """The law and the Gamma of a `label`."""
+    law, _, Gamma = name.partition(", Gamma = ")
+    return LAWS[law], float(Gamma) if Gamma else None

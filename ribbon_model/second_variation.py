@@ -17,18 +17,17 @@ see docs/stability.md. v is free: two functions (three for a law without omega_2
 from __future__ import annotations
 
 import math
-import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from contin.collocation import basis, interpolation
+from ribbon_model import linear
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
 from ribbon_model.shape import frames
 
-_STEP = 1e-30  # of the imaginary part: derivatives to round-off
 _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
 
 
@@ -73,16 +72,11 @@ class Equilibrium:
     moment: np.ndarray
     force: np.ndarray
     symmetry: Symmetry
+    Gamma: float | None = None
 
     def response(self, moment):
         """Strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""
-        # the same code as plain Python's, on arrays of complex numbers
-        response = types.FunctionType(self.law.response.__code__, {"math": np})
-        arguments = np.repeat(moment.T[:, None].astype(complex), 3, axis=1)  # component, direction of the step, place
-        arguments[range(3), range(3)] += 1j * _STEP
-        shape = arguments.shape[1:]
-        strain = np.array([np.broadcast_to(w, shape) for w in response(*arguments, self.kappa_n, self.nu)[1:4]])
-        return strain[:, 0].real.T, strain.imag.transpose(2, 0, 1) / _STEP
+        return self.law.linearized(moment, self.kappa_n, *self.law.values(self.nu, self.Gamma).values())
 
 
 def coupling(moment, force) -> np.ndarray:
@@ -97,7 +91,7 @@ def cross_matrix(a) -> np.ndarray:
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-def circle(law: Law, nu: float, m: int, kappa_n: float) -> Equilibrium:
+def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = None) -> Equilibrium:
     """The planar m-covered circle.
 
     Raises
@@ -112,8 +106,8 @@ def circle(law: Law, nu: float, m: int, kappa_n: float) -> Equilibrium:
         normal = np.array([np.sin(angle), -np.cos(angle), zero])  # d2 = d3 x d1
         return np.array([[zero, zero, one], normal, tangent]).transpose(2, 0, 1)
 
-    moment = np.array([0.0, 0.0, m - kappa_n])
-    found = Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), Symmetry(order=m, mirror=True))
+    moment = np.array([0.0, 0.0, linear.circle(law, m, kappa_n, nu, Gamma)["M1"]])
+    found = Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), Symmetry(order=m, mirror=True), Gamma)
     strain = found.response(directors(np.zeros(1)) @ moment)[0][0]
     if not np.abs(strain - [m, 0, 0]).max() < 1e-9 * m:
         raise ValueError(
@@ -149,7 +143,7 @@ def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, flo
         axes, directors, symmetry = _unfolded_cell(sample, p["length"])
     else:
         axes, directors, symmetry = _unfolded_half(sample)
-    return Equilibrium(law, p["nu"], p["kappa_n"], directors, axes @ moment, axes @ force, symmetry)
+    return Equilibrium(law, p["nu"], p["kappa_n"], directors, axes @ moment, axes @ force, symmetry, p.get("Gamma"))
 
 
 def _unfolded_half(sample):

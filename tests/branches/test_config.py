@@ -13,7 +13,7 @@ BOMB = "a: &a [x, x]\n" + "".join(f"{c}: &{c} [*{p}, *{p}, *{p}, *{p}]\n" for p,
 
 # text of the file, and what the sentence must say: the field, the value, what is allowed
 BAD = {
-    "unknown field": (SCENE + "foo: 1\n", ["'foo'", "title, law, nu, m, n"]),
+    "unknown field": (SCENE + "foo: 1\n", ["'foo'", "title, law, nu, Gamma, m, n"]),
     "unknown nested field": (SCENE + "mesh: {foo: 1}\n", ["'mesh.foo'", "degree, intervals"]),
     "junk below a number": (SCENE + "mesh: {degree: {a: {b: 1}}}\n", ["mesh.degree", "integer", "{'a': {'b': 1}}"]),
     "missing field": ("m: 1\n", ["'n'", "missing"]),
