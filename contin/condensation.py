@@ -66,23 +66,46 @@ def _eliminate(block, columns, pivots, border, border_pivot):
             pivots[c] = at
             if at != c:
                 sign = -sign
-                for j in range(width):
-                    block[c, j], block[at, j] = block[at, j], block[c, j]
+                _swap(block[c], block[at])
             pivot = block[c, c]
             if pivot < 0:
                 sign = -sign
             border_pivot[0] = min(border_pivot[0], abs(pivot))
+            inverse = 1 / pivot
             for i in range(c + 1, rows):
-                _subtract(block, i, block, c, block[i, c] / pivot, c + 1, end)
+                _subtract(block, i, block, c, block[i, c] * inverse, c + 1, end)
             for i in range(border.shape[0]):
-                _subtract(border, i, block, c, border[i, c] / pivot, c + 1, end)
+                _subtract(border, i, block, c, border[i, c] * inverse, c + 1, end)
             for above in range(start, c):
-                for j in range(end, width):
-                    block[c, j] -= block[c, above] * block[above, j]
+                _add_multiple(block[c, end:], -block[c, above], block[above, end:])
         _apply_panel(block, end, block, start, end)
         _apply_panel(border, 0, block, start, end)
         start = end
     return sign
+
+
+# A loop from 0 over a slice is compiled to vector instructions; one from c + 1 over a row is not, because numba must allow for
+# negative indices.
+
+
+@njit(inline="always", **_OPTIONS)
+def _swap(a, b):
+    for j in range(a.size):
+        a[j], b[j] = b[j], a[j]
+
+
+@njit(inline="always", **_OPTIONS)
+def _add_multiple(a, factor, b):
+    for j in range(a.size):
+        a[j] += factor * b[j]
+
+
+@njit(inline="always", **_OPTIONS)
+def _dot(a, b):
+    total = 0.0
+    for j in range(a.size):
+        total += a[j] * b[j]
+    return total
 
 
 @njit(inline="always", **_OPTIONS)
@@ -100,25 +123,23 @@ def _apply_panel(rows, first, block, start, end):
     if end - start < _PANEL:
         for i in range(first, count):
             for c in range(start, end):
-                factor = rows[i, c]
-                for j in range(end, width):
-                    rows[i, j] -= factor * block[c, j]
+                _add_multiple(rows[i, end:], -rows[i, c], block[c, end:])
         return
-    p0, p1, p2, p3 = block[start], block[start + 1], block[start + 2], block[start + 3]
+    p0, p1, p2, p3 = block[start, end:], block[start + 1, end:], block[start + 2, end:], block[start + 3, end:]
     i = first
     while i + 1 < count:  # two rows at a time share what is loaded of the pivot rows
-        a, b = rows[i], rows[i + 1]
-        a0, a1, a2, a3 = a[start], a[start + 1], a[start + 2], a[start + 3]
-        b0, b1, b2, b3 = b[start], b[start + 1], b[start + 2], b[start + 3]
-        for j in range(end, width):
+        a, b = rows[i, end:], rows[i + 1, end:]
+        a0, a1, a2, a3 = rows[i, start], rows[i, start + 1], rows[i, start + 2], rows[i, start + 3]
+        b0, b1, b2, b3 = rows[i + 1, start], rows[i + 1, start + 1], rows[i + 1, start + 2], rows[i + 1, start + 3]
+        for j in range(width - end):
             u0, u1, u2, u3 = p0[j], p1[j], p2[j], p3[j]
             a[j] -= a0 * u0 + a1 * u1 + a2 * u2 + a3 * u3
             b[j] -= b0 * u0 + b1 * u1 + b2 * u2 + b3 * u3
         i += 2
     if i < count:
-        a = rows[i]
-        a0, a1, a2, a3 = a[start], a[start + 1], a[start + 2], a[start + 3]
-        for j in range(end, width):
+        a = rows[i, end:]
+        a0, a1, a2, a3 = rows[i, start], rows[i, start + 1], rows[i, start + 2], rows[i, start + 3]
+        for j in range(width - end):
             a[j] -= a0 * p0[j] + a1 * p1[j] + a2 * p2[j] + a3 * p3[j]
 
 
@@ -182,26 +203,17 @@ def _forward(block, columns, pivots, border, x, y):
     for c in range(columns):
         x[c], x[pivots[c]] = x[pivots[c]], x[c]
     for i in range(1, block.shape[0]):
-        total = 0.0
-        for c in range(min(i, columns)):
-            total += block[i, c] * x[c]
-        x[i] -= total
+        count = min(i, columns)
+        x[i] -= _dot(block[i, :count], x[:count])
     for i in range(border.shape[0]):
-        total = 0.0
-        for c in range(columns):
-            total += border[i, c] * x[c]
-        y[i] -= total
+        y[i] -= _dot(border[i, :columns], x[:columns])
 
 
 @njit(inline="never", **_OPTIONS)
 def _backward(block, columns, x, known):
     """Solve the upper triangle of the eliminated ``columns`` for x[:columns]; ``known`` are the unknowns after them."""
     for c in range(columns - 1, -1, -1):
-        total = 0.0
-        for j in range(c + 1, columns):
-            total += block[c, j] * x[j]
-        for j in range(columns, block.shape[1]):
-            total += block[c, j] * known[j - columns]
+        total = _dot(block[c, c + 1 : columns], x[c + 1 : columns]) + _dot(block[c, columns:], known)
         x[c] = (x[c] - total) / block[c, c]
 
 
@@ -266,21 +278,18 @@ def _forward_transposed(block, columns, x, rest):
         value = x[c] / block[c, c]
         x[c] = value
         if value != 0.0:
-            for j in range(c + 1, columns):
-                x[j] -= block[c, j] * value
-            for j in range(columns, block.shape[1]):
-                rest[j - columns] -= block[c, j] * value
+            _add_multiple(x[c + 1 : columns], -value, block[c, c + 1 : columns])
+            _add_multiple(rest[: block.shape[1] - columns], -value, block[c, columns:])
 
 
 @njit(inline="never", **_OPTIONS)
 def _backward_transposed(block, columns, pivots, border, x, y):
     """Apply the transpose of the elimination of ``block`` to the multipliers x of its rows and y of the border."""
     for i in range(border.shape[0]):
-        for c in range(columns):
-            x[c] -= border[i, c] * y[i]
+        _add_multiple(x[:columns], -y[i], border[i, :columns])
     for i in range(block.shape[0] - 1, 0, -1):
-        for c in range(min(i, columns)):
-            x[c] -= block[i, c] * x[i]
+        count = min(i, columns)
+        _add_multiple(x[:count], -x[i], block[i, :count])
     for c in range(columns - 1, -1, -1):
         x[c], x[pivots[c]] = x[pivots[c]], x[c]
 
