@@ -8,6 +8,7 @@ directors at S = 0, the origin is x(0): M1, M2, M3 and R1, R2, R3 are the moment
 - ``cell``: a quarter wave [0, L/4n] of a primary branch, between a mirror at S = 0 (normal to d3) and a two-fold axis along
   d2 at the other end; R = 0. The smallest, and the default.
 - ``half_loop``: [0, L/2] between two mirrors: every wavenumber at once, each as a simple bifurcation.
+- ``half_loop_between_axes``: [0, L/2] between two-fold axes along d2: what breaks the mirrors and keeps an axis.
 - ``loop``: [0, L] closed, gauge and phase fixed, the redundancy of closure unfolded by a parameter that stays zero.
 """
 
@@ -115,6 +116,19 @@ def half_loop(law: Law) -> Domain:
     return Domain(_with_force(law, boundary, LENGTH / 2), ("kappa_n", "M1", "M2", "R3"))
 
 
+def half_loop_between_axes(law: Law) -> Domain:
+    """[0, L/2] between two-fold axes along d2: M2 = R2 = 0 at both ends follows from both axes being one line.
+
+    ``axes`` = 1, which the equations do not use, tells a solution from one between mirrors.
+    """
+
+    def boundary(u0, u1, p):
+        d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
+        return u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, d21, d23, u1.x1, u1.x3
+
+    return Domain(_with_force(law, boundary, LENGTH / 2, axes=1.0), ("kappa_n", "M1", "M3", "R1", "R3"))
+
+
 def loop(law: Law) -> Domain:
     """[0, L] closed. M3 at S = 0, a parameter, fixes the phase; ``unfold`` is zero on every closed solution.
 
@@ -135,8 +149,8 @@ def _material(law: Law) -> dict[str, float]:
     return {"kappa_n": 0.0, **{name: {"nu": 0.3, "Gamma": 1.0}[name] for name in law.parameters}}
 
 
-def _with_force(law: Law, boundary: Callable, length: float) -> BoundaryValueProblem:
-    """Frame and centreline as states, moment and force at S = 0 as parameters."""
+def _with_force(law: Law, boundary: Callable, length: float, **marks: float) -> BoundaryValueProblem:
+    """Frame and centreline as states, moment and force at S = 0 as parameters; ``marks`` are parameters besides."""
     response = law.response_at
 
     def moment(u, p):
@@ -158,7 +172,7 @@ def _with_force(law: Law, boundary: Callable, length: float) -> BoundaryValuePro
 
     values = dict.fromkeys(("M1", "M2", "M3", "R1", "R2", "R3", "unfold"), 0.0)
     return BoundaryValueProblem(
-        rhs, boundary, (*FRAME, *CENTRELINE), {**_material(law), **values, "length": length},
+        rhs, boundary, (*FRAME, *CENTRELINE), {**_material(law), **values, "length": length, **marks},
         functionals=_functionals(response, moment),
     )  # fmt: skip
 

@@ -33,7 +33,7 @@ _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
 
 @dataclass(frozen=True)
 class Symmetry:
-    """Symmetry of a loop: its lab axes have e3 along the axis of rotation and, with a mirror, e1 = d3(0).
+    """Symmetry of a loop: its lab axes have e3 along the axis of rotation and e1 = d3(0) with a mirror, d2(0) with an axis.
 
     Attributes
     ----------
@@ -45,12 +45,20 @@ class Symmetry:
         Whether d2 and d3 change sign besides (on the frame this is a half turn about d1; in space, a rotary reflection).
     mirror : bool
         Mirror symmetry at S = 0: d_i(-S) is the image of d_i(S), -d3(S) for i = 3.
+    axis : bool
+        In its place, a two-fold axis along d2 at S = 0: d_i(-S) is the image of -d_i(S), d2(S) for i = 2.
     """
 
     order: int = 1
     winding: int = 0
     flip: bool = False
     mirror: bool = False
+    axis: bool = False
+
+    @property
+    def reverses(self) -> bool:
+        """Whether there is a symmetry that takes S to -S."""
+        return self.mirror or self.axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,24 +150,25 @@ def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, flo
     elif "turn" in p:
         axes, directors, symmetry = _unfolded_cell(sample, p["length"])
     else:
-        axes, directors, symmetry = _unfolded_half(sample)
+        axes, directors, symmetry = _unfolded_half(sample, "axes" in p)
     return Equilibrium(law, p["nu"], p["kappa_n"], directors, axes @ moment, axes @ force, symmetry, p.get("Gamma"))
 
 
-def _unfolded_half(sample):
-    """Lab axes (rows), directors and symmetry of a half loop between mirrors."""
+def _unfolded_half(sample, between_axes: bool):
+    """Lab axes (rows), directors and symmetry of a half loop between mirrors, or between two-fold axes."""
     first = sample(np.zeros(1))[0]
-    axes = np.array([first[2], -first[1], first[0]])
-    mirror = np.diag([-1.0, 1.0, 1.0])
+    axes = np.array([first[1], first[2], first[0]] if between_axes else [first[2], -first[1], first[0]])
+    image = np.diag([1.0, -1.0, -1.0]) if between_axes else np.diag([-1.0, 1.0, 1.0])
+    signs = np.array([-1.0, 1.0, -1.0] if between_axes else [1.0, 1.0, -1.0])
 
     def directors(stations):
         s = np.mod(stations, LENGTH)
         beyond = s > LENGTH / 2
         d = sample(np.where(beyond, LENGTH - s, s) / (LENGTH / 2)) @ axes.T
-        d[beyond] = d[beyond] @ mirror * np.array([1.0, 1.0, -1.0])[:, None]
+        d[beyond] = d[beyond] @ image * signs[:, None]
         return d
 
-    return axes, directors, Symmetry(mirror=True)
+    return axes, directors, Symmetry(mirror=not between_axes, axis=between_axes)
 
 
 def _unfolded_cell(sample, length):

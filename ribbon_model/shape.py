@@ -1,7 +1,7 @@
 """The closed strip in space: centreline, directors and surface, from the solution on a domain.
 
 The cell carries a mirror at S = 0 (plane through x(0), normal to d3) and a two-fold axis along d2 at its other end; the half
-loop carries mirrors at both ends. These symmetries unfold a solution to the whole loop; where the plane and the axis (or the
+loop carries mirrors at both ends, or two-fold axes along d2. These symmetries unfold a solution to the whole loop; where the plane and the axis (or the
 planes) meet, the copies turn about one line, so the centreline closes.
 """
 
@@ -127,6 +127,8 @@ def closed_strip(law: Law, t, states, degree: int, parameters: Mapping[str, floa
     part = Shape(s, x, d, eta)
     if math.isclose(length, LENGTH):
         return part
+    if "axes" in p:  # half loop between two-fold axes, which are one line
+        return _turned(part)
     if "turn" not in p:  # half loop: one mirror does it
         return _mirrored(part)
     periods = round(LENGTH / (4 * length))
@@ -138,14 +140,14 @@ def closed_strip(law: Law, t, states, degree: int, parameters: Mapping[str, floa
     return _repeated(wave, periods, axis, centre, angle)
 
 
-def _turned(quarter: Shape) -> Shape:
-    """The half wave: the quarter and its image under the two-fold axis along d2 at its end."""
-    axis, centre = quarter.directors[-1, 1], quarter.centreline[-1]
+def _turned(part: Shape) -> Shape:
+    """A part (a quarter wave, a half loop) and its image under the two-fold axis along d2 at its end."""
+    axis, centre = part.directors[-1, 1], part.centreline[-1]
     turn = 2 * np.outer(axis, axis) - np.eye(3)
-    x = (quarter.centreline[-2::-1] - centre) @ turn + centre
-    d = quarter.directors[-2::-1] @ turn * np.array([-1.0, 1.0, -1.0])[:, None]
-    s = 2 * quarter.arclength[-1] - quarter.arclength[-2::-1]
-    return _joined(quarter, Shape(s, x, d, quarter.eta[-2::-1]))
+    x = (part.centreline[-2::-1] - centre) @ turn + centre
+    d = part.directors[-2::-1] @ turn * np.array([-1.0, 1.0, -1.0])[:, None]
+    s = 2 * part.arclength[-1] - part.arclength[-2::-1]
+    return _joined(part, Shape(s, x, d, part.eta[-2::-1]))
 
 
 def _mirrored(half: Shape) -> Shape:

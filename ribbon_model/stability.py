@@ -40,7 +40,7 @@ class SymmetryClass:
         j: from one part of the loop to the next the perturbation gains the factor exp(2 pi i j / order), besides the motion
         that takes one part to the next. j = 0 keeps the symmetry.
     parity : str
-        'even' or 'odd' under the mirror at S = 0; '' where the mirror takes j to another class, or there is none.
+        'even' or 'odd' under the mirror (or the two-fold axis) at S = 0; '' where that takes j to another class, or is not there.
     multiplicity : int
         2 if the class -j, which has the same eigenvalues, is another one: then modes come in pairs.
     eigenvalues : ndarray
@@ -207,7 +207,7 @@ class _Form:
             p = j + self.rows[:, None] + self.order * b
             weights = np.where((p == 0) | (np.abs(p) > self.order * (2 * cutoff + 0.5)), 0.0, 1 / np.where(p == 0, 1, p))
             own = 2 * j % self.order == 0
-            for parity in ("even", "odd") if own and self.symmetry.mirror else ("",):
+            for parity in ("even", "odd") if own and self.symmetry.reverses else ("",):
                 basis = self._basis(wavenumbers, len(a), cutoff, parity)
                 e, conditions = self._combined(matrix[self.coupled], basis), self._combined(matrix[p == 0], basis)
                 vector = self._combined(motion.T.ravel(), basis) if j == 0 else np.zeros(0)
@@ -317,7 +317,7 @@ def _stretched(equilibrium: Equilibrium, count: int = 512, modes: int = 40):
     tau = np.concatenate([[0.0], np.cumsum((density + np.roll(density, -1)) / 2)])
     inverse = np.interp(at.tau, part * tau / tau[-1], np.append(at.tau, part))
     series = np.fft.rfft(inverse - at.tau)[:modes] / count * np.exp(-36 * (np.arange(modes) / modes) ** 8)
-    if equilibrium.symmetry.mirror:
+    if equilibrium.symmetry.reverses:
         series = 1j * series.imag
     slope = series * (2j * math.pi / part * np.arange(modes))
 
@@ -361,12 +361,14 @@ def _form(equilibrium: Equilibrium, at: _Samples) -> _Form:
     motion = np.fft.fft(motion * np.exp(-1j * columns * at.tau[:, None]), axis=0) / len(at.tau)
     circular = np.kron(np.eye(2), _CIRCULAR)
     form = circular @ (1j * coupling(at.momentum, equilibrium.force)) @ circular.conj().T
-    if symmetry.mirror:  # phases that make everything real
-        row_phase, phase = np.array([-1j, -1j, 1, 1, 1, -1j]), np.array([1, 1, 1j])[free]
+    signs = np.array([1, -1, 1] if symmetry.axis else [1, 1, -1])[free]  # of the functions v under S -> -S
+    if symmetry.reverses:  # phases that make everything real
+        row_phase = np.array([-1j, -1j, 1, *((-1j, -1j, 1) if symmetry.axis else (1, 1, -1j))])
+        phase = np.where(signs > 0, 1, 1j)
         generator = (row_phase[:, None] * generator * phase).real
         motion = (1j * motion / phase).real
         form = (row_phase[:, None] * form / row_phase).real
-    return _Form(symmetry, generator, motion, form, rows, columns, np.array([1, 1, -1])[free], at.closure, _reach(at))
+    return _Form(symmetry, generator, motion, form, rows, columns, signs, at.closure, _reach(at))
 
 
 def _reach(at: _Samples) -> float:
