@@ -50,10 +50,10 @@ def update(path: Path, results: dict) -> None:
     """
     text = path.read_text(encoding="utf-8")
     for part, block in markdown(results).items():
-        pattern = re.compile(rf"(<!-- bench: {part} -->\n).*?(\n<!-- end -->)", re.DOTALL)
+        pattern = re.compile(rf"(<!-- bench: {part} -->\n).*?(<!-- end -->)", re.DOTALL)
         if not pattern.search(text):
             raise ValueError(f"{path}: has no place for {part} (<!-- bench: {part} --> ... <!-- end -->)")
-        text = pattern.sub(lambda match, block=block: match[1] + block + match[2], text)
+        text = pattern.sub(lambda match, block=block: match[1] + block + "\n" + match[2], text)
     path.write_text(text, encoding="utf-8")
 
 
@@ -76,6 +76,12 @@ def pictures(results: dict, folder: Path) -> list[Path]:
 def _saved(figure, path: Path) -> Path:
     figure.savefig(path, dpi=130, bbox_inches="tight")
     return path
+
+
+def _plain(axis, values):
+    """Ticks of a logarithmic axis at these values, written as numbers."""
+    axis.set_ticks(values, [f"{value:g}" for value in values])
+    axis.set_ticks([], minor=True)
 
 
 def _fold(results):
@@ -113,6 +119,7 @@ def _cost(results):
         guide = [1e3 * rows[-1]["linearize"] * (value / x[-1]) ** power for value in x]
         axes.loglog(x, guide, "k--", linewidth=0.8, label=f"power {power}")
         axes.set(xlabel=label)
+        _plain(axes.xaxis, x)
         axes.legend(fontsize=7)
     time.set_ylabel("ms")
     rows = results["components"]
@@ -126,6 +133,7 @@ def _cost(results):
             "--",
             label=f"LAPACK {name}",
         )
+    _plain(rate.xaxis, [row["size"] for row in results["blas"]])
     rate.set(xlabel="size of a block, n × degree", ylabel="GFlop/s")
     rate.legend(fontsize=7)
     return figure
@@ -148,6 +156,7 @@ def _errors(cases):
                     label=label,
                 )
         axes.set(xlabel="intervals", title=case["name"])
+        _plain(axes.xaxis, [5, 10, 20, 40, 80, 160])
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("error of $\\kappa^*$ (dotted: uniform mesh)")
     figure.axes[0].legend(fontsize=7)

@@ -88,8 +88,8 @@ def table(results: dict) -> str:
     lines += [
         "",
         f"An empty Python takes {results['python']:.2f} s; `python -m branches.run configs/m1_n2.yaml` "
-        f"{results['first_run']:.1f} s the first time, with empty caches, and {results['warm_run']:.2f} s from then on. It loads {results['module_count']} "
-        f"modules, beyond the standard library those of {', '.join(results['modules'])}.",
+        f"{results['first_run']:.1f} s the first time, with empty caches, and {results['warm_run']:.2f} s from then on. "
+        f"It loads {results['module_count']} modules, beyond the standard library those of {', '.join(results['modules'])}.",
         "",
         "Own time by package when `branches.job` is imported: "
         + ", ".join(f"{name} {1e3 * seconds:.0f} ms" for name, seconds in results["dearest"][:8])

@@ -106,8 +106,8 @@ def study(statement, stop, intervals, degree, tolerance, longest_step):
     settings = {
         "ips": auto.IPS_GENERAL_BVP, "ndim": ndim, "npar": len(icu), "nbc": nbc, "nint": 0, "nmx": 2000, "ntst": intervals,
         "ncol": degree, "iad": 3, "ilp": 0, "isp": 1, "mxbf": 0, "iads": 1, "itmx": 9, "itnw": 7, "nwtn": 3, "jac": 1,
-        "ds": 0.05, "dsmin": 1e-6, "dsmax": longest_step, "rl0": -1e300, "rl1": 1e300, "a0": -1e300, "a1": 1e300, "epsl": tolerance,
-        "epsu": tolerance, "epss": 10 * tolerance, "iid": 0, "iplt": 0,
+        "ds": 0.05, "dsmin": 1e-6, "dsmax": longest_step, "rl0": -1e300, "rl1": 1e300, "a0": -1e300, "a1": 1e300,
+        "epsl": tolerance, "epsu": tolerance, "epss": 10 * tolerance, "iid": 0, "iplt": 0,
     }  # fmt: skip
     options = {"icu": icu, "bcnd": conditions, "transpile": True, "jac": auto.AUTO_JACOBIAN, "bcnd_jac": auto.AUTO_JACOBIAN}
     circle = auto.run(rates, start, settings, sp=["BP1"], **options).branches[0]

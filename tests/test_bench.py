@@ -1,0 +1,94 @@
+"""The parsing and choosing in scripts/benchmarks: what turns the peers' output into numbers. Nothing is timed here."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
+
+from benchmarks import cost, fold, report, startup  # noqa: E402
+from peers import auto_07p, scipy_bvp  # noqa: E402
+
+BRANCH_FILE = """\
+   0   PT  TY  LAB    kappa_n       L2-NORM        MAX M1
+   2     1     9    2    2.3000000000E+00    2.1656407828E+00   -1.3000000000E+00
+   2    -2     0    0    2.4060660172E+00    2.2309172553E+00   -1.4060660172E+00
+   2     3     5    3    4.0756675354E+00    4.3569103380E+00   -1.9163912512E+00
+   2     4     1    4   -5.0000000000E-01    3.6704494889E+00    3.5000000000E+00
+"""
+DIAGNOSTICS = """\
+  BR    PT  IT         PAR           L2-NORM
+   1     2   0        2.33536E+00   2.18705E+00
+   1     2   1        2.33536E+00   2.18705E+00
+   1     2   2       -2.33536E+00   2.18705E+00
+
+   1     2         Fold Function    7.07107E-01
+   1     2         Iterations   :   2
+"""
+
+
+def test_auto_output_is_parsed():
+    parsed = auto_07p.parse(BRANCH_FILE, DIAGNOSTICS, "\n Total Time    0.509E+00\n")
+    assert parsed["seconds"] == 0.509
+    assert parsed["points"] == 4
+    assert parsed["iterations"] == 2
+    assert parsed["labels"] == [("EP", 2.3), ("LP", 4.0756675354), ("BP", -0.5)]
+
+
+def test_auto_output_without_points_is_refused():
+    with pytest.raises(ValueError, match="no points"):
+        auto_07p.parse("", "", " Total Time    0.1E+00")
+
+
+def test_best_is_the_fastest_that_is_exact_enough():
+    rows = [
+        {"tool": "a", "seconds": 1.0, "error": 1e-7},
+        {"tool": "a", "seconds": 3.0, "error": 1e-11},
+        {"tool": "a", "seconds": 2.0, "error": 1e-3},
+    ]
+    found = fold.best(rows)["a"]
+    assert [found[key] and found[key]["seconds"] for key in ("1e-06", "1e-08", "1e-10", "1e-12")] == [1.0, 3.0, 3.0, None]
+
+
+def test_import_times_are_summed_by_package():
+    text = "import time: self [us] | cumulative | imported package\nimport time:       100 |        300 |   numpy\n"
+    text += "import time:        50 |         50 |     numpy.linalg\nimport time:       200 |        500 | contin\n"
+    assert startup.by_package(text) == [("contin", pytest.approx(2e-4)), ("numpy", pytest.approx(1.5e-4))]
+
+
+def test_blocks_of_a_page_are_replaced(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- bench: machine -->\n<!-- end -->\nafter\n")
+    results = {"machine": {"processor": "x", "load_at_start": 0.5}}
+    for _ in range(2):  # into an empty place, and over what stands there
+        report.update(page, results)
+    assert page.read_text() == (
+        "before\n<!-- bench: machine -->\nprocessor x; one thread; load when it began 0.5.\n<!-- end -->\nafter\n"
+    )
+
+
+def test_exponent_of_a_power_law():
+    x = np.array([1, 2, 4, 8, 16, 32])
+    assert cost.slope(x, 3.0 * x**2.5) == pytest.approx(2.5)
+
+
+def test_flops_of_one_interval_of_one_state():
+    """degree 1, n = 1: nothing inside; one link of two rows and four columns, one elimination in one row and one border row."""
+    assert cost.flops(1, 1, 1) == 2 * 2 * 3
+
+
+def test_jacobian_given_to_solve_bvp_is_exact():
+    """A peer with a wrong Jacobian would be slow for no fault of its own."""
+    q, p = np.random.default_rng(1).standard_normal((4, 3)), np.array([2.0, -1.0, 0.5])
+    by_state, by_parameters = scipy_bvp.rhs_jacobian(0, q, p)
+    for j in range(4):
+        e = np.zeros((4, 1))
+        e[j] = 1e-6
+        difference = (scipy_bvp.rhs(0, q + e, p) - scipy_bvp.rhs(0, q - e, p)) / 2e-6
+        np.testing.assert_allclose(by_state[:, j], difference, atol=1e-8)
+    for j in range(3):
+        e = 1e-6 * np.eye(3)[j]
+        difference = (scipy_bvp.rhs(0, q, p + e) - scipy_bvp.rhs(0, q, p - e)) / 2e-6
+        np.testing.assert_allclose(by_parameters[:, j], difference, atol=1e-8)
