@@ -87,7 +87,7 @@ def _plain(axis, values):
 def _fold(results):
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    figure = Figure(figsize=(13, 4.5), layout="constrained")
     tools = list(dict.fromkeys(row["tool"] for row in results["rows"]))
     for axes, key, title in zip(
         figure.subplots(1, 2, sharey=True), ("seconds", "process_seconds"), ("in the process, warm", "whole processes")
@@ -98,7 +98,7 @@ def _fold(results):
         axes.set(xlabel=f"seconds, {title}", title=title)
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("error of $\\kappa_n$ at the fold of (1, 2)")
-    figure.axes[1].legend(fontsize=8)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside right upper", fontsize=8)
     return figure
 
 
