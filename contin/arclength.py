@@ -280,13 +280,13 @@ class Continuation:
         system, rows = state.system, (state.system.weights * state.tangent,)
         if before.factors is None:
             before.factors = system.linearize(before.x, rows)[1]
-        if before.sign == trial.sign and calm(quotients(before.factors, trial.factors, system.size)):
+        if before.sign == trial.sign and calm(quotients(before, trial)):
             return 0, True
         before.factors = system.linearize(before.x, rows)[1]
         if not trial.exact:
             trial.factors, trial.exact = system.linearize(trial.x, rows)[1], True
             trial.sign = trial.factors.sign
-        return crossings(quotients(before.factors, trial.factors, system.size))
+        return crossings(quotients(before, trial))
 
     def _accept(self, state: State, trial: Trial, step: float, distance: float) -> State:
         """The next state, its step chosen so that the predictor's error is ``accuracy`` of it."""

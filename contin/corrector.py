@@ -28,7 +28,7 @@ class Newton:
 
 @dataclass(frozen=True)
 class Corrected:
-    """A corrected x, the last factorization (taken one Newton step before x or nearer), and the estimated error left."""
+    """A corrected x, the last factorization (taken at an iterate before x), and the estimated error left."""
 
     x: np.ndarray
     factors: object
@@ -36,8 +36,10 @@ class Corrected:
     error: float
 
 
-#: After an update below this the factorization is kept (chord steps gain at least as much a step as this is small).
-_CHORD = 1e-3
+#: After a larger update the next iteration takes the Jacobian anew.
+_FAR = 0.1
+#: Chord steps with an old factorization that are worth a new one.
+_CHORDS = 4
 #: Updates that small and no longer shrinking are round-off.
 _ROUND_OFF = 1e-9
 
@@ -78,11 +80,12 @@ def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), fact
             x = x - update
             moved = size if fresh else moved + size
             rate = _rate(history, fresh, moved)
-            if size * rate <= newton.tolerance or (size < _ROUND_OFF and len(history) > 1 and rate >= 0.5):
+            confirmed = len(history) > 1 or size <= newton.tolerance
+            if (confirmed and size * rate <= newton.tolerance) or (size < _ROUND_OFF and len(history) > 1 and rate >= 0.5):
                 return Corrected(x, factors, len(history), size * rate)
             if len(history) > 2 and size > 2 * history[-2] > _ROUND_OFF:
                 break
-            if size > _CHORD or rate > 0.2:
+            if size > _FAR or not rate < 0.5 or np.log(newton.tolerance / size) < _CHORDS * np.log(rate):
                 factors = None
     updates = ", ".join(f"{size:.1e}" for size in history) or "not finite"
     raise ConvergenceError(f"Newton did not converge (updates {updates})")
@@ -90,11 +93,9 @@ def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), fact
 
 def _rate(history, fresh, moved) -> float:
     """Estimated ratio of the error after the last update to its size; ``moved``: distance from where the Jacobian was taken."""
-    last = history[-1]
+    if len(history) < 2:  # nothing is known of how nonlinear the equations are
+        return min(moved, _FAR) if fresh else 1.0
+    ratio = history[-1] / history[-2]
     if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
-        ratio = last if len(history) < 2 else max(last, last / history[-2] * min(1.0, last / history[-2]))
-        return min(1.0, ratio)
-    if len(history) < 2:
-        return 1.0
-    ratio = last / history[-2]
+        return min(1.0, max(history[-1], ratio * min(1.0, ratio)))
     return max(min(moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0

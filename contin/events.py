@@ -138,10 +138,15 @@ def hopf() -> Monitor:
     return Monitor("HB", "Hopf", function, several=several, **describe)
 
 
+#: Steps up to so many tolerances may be round-off.
+_IDLE = 1e3
+
+
 def find_zero(function: Callable[[float], float], a, fa, b, fb, tolerance) -> float:
     """A zero of ``function`` between a and b, where its values fa and fb differ in sign.
 
-    The secant method, kept inside the bracket by the Anderson-Björck rule; ends when the step is below ``tolerance``.
+    The secant method, kept inside the bracket by the Anderson-Björck rule; ends when the step is below ``tolerance``, or when
+    close to that the values no longer fall: they are round-off.
 
     Raises
     ------
@@ -150,7 +155,7 @@ def find_zero(function: Callable[[float], float], a, fa, b, fb, tolerance) -> fl
     """
     if fb == 0:
         return b
-    last = b
+    last, best, idle = b, (np.inf, b), 0
     for _ in range(60):
         c = b - fb * (b - a) / (fb - fa)
         if not min(a, b) < c < max(a, b):
@@ -158,6 +163,10 @@ def find_zero(function: Callable[[float], float], a, fa, b, fb, tolerance) -> fl
         fc = function(c)
         if fc == 0 or abs(c - last) <= tolerance:
             return c
+        idle = idle + 1 if abs(c - last) < _IDLE * tolerance and abs(fc) > best[0] / 2 else 0
+        best = min(best, (abs(fc), c))
+        if idle == 2:
+            return best[1]
         last = c
         if fc * fb < 0:
             a, fa = b, fb

@@ -33,6 +33,8 @@ _DEEPER = 0.5
 _BESIDE = 0.05
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
 _FAR = 0.05
+#: A tangent's component at a branch point below this is zero: tangents there come from differences.
+_STATIONARY = 1e-5
 #: Cosine between the kernels of a branch point on two meshes, below which they are two points.
 _SAME_KERNEL = 0.9
 #: Into how many parts a step is divided to look inside it, and how often parts with several events are halved.
@@ -124,9 +126,19 @@ class Segment:
         if max(map(abs, ends)) < _ROUND_OFF:
             return []
         if sign_changed(*ends):
-            return [self._locate(self.fold, left, right)]
+            return [self._turn_at_crossing() or self._locate(self.fold, left, right)]
         dip = self._dip(left, right)
         return [] if dip is None else self._turns_between(left, dip) + self._turns_between(dip, right)
+
+    def _turn_at_crossing(self) -> Event | None:
+        """The turn of a pitchfork, right at the branch point inside the step; None if there is none or it turns elsewhere."""
+        if not (self.settings.branch_points and sign_changed(self.before.sign, self.trial.sign)):
+            return None
+        found = self.crossing()
+        if found.name == "possible" or not found.details.tangents:
+            return None
+        component = found.details.tangents[0][self.trial.system.parameter_index(self.fold.name)]
+        return dataclasses.replace(found, label=self.fold.label, monitor=self.fold) if abs(component) < _STATIONARY else None
 
     def _slope(self, trial: Trial) -> float:
         """Rate of the primary parameter along the state's tangent."""

@@ -132,8 +132,10 @@ def _orthonormalize(rows):
                 rows[i, k] = rows[i, k] - product * rows[j, k] if j < i else rows[i, k] / np.sqrt(product)
 
 
-def smallest_directions(factors, size, count: int = _WATCHED):
+def smallest_directions(factors, size):
     """Right and left singular vectors, as rows, of the smallest singular values: inverse iteration on a block.
+
+    It starts from random vectors, not from those of the point before: a run resumed must decide as one undisturbed.
 
     Returns
     -------
@@ -141,7 +143,7 @@ def smallest_directions(factors, size, count: int = _WATCHED):
     response : ndarray, shape (count, count)
         right J^-1 left^T: about the reciprocals of the singular values.
     """
-    right = _random_block(min(count, size), size)
+    right = _random_block(min(_WATCHED, size), size)
     for _ in range(2):
         left = factors.solve_transposed(right)
         _orthonormalize(left)
@@ -159,16 +161,16 @@ _VANISHES = 1e4
 _CALM = 2.0
 
 
-def quotients(before, after, size):
-    """How the smallest singular values change between two neighbouring matrices, from their factors: shape (watched,), complex.
+def quotients(before, after):
+    """How the smallest singular values change between two neighbouring trials, from their factors: shape (watched,), complex.
 
     In the directions in which ``after`` is nearest to singular, J^-1 of the two is compared: each passage of a singular value
     through zero turns one eigenvalue of the quotient negative. A determinant sees the parity only; two modes that cross
     together, or two branch points in one step, are seen here. NaN where a matrix is exactly singular.
     """
     with np.errstate(all="ignore"):
-        right, left, response = smallest_directions(after, size)
-        earlier = right @ before.solve(left).T
+        right, left, response = smallest_directions(after.factors, after.system.size)
+        earlier = right @ before.factors.solve(left).T
         if not (np.all(np.isfinite(response)) and np.all(np.isfinite(earlier))):
             return np.full(len(response), np.nan)
         try:
