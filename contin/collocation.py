@@ -77,6 +77,13 @@ def interpolation(nodes, barycentric, at):
     return np.where(exact.any(axis=1, keepdims=True), exact, matrix)
 
 
+@njit(inline="always", error_model="numpy")
+def _scaled(target, factor, source):
+    """target = factor * source, a loop from 0 so that it becomes vector instructions."""
+    for b in range(target.size):
+        target[b] = factor * source[b]
+
+
 @njit(
     "void(f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,::1], i8, f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1],"
     "f8[:,::1])",
@@ -104,22 +111,20 @@ def assemble(value, slope, weights, h, jacobian, n, columns, rows, local, border
                 border[j, q, b] = 0.0
         for i in range(d):
             point = jacobian[j * d + i]
-            for node in range(d + 1):
-                start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
-                scale = h[j] * value[i, node]
-                for a in range(n):
-                    for b in range(n):
-                        local[j, i * n + a, start + b] = -scale * point[a, b]
-                    local[j, i * n + a, start + a] += slope[i, node]
-                for q in range(n_int):
-                    for b in range(n):
-                        border[j, q, start + b] += weights[i] * scale * point[n + q, b]
             for a in range(n):
-                for b in range(k):
-                    local[j, i * n + a, inner + 2 * n + b] = -h[j] * point[a, n + b]
+                row = local[j, i * n + a]
+                for node in range(d + 1):
+                    start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
+                    _scaled(row[start : start + n], -h[j] * value[i, node], point[a, :n])
+                    row[start + a] += slope[i, node]
+                _scaled(row[inner + 2 * n : inner + 2 * n + k], -h[j], point[a, n:])
                 for b in range(c):
-                    local[j, i * n + a, inner + 2 * n + k + b] = columns[b, (j * d + i) * n + a]
+                    row[inner + 2 * n + k + b] = columns[b, (j * d + i) * n + a]
             for q in range(n_int):
+                for node in range(d + 1):
+                    start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
+                    for b in range(n):
+                        border[j, q, start + b] += weights[i] * h[j] * value[i, node] * point[n + q, b]
                 for b in range(k):
                     corner[q, b] += weights[i] * h[j] * point[n + q, n + b]
         for q in range(r):
