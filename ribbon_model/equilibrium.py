@@ -14,6 +14,7 @@ directors at S = 0, the origin is x(0): M1, M2, M3 and R1, R2, R3 are the moment
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -30,7 +31,10 @@ CENTRELINE = ("x1", "x2", "x3")
 
 @dataclass(frozen=True)
 class Domain:
-    """A problem on one of the domains, with the parameters that are free on a branch (kappa_n first)."""
+    """A problem on one of the domains, with the parameters that are free on a branch (kappa_n first).
+
+    There is one for each law: what is compiled for it is found again.
+    """
 
     problem: BoundaryValueProblem
     free: tuple[str, ...]
@@ -76,6 +80,7 @@ def on_directors(q0, q1, q2, q3, a1, a2, a3):
     )  # fmt: skip
 
 
+@functools.cache
 def cell(law: Law) -> Domain:
     """Quarter wave with R = 0; parameters ``turn`` (2 pi m / 4n) and ``sense`` (the sign of the moment on the circle)."""
     response = law.response_at
@@ -106,6 +111,7 @@ def cell(law: Law) -> Domain:
     return Domain(problem, ("kappa_n", "M1", "M2"))
 
 
+@functools.cache
 def half_loop(law: Law) -> Domain:
     """[0, L/2] between mirrors normal to d3: M3 = R1 = R2 = 0 at both ends follows from d3 being parallel there."""
 
@@ -116,6 +122,7 @@ def half_loop(law: Law) -> Domain:
     return Domain(_with_force(law, boundary, LENGTH / 2), ("kappa_n", "M1", "M2", "R3"))
 
 
+@functools.cache
 def half_loop_between_axes(law: Law) -> Domain:
     """[0, L/2] between two-fold axes along d2: M2 = R2 = 0 at both ends follows from both axes being one line.
 
@@ -129,6 +136,7 @@ def half_loop_between_axes(law: Law) -> Domain:
     return Domain(_with_force(law, boundary, LENGTH / 2, axes=1.0), ("kappa_n", "M1", "M3", "R1", "R3"))
 
 
+@functools.cache
 def loop(law: Law) -> Domain:
     """[0, L] closed. M3 at S = 0, a parameter, fixes the phase; ``unfold`` is zero on every closed solution.
 
