@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import functools
 import os
+import secrets
 import sys
 import tempfile
 from pathlib import Path
+
+from contin.errors import ContinError
+
+_ADVICE = "set CONTIN_CACHE_DIR to a folder that can be written"
 
 
 def cache_directory() -> Path:
@@ -27,17 +32,52 @@ def cache_directory() -> Path:
 
 @functools.cache
 def _temporary_directory() -> Path:
-    path = Path(tempfile.mkdtemp(prefix="contin-"))
+    try:
+        path = Path(tempfile.mkdtemp(prefix="contin-"))
+    except OSError as error:
+        raise ContinError(f"no place for compiled code: {error.strerror}; {_ADVICE}") from error
     print(f"contin: no writable cache, compiling into {path}; set CONTIN_CACHE_DIR to keep it", file=sys.stderr)
     return path
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a file so that no other process ever sees half of it."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "w") as file:
-        file.write(text)
-    os.replace(temporary, path)
+def write_bytes(path: Path, data: bytes) -> None:
+    """Put a whole file in place of ``path``: no process, and no power cut, ever sees half of it.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; what was there is left as it was.
+    """
+    temporary = path.with_name(f".{path.name[:50]}.{secrets.token_hex(4)}.part")
+    try:
+        with open(temporary, "xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_source(name: str, text: str) -> Path:
+    """Keep generated code in the cache directory or, where that is full, in a temporary one; the path.
+
+    Raises
+    ------
+    ContinError
+        There is no place for it.
+    """
+    folder = cache_directory()
+    try:
+        write_bytes(folder / name, text.encode("utf-8"))
+        return folder / name
+    except OSError:
+        path = _temporary_directory() / name
+    try:
+        write_bytes(path, text.encode("utf-8"))
+    except OSError as error:
+        raise ContinError(f"no place for compiled code: {folder} and {path.parent}: {error.strerror}; {_ADVICE}") from error
+    return path
 
 
 def _tell_numba() -> None:
@@ -48,7 +88,10 @@ def _tell_numba() -> None:
     beside = package / "__pycache__"
     if os.access(beside if beside.exists() else package, os.W_OK):
         return
-    os.environ["NUMBA_CACHE_DIR"] = str(cache_directory() / "engine")
+    try:
+        os.environ["NUMBA_CACHE_DIR"] = str(cache_directory() / "engine")
+    except ContinError:
+        return  # nothing is kept then; what needs a place says so
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]
 

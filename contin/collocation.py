@@ -11,8 +11,8 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from contin._kernels import njit
 from contin.condensation import Factorization
 from contin.errors import ProblemError
 from contin.mesh import MeshControl, adapted_mesh

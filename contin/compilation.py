@@ -26,7 +26,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from contin._analytic import AnalyticCompiler
-from contin._cache import cache_directory, write_text
+from contin._cache import cache_directory, write_source
 from contin.errors import ProblemError
 
 #: Part of every fingerprint: changes when functions are compiled by other rules (the template has its own part).
@@ -35,7 +35,7 @@ _RULES = 5
 _TEMPLATE = '''"""Generated; safe to delete."""
 from collections import namedtuple
 import numpy as np
-from numba import njit
+from contin._kernels import njit
 
 U = namedtuple("U", {states})
 V = namedtuple("V", {states})
@@ -340,8 +340,8 @@ def _module(key: str, dispatchers: dict[str, Dispatcher], name: str, source: str
     known = sys.modules.get(f"contin_{path.stem}")
     if known is not None:
         return known
-    if not path.exists() or path.read_text() != source:
-        write_text(path, source)
+    if not path.exists() or path.read_text(encoding="utf-8") != source:
+        path = write_source(path.name, source)
     spec = importlib.util.spec_from_file_location(f"contin_{path.stem}", path)
     module = importlib.util.module_from_spec(spec)
     vars(module).update(dispatchers)

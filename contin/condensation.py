@@ -19,7 +19,8 @@ Vectors of unknowns are [mesh and interior values in order | parameters]; vector
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from contin._kernels import njit
 
 _OPTIONS = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
 

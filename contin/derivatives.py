@@ -8,7 +8,7 @@ import math
 import types
 from collections.abc import Callable, Sequence
 
-from contin._cache import cache_directory, write_text
+from contin._cache import cache_directory, write_source
 
 
 def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[..., tuple]:
@@ -23,10 +23,10 @@ def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[...,
     what = repr((code.co_code, code.co_consts, code.co_names, code.co_varnames, arguments, list(by), 1))
     path = cache_directory() / f"g{hashlib.sha256(what.encode()).hexdigest()[:32]}.py"
     try:
-        source = path.read_text()
+        source = path.read_text(encoding="utf-8")
     except OSError:
         source = _derive(function, arguments, by)
-        write_text(path, source)
+        write_source(path.name, source)
     scope = {"math": math, "__name__": function.__module__}
     exec(compile(source, f"<gradient of {function.__qualname__}>", "exec"), scope)
     return scope["derived"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
-import os
 from pathlib import Path
 
 import numpy as np
 
+from contin._cache import write_bytes
 from contin.algebraic import Algebraic, AlgebraicProblem
 from contin.branch import Branch, Point, Stop
 from contin.collocation import Collocation
@@ -58,14 +59,9 @@ def save(branch: Branch, path: str | Path) -> None:
         "format": _FORMAT, "points": rows, "stop": stop, "free": first.free, "degrees": [s.degree for s in systems],
         "states": first.problem.states, "names": list(first.problem.parameters),
     }  # fmt: skip
-    path = Path(path)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        with open(temporary, "wb") as file:
-            np.savez_compressed(file, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    image = io.BytesIO()
+    np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
+    write_bytes(Path(path), image.getvalue())
 
 
 def load(problem, path: str | Path) -> Branch:
@@ -78,19 +74,23 @@ def load(problem, path: str | Path) -> Branch:
     ProblemError
         It is no branch, or one of a problem with other states or parameters.
     """
+    with open(path, "rb"):
+        pass  # a file that cannot be read is an OSError; whatever goes wrong below is in what it holds
     try:
         with np.load(path, allow_pickle=False) as file:
             head = json.loads(file["head"].tobytes())
             if head["format"] != _FORMAT:
                 raise KeyError("format")
             arrays = {name: file[name] for name in file.files}
-    except (KeyError, ValueError, EOFError) as error:
-        raise ProblemError(f"{str(path)!r} is no branch stored by contin") from error
-    if tuple(head["states"]) != tuple(problem.states) or head["names"] != list(problem.parameters):
-        raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
-    systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
-    points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
-    return Branch(points, Stop(*head["stop"]) if head["stop"] else None)
+        if tuple(head["states"]) != tuple(problem.states) or head["names"] != list(problem.parameters):
+            raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
+        systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
+        points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
+        return Branch(points, Stop(*head["stop"]) if head["stop"] else None)
+    except ProblemError:
+        raise
+    except Exception as error:  # zip, zlib, json, numpy, and memory have many ways to say that a file is damaged
+        raise ProblemError(f"{str(path)!r} is no branch stored by contin, or damaged") from error
 
 
 def _system(problem, head, arrays, i):

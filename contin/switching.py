@@ -14,8 +14,8 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from contin._kernels import njit
 from contin.corrector import Newton
 from contin.errors import ConvergenceError
 
