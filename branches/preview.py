@@ -41,7 +41,9 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
         if diagram.holds_circle(graph, one.material, one.nu, one.m, one.n):
             continue  # there already, from its other end
         try:
-            points = exact.curve(one.m, one.n, one.nu, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law)
+            points = exact.curve(
+                one.m, one.n, one.nu, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law, Gamma=one.Gamma
+            )
         except (ValueError, RuntimeError) as error:
             failed[f"{one.material}, nu = {one.nu:g}, ({one.m}, {one.n})"] = str(error)
             continue
@@ -52,7 +54,7 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
 
 def _add(graph, family, points):
     place = np.array([exact.coordinates(point) for point in points])
-    columns = {"arclength": np.append(0, np.cumsum(np.hypot(*np.diff(place, axis=0).T)))}
+    columns = {"arclength": np.append(0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))}
     columns |= {name: np.array([getattr(point, name) for point in points]) for name in ("kappa_n", "kappa_star", "energy")}
     special = [i for i, point in enumerate(points) if point.label]
     nodes = [_node(family, points[i], i) for i in special]

@@ -24,6 +24,7 @@ The rods' quadratures are in `ribbon_model.exact_rods`; the follower and the fun
 Units: bending modulus B = 1, length L = 2 pi. Source of every number: quadrature of the R = 0 equilibrium.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,7 +119,7 @@ def solve(m, n, nu, guess, *, kappa_n=None, eta_max_squared=None, amplitude=None
     raise RuntimeError(f"no convergence on branch ({m}, {n}): start nearer, or prescribe the other quantity")
 
 
-def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", root=0):
+def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", root=0, Gamma=None):
     """The branch from the m-covered circle to the one where it ends, or to a limit of kappa_n.
 
     Parameters
@@ -128,9 +129,11 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
     step : float
         Largest arclength between points in the plane of the unknowns: (log(1 + A), log(q)/2) of the ribbon.
     law : str
-        'ribbon', 'flat rod' or 'isotropic rod'.
+        'ribbon', 'flat rod', 'isotropic rod', or 'finite width': see `ribbon_model.exact_finite_width`.
     root : int
         Which of the thresholds on the m-covered circle: 0, or for the isotropic rod also 1.
+    Gamma : float, optional
+        For the law 'finite width'.
 
     Returns
     -------
@@ -144,6 +147,10 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
     RuntimeError
         If the follower cannot proceed.
     """
+    if law == "finite width":
+        from ribbon_model import exact_finite_width  # the engine compiles its energy
+
+        return exact_finite_width.curve(m, n, nu, Gamma, kappa_limits, step)
     family, (lowest, highest) = _family(law, m, n, nu, root), kappa_limits
     start, begin = family.threshold(m), family.circle(m)
     if not lowest <= start <= highest:
@@ -176,14 +183,16 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
 
 
 def coordinates(point):
-    """Where a point of `curve` lies in the plane of the unknowns, shape (2,), on which the branch is a smooth curve."""
+    """Where a point of `curve` lies in the plane of the unknowns, shape (2,) or (3,), on which the branch is a smooth curve."""
+    if hasattr(point, "Gamma"):
+        return np.array([point.kappa_n / 5, point.omega, math.sqrt(point.amplitude)])
     law, root = (point.law, point.root) if isinstance(point, RodPoint) else ("ribbon", 0)
     return _family(law, point.m, point.n, point.nu, root).coordinates(point)
 
 
-def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0):
+def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0, Gamma=None):
     """The points of `curve` at which kappa_n is stationary, in order. Raises as `curve` does."""
-    return [point for point in curve(m, n, nu, kappa_limits, law=law, root=root) if point.label == "LP"]
+    return [point for point in curve(m, n, nu, kappa_limits, law=law, root=root, Gamma=Gamma) if point.label == "LP"]
 
 
 def end(m, n, nu, law="ribbon", root=0):
