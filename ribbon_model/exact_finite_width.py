@@ -2,14 +2,16 @@
 
 With R = 0, |M| = mu and H = omega.grad U - U are constant along the strip: omega = rho (cos phi, sin phi) runs along a level
 curve of H, which meets every ray once where U is convex (dH/drho = omega.D2U.omega/rho). A quarter wave runs from the mirror,
-phi = 0, to the two-fold axis, where M_2 = 0. With tan(phi/2) = sqrt(A) sin(theta), 0 < theta < pi/2, J a quarter turn and D2U J D2U = det J,
+phi = 0, to the two-fold axis, where M_2 = 0. With
+tan(phi/2) = sqrt(A) sin(theta), 0 < theta < pi/2, J a quarter turn and D2U J D2U = det(D2U) J,
 
     M_2**2 = mu**2 - M_1**2 - M_3**2,    dS/dtheta = (dphi/dtheta) rho**2 det(D2U) / (|M_2| omega.D2U.omega),
     precession of d_1 about M            = mu omega_3 M_3 / (M_2**2 + M_3**2) dS,
 
-and the loop closes if the length is pi/2n and the precession pi |m - n|/2n, as for the flat rod (`ribbon_model.exact_rods`). The
-integrands are even and pi-periodic in theta: the midpoint rule converges exponentially. rho comes from Newton's method at each
-node, M_2**2 from its own derivative, which does not cancel. Two equations for kappa_n, omega = rho(0) and sqrt(A): one curve.
+and the loop closes if the length is pi/2n and the precession pi |m - n|/2n, as for the flat rod (`ribbon_model.exact_rods`).
+The integrands are even and pi-periodic in theta: the midpoint rule converges exponentially. rho comes from Newton's method
+at each node, M_2**2 from its own derivative, which does not cancel. Two equations for kappa_n,
+omega = rho(0) and sqrt(A): one curve.
 
 Units: B = 1 (the plate's modulus times the width), L = 2 pi. Source of every number: quadrature of the R = 0 equilibrium.
 """
@@ -35,8 +37,9 @@ _FIRST, _SHORTEST = 0.02, 1e-5  # steps; the first is sqrt(A) of the first point
 class FiniteWidthPoint:
     """One equilibrium on the primary branch (m, n) (B = 1, L = 2 pi).
 
-    ``omega`` is omega_1 at the mirror, ``amplitude`` A above, ``kappa_star`` (28), ``energy`` the mean of U without kappa_n**2/2;
-    ``label`` is 'BP' on a circle, 'LP' at a fold, 'EP' at a limit of kappa_n, 'MX' where the branch is lost, '' elsewhere.
+    ``omega`` is omega_1 at the mirror, ``amplitude`` A above, ``kappa_star`` (28), ``energy`` the mean of U, without
+    kappa_n**2/2; ``label`` is 'BP' on a circle, 'LP' at a fold, 'EP' at a limit of kappa_n, 'MX' where the branch is lost, ''
+    elsewhere.
     """
 
     m: int
@@ -115,7 +118,7 @@ def _quadratures(kappa_n, omega, root_A, nu, Gamma, nodes):
 
 
 def _integral_to_the_end(values, theta):
-    """Integral from theta to pi/2 of a function that is a series of sin(2 k theta), given at midpoints; exact near pi/2, too."""
+    """Integral from theta to pi/2 of a series of sin(2 k theta) given at midpoints, accurate near pi/2 as well."""
     k = np.arange(1, len(theta))
     coefficients = 2 / len(theta) * (np.sin(2 * np.outer(k, theta)) @ values)
     return (np.sin(np.outer(math.pi / 2 - theta, k)) ** 2 / k) @ (coefficients * (-1.0) ** (k + 1))

@@ -9,6 +9,9 @@ The strip has the natural curvature kappa_n and spans theta_n = L kappa_n; turni
   and one for those with psi_2 odd: det S = -8 (1 - xi)**4 even odd / t. It is written in units of the natural radius 1/kappa_n,
   where nothing becomes singular but the law.
 
+For the law 'finite width' every function takes ``width`` = w**2 kappa_n / h, that is w**2/(R h) with the natural radius R: the
+Gamma of these units. Its t may vanish twice in 0 < xi < 1, or not at all: small widths never do.
+
 xi = 1, the flat strip, is a singular point of the scaling in (20): the interval shrinks to nothing and both forms vanish there
 with a power of 1 - xi, for any kind of strip. It is no root. `first_root` leaves |1 - xi| < `FLAT` out.
 """
@@ -20,8 +23,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ribbon_model.dispersion import tangent_moduli
-from ribbon_model.laws import RIBBON, Law
+from ribbon_model import finite_width
+from ribbon_model.dispersion import prestress, tangent_moduli
+from ribbon_model.laws import FINITE_WIDTH, RIBBON, Law
 
 #: Half width in xi of what is left out around the flat state, which is not a root.
 FLAT = 0.01
@@ -30,7 +34,7 @@ CLAMPED = (0, 1, 2)
 HINGED = (0, 2, 3)
 
 
-def system_matrix(law: Law, nu, xi) -> np.ndarray:
+def system_matrix(law: Law, nu, xi, width: float | None = None) -> np.ndarray:
     """The matrix of (20), y' = matrix y with y = (x_1, psi_2, psi_3, M_2, M_3, R_1); shape (..., 6, 6), broadcasting nu and xi.
 
     For g infinite (20b) is psi_2' = psi_3: M_2 is then a reaction, determined by (20d) to (20f).
@@ -44,10 +48,11 @@ def system_matrix(law: Law, nu, xi) -> np.ndarray:
     if np.any(xi == 1):
         raise ValueError("xi = 1 is the flat strip: it has no radius to scale lengths with")
     ratio = 1 / (1 - xi)  # kappa_n r0
-    g, t = tangent_moduli(law, ratio, nu)
+    local = None if width is None else width * (1 - xi)
+    g, t = tangent_moduli(law, ratio, nu, local)
     if np.any(t == 0):
         raise ValueError("the tangent twisting modulus vanishes: (20c) cannot be solved for psi_3'")
-    moment = 1 - ratio  # (17a)
+    moment = prestress(law, ratio, nu, local)  # (17a)
     matrix = np.zeros((*xi.shape, 6, 6))
     matrix[..., 0, 1] = 1  # (20a)
     matrix[..., 1, 2], matrix[..., 1, 3] = 1 - moment / g, 1 / g  # (20b)
@@ -56,7 +61,7 @@ def system_matrix(law: Law, nu, xi) -> np.ndarray:
     return matrix
 
 
-def shooting_determinant(law: Law, nu, xi, theta_n: float = math.pi, ends: tuple[int, int, int] = CLAMPED) -> np.ndarray:
+def shooting_determinant(law: Law, nu, xi, theta_n: float = math.pi, ends=CLAMPED, width: float | None = None) -> np.ndarray:
     """det S(theta_n, nu, xi) of section 5.3, by the matrix exponential; shape of nu and xi broadcast.
 
     Parameters
@@ -72,12 +77,12 @@ def shooting_determinant(law: Law, nu, xi, theta_n: float = math.pi, ends: tuple
     from scipy.linalg import expm
 
     xi = np.asarray(xi, float)
-    transfer = expm(system_matrix(law, nu, xi) * (theta_n * (1 - xi))[..., None, None])
+    transfer = expm(system_matrix(law, nu, xi, width) * (theta_n * (1 - xi))[..., None, None])
     free = [i for i in range(6) if i not in ends]
     return np.linalg.det(transfer[..., np.array(ends)[:, None], np.array(free)])
 
 
-def factors(law: Law, nu, xi, theta_n: float = math.pi) -> tuple[np.ndarray, np.ndarray]:
+def factors(law: Law, nu, xi, theta_n: float = math.pi, width: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The factors (even, odd) of the determinant with (20g), in closed form; shape of nu and xi broadcast.
 
     With curvature kappa = 1 - xi, moment M = kappa - 1 (times B kappa_n), torsional stiffness T = t kappa, half length H and
@@ -103,6 +108,10 @@ def factors(law: Law, nu, xi, theta_n: float = math.pi) -> tuple[np.ndarray, np.
     kappa, moment, half = 1 - xi, -xi, theta_n / 2
     if law is RIBBON:  # t kappa without the division
         g, torsion = math.inf, 2 * (kappa - nu)
+    elif law is FINITE_WIDTH:  # a circle of curvature kappa that is naturally of curvature 1
+        energy = np.vectorize(finite_width.strain_energy, otypes=[float] * 9)(kappa, 0.0, 1.0, nu, width)
+        g, moment, t = math.inf, energy[1], energy[5]
+        torsion = t * kappa
     else:
         g, t = tangent_moduli(law, 1.0, nu)
         torsion = t * kappa
@@ -138,6 +147,7 @@ def first_root(
     ends: tuple[int, int, int] = CLAMPED,
     largest: float = 6.0,
     method: str = "closed form",
+    width: float | None = None,
 ) -> float | None:
     """The smallest xi > 0 at which the planar arc has a marginal out-of-plane mode, to about 1e-12, or None below ``largest``.
 
@@ -146,6 +156,7 @@ def first_root(
     - The flat state xi = 1 is left out.
     - Ribbon, nu > 0: roots accumulate at xi = 1 - nu from below, where t = 0; the grid gets finer towards it and ends there.
       Beyond, t < 0 and every high wavenumber is unstable.
+    - Finite width: the same at the first zero of t, if there is one in 0 < xi < 1.
     - Ribbon, nu < 0: the search ends at the flat state, beyond which t < 0. (There is no root: None.)
 
     Parameters
@@ -154,21 +165,25 @@ def first_root(
         `CLAMPED`, (20g), or `HINGED`, which only the shooting method knows.
     method : str
         'closed form' (`factors`) or 'shooting' (`shooting_determinant`).
+    width : float, optional
+        w**2/(R h), for the law 'finite width' only.
 
     Raises
     ------
     ValueError
-        nu outside (-1, 1), theta_n or ``largest`` not positive, an unknown method, `HINGED` with the closed form, or a
+        As `Law.values` for the width; nu outside (-1, 1), theta_n or ``largest`` not positive, an unknown method,
+        `HINGED` with the closed form, or a
         determinant that is zero throughout (isotropic rod with `HINGED` ends, nu = 0, where t = g).
     """
     from scipy.optimize import brentq
 
     if not (-1 < nu < 1 and theta_n > 0 and largest > 0):
         raise ValueError(f"nu = {nu:g}, theta_n = {theta_n:g}, largest = {largest:g}: outside what the search covers")
-    found = []
-    for low, high in _pieces(law, nu, largest):
-        for function in _functions(law, nu, theta_n, ends, method):
-            grid = _grid(law, nu, low, high)
+    law.values(nu, width)
+    found, end = [], _singular(law, nu, width)
+    for low, high in _pieces(law, nu, largest, end):
+        for function in _functions(law, nu, theta_n, ends, method, width):
+            grid = _grid(low, high, end)
             values = function(grid)
             if not np.max(np.abs(values)) > 1e-12:
                 raise ValueError(
@@ -181,33 +196,52 @@ def first_root(
     return None
 
 
-def _functions(law, nu, theta_n, ends, method) -> list[Callable]:
+def _functions(law, nu, theta_n, ends, method, width) -> list[Callable]:
     """The functions of xi whose zeros are the modes."""
     if method == "shooting":  # det S has the factor (1 - xi)**4 / t
-        return [lambda xi: shooting_determinant(law, nu, xi, theta_n, ends) / (1 - np.asarray(xi)) ** 4]
+        return [lambda xi: shooting_determinant(law, nu, xi, theta_n, ends, width) / (1 - np.asarray(xi)) ** 4]
     if method != "closed form":
         raise ValueError(f"method {method!r}: 'closed form' or 'shooting'")
     if ends != CLAMPED:
         raise ValueError("the closed form is for the ends (20g); use the method 'shooting'")
-    return [lambda xi, i=i: factors(law, nu, xi, theta_n)[i] for i in (0, 1)]
+    return [lambda xi, i=i: factors(law, nu, xi, theta_n, width)[i] for i in (0, 1)]
 
 
-def _pieces(law, nu, largest):
-    """Intervals of xi without a singular point inside."""
+def _singular(law, nu, width) -> float | None:
+    """The smallest xi in (0, 1) where t vanishes: 1 - nu for the ribbon."""
     if law is RIBBON and nu > 0:
-        return [(0.0, min(largest, 1 - nu))]
+        return 1 - nu
+    return first_zero_of_t(nu, width) if law is FINITE_WIDTH else None
+
+
+def first_zero_of_t(nu: float, width: float) -> float | None:
+    """The smallest xi in (0, 1) where the torsional modulus t of the law 'finite width' vanishes, or None."""
+    from scipy.optimize import brentq
+
+    def t(xi):
+        return finite_width.strain_energy(1 - xi, 0.0, 1.0, nu, width)[5]
+
+    grid = 1 - np.geomspace(1.0, 1e-3 / (1 + width), 2000)
+    below = np.flatnonzero([t(xi) < 0 for xi in grid])
+    return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
+
+
+def _pieces(law, nu, largest, singular):
+    """Intervals of xi without a singular point inside."""
+    if singular is not None:
+        return [(0.0, min(largest, singular))]
     pieces = [(0.0, min(largest, 1 - FLAT))]
     if largest > 1 + FLAT and not (law is RIBBON and nu < 0):
         pieces.append((1 + FLAT, largest))
     return pieces
 
 
-def _grid(law, nu, low, high):
-    """Points from ``low`` to ``high``, both left out if singular; for the ribbon ever closer to where its t vanishes."""
+def _grid(low, high, singular):
+    """Points from ``low`` to ``high``, both left out if singular; ever closer to where t vanishes."""
     start = max(low, 1e-3 * (high - low))
     uniform = np.linspace(start, high, 2 + int((high - start) / 0.01))
-    if not (law is RIBBON and nu > 0):
+    if singular is None:
         return uniform
-    towards = 1 - nu - (1 - nu) * np.geomspace(1.0, 1e-9, 1200)
+    towards = singular - singular * np.geomspace(1.0, 1e-9, 1200)
     points = np.union1d(uniform, towards)
-    return points[(points >= start) & (points <= high) & (points < 1 - nu)]
+    return points[(points >= start) & (points <= high) & (points < singular)]

@@ -1,0 +1,231 @@
+"""The law between the flat rod and the ribbon: from plate theory, its two limits, its branches against the quadrature."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+import contin
+from contin import Settings, follow
+from ribbon_model import exact_finite_width, finite_width
+from ribbon_model.equilibrium import half_loop
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, from_label, label
+from ribbon_model.linear import circle, covering, index, stability_interval, thresholds
+from ribbon_model.seeds import primary_branch
+from ribbon_model.shape import closed_strip
+from ribbon_model.unfolding import factors, first_root, first_zero_of_t, shooting_determinant
+
+NU = 0.3
+
+
+def branch(m, n, Gamma, **settings):
+    system, x, tangent = primary_branch(FINITE_WIDTH, m, n, NU, 10, 7, Gamma=Gamma)
+    return follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, **settings), tangent)
+
+
+def moments(random, Gamma):
+    """Random strains away from omega_1 = 0, their derivatives of U, with U convex all the way to larger omega_1."""
+    while True:
+        w1, w3, kappa_n = random.uniform(0.8, 4), random.uniform(-3, 3), random.uniform(-4, 4)
+        d = [finite_width.strain_energy(w1 + s, w3, kappa_n, NU, Gamma) for s in np.linspace(0, 6, 61)]
+        if all(e[3] > 0 and e[3] * e[5] - e[4] ** 2 > 0.01 * e[3] for e in d):
+            return w1, w3, kappa_n, d[0]
+
+
+# --- the energy -------------------------------------------------------------------------------------------------------
+
+
+def test_the_membrane_function_against_its_definition():
+    """g, g', g'' by mpmath with 40 digits, on both sides of the series' limit and where cosh overflows."""
+    with mpmath.workdps(40):
+
+        def g(z):
+            x = mpmath.root(z, 4)
+            return (1 - 2 * (mpmath.cosh(x) - mpmath.cos(x)) / (x * (mpmath.sinh(x) + mpmath.sin(x)))) / z
+
+        for z in (0.01, 3.0, finite_width.SERIES_LIMIT - 0.01, finite_width.SERIES_LIMIT, 200.0, 1e5, 1e13):
+            exact = [mpmath.diff(g, mpmath.mpf(z), k, h=mpmath.mpf(z) * mpmath.mpf(10) ** -10) for k in range(3)]
+            found = finite_width.membrane(z)
+            assert [float(f / e) for f, e in zip(found, exact)] == pytest.approx([1, 1, 1], rel=3e-13)
+    assert finite_width.membrane(0.0) == pytest.approx((1 / 180, -1 / 22680, 2 * 2879 / 8172964800), rel=1e-15)
+
+
+@pytest.mark.parametrize("Gamma", (0.5, 10.0, 200.0))
+def test_the_energy_is_the_least_of_a_plate(Gamma):
+    """Plate bending and stretching of a section whose profile is a polynomial of degree 40: a linear problem, minimised."""
+    from numpy.polynomial import legendre
+
+    y, weight = legendre.leggauss(80)
+    weight, basis = weight / 2, np.eye(41)
+    value = legendre.legval(y, basis)
+    curvature = legendre.legval(y, legendre.legder(basis, 2, axis=1).T) * 4  # by y/w in [-1/2, 1/2]
+    for w1, w3, kappa_n in ((1.3, 0.7, 2.0), (-0.4, 1.1, 0.5), (3.0, 0.0, -1.0)):
+        bent, stretch = w1 - kappa_n, 6 * (1 - NU**2) * Gamma**2
+        twist = w3**2 * (y / 2) ** 2 / 2
+        # energy = a.A.a/2 + b.a + c in the coefficients of zeta / w^2; a constant elongation comes with the constant of zeta
+        A = (curvature * weight) @ curvature.T + 2 * stretch * w1**2 * (value * weight) @ value.T
+        b = NU * bent * curvature @ weight - 2 * stretch * w1 * (value * weight) @ twist
+        c = bent**2 / 2 + (1 - NU) * w3**2 + stretch * weight @ twist**2
+        least = c - b @ np.linalg.lstsq(A, b, rcond=1e-14)[0] / 2
+        assert finite_width.strain_energy(w1, w3, kappa_n, NU, Gamma)[0] == pytest.approx(least, rel=1e-10)
+
+
+@pytest.mark.parametrize("Gamma", (0.0, 1.0, 30.0))
+def test_derivatives_of_the_energy(Gamma):
+    """By complex steps: of U, and of its first derivatives."""
+    h = 1e-30
+    for at in ((1.3, 0.7, 2.0), (0.02, -0.4, 3.0), (-0.5, 0.3, 1.0)):
+        d = finite_width.strain_energy(*at, NU, Gamma)
+        steps = [finite_width.strain_energy(*(np.array(at) + 1j * h * e), NU, Gamma) for e in np.eye(3)]
+        by = [[step[i].imag / h for step in steps] for i in (0, 1, 2)]
+        assert by[0] == pytest.approx([d[1], d[2], d[6]], rel=1e-12, abs=1e-13)
+        assert by[1] == pytest.approx([d[3], d[4], d[7]], rel=1e-11, abs=1e-12)
+        assert by[2] == pytest.approx([d[4], d[5], d[8]], rel=1e-11, abs=1e-12)
+
+
+# --- the Legendre transform -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("Gamma", (0.0, 0.3, 3.0, 30.0, 3e3, 1e6))
+def test_the_response_inverts_the_energy(Gamma):
+    random = np.random.default_rng(3)
+    for _ in range(30):
+        w1, w3, kappa_n, d = moments(random, Gamma)
+        value, v1, v2, v3, star = FINITE_WIDTH.response(d[1], 0.4, d[2], kappa_n, NU, Gamma)
+        assert (v1, v2, v3) == pytest.approx((w1, 0.0, w3), rel=1e-11, abs=1e-12)
+        assert value == pytest.approx(d[1] * w1 + d[2] * w3 - d[0] + kappa_n**2 / 2, rel=1e-12, abs=1e-12)
+        assert star == pytest.approx(kappa_n - d[6], rel=1e-11, abs=1e-12)
+
+
+def test_the_response_carries_derivatives():
+    """Complex steps through Newton's method against central differences of the response, for all that it depends on."""
+    random, h = np.random.default_rng(4), 1e-5
+    for Gamma in (0.3, 10.0, 300.0):
+        w1, w3, kappa_n, d = moments(random, Gamma)
+        at = np.array([d[1], 0.1, d[2], kappa_n, NU, Gamma])
+        for e in np.eye(6)[[0, 2, 3, 4, 5]]:
+            exact = np.array([complex(v).imag for v in FINITE_WIDTH.response(*(at + 1e-30j * e))]) / 1e-30
+            ends = [np.array(FINITE_WIDTH.response(*(at + k * h * e))) for k in (1, -1)]
+            assert exact == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-6, abs=1e-7)
+
+
+def test_limits_of_the_response():
+    """Gamma = 0: the flat rod with modulus 1 - nu^2, to round-off, with an error O(Gamma^2); ribbon: O(1/sqrt(Gamma))."""
+    plane = 1 - NU**2
+    for M1, M3, kappa_n in ((0.4, 0.3, 1.5), (-1.0, 0.5, 2.0)):
+        H, w1, _, w3, star = FLAT_ROD.response(M1 / plane, 0, M3 / plane, kappa_n, NU)
+        flat = np.array([plane * H + NU**2 * kappa_n**2 / 2, w1, 0, w3, plane * star + NU**2 * kappa_n])
+        assert FINITE_WIDTH.response(M1, 0, M3, kappa_n, NU, 0.0) == pytest.approx(flat, rel=4e-16, abs=4e-16)
+        errors = [np.abs(np.array(FINITE_WIDTH.response(M1, 0, M3, kappa_n, NU, G)) - flat).max() for G in (1e-3, 2e-3)]
+        assert errors[1] / errors[0] == pytest.approx(4, rel=1e-3)
+    M1, M3, kappa_n = 0.8, 0.6, 0.7
+    ribbon = np.array(RIBBON.response(M1, 0, M3, kappa_n, NU))
+    errors = [np.abs(np.array(FINITE_WIDTH.response(M1, 0, M3, kappa_n, NU, G)) - ribbon).max() for G in (1e8, 4e8)]
+    assert errors[0] / errors[1] == pytest.approx(2, rel=1e-3) and errors[0] < 1e-4
+
+
+def test_where_the_energy_is_not_convex_there_is_no_response():
+    """At w^2 kappa_n / h = 100 an arc opened to xi = .85 has t < 0 (its t vanishes first at .776)."""
+    d = finite_width.strain_energy(0.15, 0.0, 1.0, NU, 100.0)
+    assert d[5] < 0
+    values = FINITE_WIDTH.response(d[1], 0.0, 0.0, 1.0, NU, 100.0)
+    assert not abs(values[1] - 0.15) < 1e-6  # another minimum, or none
+
+
+# --- circles ----------------------------------------------------------------------------------------------------------
+
+
+def test_thresholds_from_the_flat_rod_to_the_ribbon():
+    for m, n in ((1, 2), (1, 5), (3, 1), (5, 6)):
+        flat, ribbon = thresholds(FLAT_ROD, m, n, NU)[0], thresholds(RIBBON, m, n, NU)[0]
+        assert thresholds(FINITE_WIDTH, m, n, NU, 0.0)[0] == pytest.approx(flat, rel=1e-14)
+        assert thresholds(FINITE_WIDTH, m, n, NU, 1e12)[0] == pytest.approx(ribbon, rel=1e-4)
+    # by shooting with this energy, independently of the formula
+    assert [round(thresholds(FINITE_WIDTH, 1, 2, NU, G)[0], 3) for G in (1e-3, 10, 100)] == [5.615, 3.346, 2.680]
+
+
+def test_the_half_loop_bifurcates_at_the_thresholds():
+    system = half_loop(FINITE_WIDTH).discretize(12, 6, {"nu": NU, "Gamma": 10.0})
+    start = half_loop(FINITE_WIDTH).circle(system, 1, 2.0, circle(FINITE_WIDTH, 1, 2.0, NU, 10.0)["M1"])
+    found = follow(system, start, Settings(limits={"kappa_n": (0, 4.6)}, max_step=0.1)).labelled("BP")
+    expected = [thresholds(FINITE_WIDTH, 1, n, NU, 10.0)[0] for n in (2, 3)]
+    assert [point["kappa_n"] for point in found] == pytest.approx(expected, abs=1e-9)
+    low, high = stability_interval(FINITE_WIDTH, 1, NU, 10.0)
+    assert high == expected[0]
+    assert [index(FINITE_WIDTH, 1, k, NU, 10.0) for k in (3.3, 3.4, 4.5, 6.0)] == [0, 2, 4, math.inf]
+
+
+def test_covering_indices_and_names():
+    for m, kappa_n in ((1, 4.0), (3, -0.5), (5, 30.0)):
+        for law, Gamma in ((RIBBON, None), (FINITE_WIDTH, 0.0), (FINITE_WIDTH, 7.0)):
+            values = circle(law, m, kappa_n, NU, Gamma)
+            assert covering(kappa_n, values["kappa_star"], values["energy"]) == m
+            assert from_label(label(law.name, Gamma)) == (law, Gamma)
+    for law, Gamma in ((RIBBON, 1.0), (FINITE_WIDTH, None), (FINITE_WIDTH, -1.0)):
+        with pytest.raises(ValueError, match="Gamma"):
+            thresholds(law, 1, 2, NU, Gamma)
+
+
+# --- branches ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("m", "n", "Gamma"), [(1, 2, 10.0), (1, 2, 100.0), (3, 4, 10.0)])
+def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
+    found = branch(m, n, Gamma)
+    points = exact_finite_width.curve(m, n, NU, Gamma)
+    folds = [point for point in points if point.label == "LP"]
+    assert len(folds) == 1
+    for p, e in zip(found.labelled("LP"), folds, strict=True):
+        assert p["kappa_n"] == pytest.approx(e.kappa_n, abs=1e-11)
+        assert (p["kappa_star"], p["energy"]) == pytest.approx((e.kappa_star, e.energy), abs=1e-8)
+    assert found.points[-1]["kappa_n"] == pytest.approx(points[-1].kappa_n, abs=1e-9)
+    assert found.stop.reason == "trivial branch" and points[-1].omega == 2 * n - m
+    middle = found.points[len(found.points) // 2]
+    system = middle.system
+    strip = closed_strip(FINITE_WIDTH, system.nodes, system.states(middle.x), system.degree, middle.parameters)
+    assert strip.closure() < 1e-10
+
+
+def test_a_flat_rod_of_no_width():
+    """Gamma = 0: the branch (1, 2) of the flat rod, point by point in kappa_n and omega."""
+    found = branch(1, 2, 0.0, zeros={"kappa_n": [2.0]})
+    system, x, tangent = primary_branch(FLAT_ROD, 1, 2, NU, 10, 7)
+    flat = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, zeros={"kappa_n": [2.0]}), tangent)
+    ours, theirs = found.labelled("UZ")[0], flat.labelled("UZ")[0]
+    assert ours["M2"] == pytest.approx((1 - NU**2) * theirs["M2"], abs=1e-9)
+    assert ours["kappa_star"] == pytest.approx((1 - NU**2) * theirs["kappa_star"] + NU**2 * 2.0, abs=1e-9)
+    assert not found.labelled("LP")
+
+
+def test_the_fold_of_1_2_is_born_at_the_pitchfork():
+    """Gamma is a parameter like any other: the curve of folds runs down to where it meets the branch point of the circle."""
+    fold = branch(1, 2, 10.0).labelled("LP")[0]
+    folds = contin.curve(fold, "Gamma", direction=-1, limits={"Gamma": (4, 20), "M2": (1e-3, 50)})
+    (birth,) = folds.labelled("BP")
+    assert 4 < birth["Gamma"] < 5
+    assert birth["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 1, 2, NU, birth["Gamma"])[0], abs=1e-9)
+    for Gamma, there in ((birth["Gamma"] - 0.05, 0), (birth["Gamma"] + 0.05, 1)):  # independently
+        points = exact_finite_width.curve(1, 2, NU, Gamma)
+        assert sum(point.label == "LP" for point in points) == there
+
+
+# --- the unfolding arc ------------------------------------------------------------------------------------------------
+
+
+def test_the_unfolding_arc():
+    """Two routes agree; a wide strip is the ribbon, a narrow one the flat rod, and in between there is a least width."""
+    xi = np.array([0.1, 0.45, 0.7])
+    even, odd = factors(FINITE_WIDTH, NU, xi, width=75.0)
+    t = np.array([finite_width.strain_energy(1 - x, 0.0, 1.0, NU, 75.0)[5] for x in xi])
+    determinant = shooting_determinant(FINITE_WIDTH, NU, xi, width=75.0)
+    assert determinant == pytest.approx(-8 * (1 - xi) ** 4 * even * odd / t, rel=1e-10)
+    assert first_root(FINITE_WIDTH, NU, width=1e-6) == pytest.approx(first_root(FLAT_ROD, NU), abs=1e-9)
+    assert first_root(FINITE_WIDTH, NU, width=1e10) == pytest.approx(first_root(RIBBON, NU), abs=1e-4)
+    assert first_root(FINITE_WIDTH, NU, width=100.0) == pytest.approx(
+        first_root(FINITE_WIDTH, NU, width=100.0, method="shooting"), abs=1e-11
+    )
+    assert first_root(FINITE_WIDTH, NU, width=50.0, largest=0.99) is None
+    # the smallest widths at which t vanishes somewhere in 0 < xi < 1, from a scan of the formula
+    for nu, low, high in ((0.1, 173, 174), (0.2, 81, 82), (0.3, 51, 52), (0.4, 36, 37)):
+        assert first_zero_of_t(nu, low) is None and first_zero_of_t(nu, high) is not None
