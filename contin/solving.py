@@ -117,10 +117,33 @@ def point_of(system, x, iterations: int = 0, error: float = 0.0) -> Point:
     return Point("", "", parameters, trial.functionals, x, trial.tangent, system, 0.0, iterations, error)
 
 
-def _correct_away(system, x, others, newton: Newton, max_iterations: int = 100):
+#: Solutions no further apart than this are one.
+_SAME = 1e-6
+#: Where a deflated Newton iteration starts, as multiples of the guess's distance from the nearest known solution, and its
+#: longest step. It wanders before it converges, and may not come back; then it is the turn of the next.
+_STARTS = ((1.0, 3.0), (1.0, 1.0), (-1.0, 3.0), (-1.0, 1.0), (5.0, 3.0), (-5.0, 3.0), (5.0, 0.5), (-5.0, 0.5))
+
+
+def _correct_away(system, x, others, newton: Newton):
     """Newton on the deflated residual: a Newton step stretched so that known solutions repel."""
     known = [point.system.carrier(system)(point.x)[: system.state_size] for point in others]
     known = [np.append(states, x[system.state_size :]) for states in known]
+    nearest = min(known, key=lambda root: inner(system, x - root, x - root))
+    away = x - nearest
+    if np.max(np.abs(away)) < _SAME:  # the known solution itself for a guess
+        away = np.where(np.arange(x.size) < system.state_size, 0.1 * (1 + np.abs(x)), 0.0)
+    for multiple, longest in _STARTS:
+        with np.errstate(all="ignore"):
+            found = _wander(system, nearest + multiple * away, known, longest)
+        if found is not None:
+            done = correct(system, found, newton=newton)
+            if all(np.max(np.abs(done.x - root)) > _SAME for root in known):
+                return done
+    raise ConvergenceError("no further solution was found from this guess; another guess may lead to one")
+
+
+def _wander(system, x, known, longest, max_iterations: int = 100):
+    """Where the deflated iteration from x converges, or None."""
     for _ in range(max_iterations):
         residual, factors = system.linearize(x)
         step = -factors.solve(residual)
@@ -132,11 +155,11 @@ def _correct_away(system, x, others, newton: Newton, max_iterations: int = 100):
         step = step / (1 - stretch)
         size = np.max(np.abs(step) / (1 + np.abs(x)))
         if not np.isfinite(size):
-            break
-        x = x + step * min(1.0, 3.0 / size)
+            return None
+        x = x + step * min(1.0, longest / size)
         if size < 1e-6:
-            return correct(system, x, newton=newton)
-    raise ConvergenceError("no further solution was found from this guess; another guess may lead to one")
+            return x
+    return None
 
 
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,

@@ -29,7 +29,7 @@ def equilibrium(point, law=RIBBON):
 @functools.cache
 def branch(m, n, law=RIBBON, lowest=-60.0):
     system, x, tangent = primary_branch(law, m, n, NU, 10, 7)
-    return follow(system, x, Settings(trivial="M2", limits={"kappa_n": (lowest, 100)}), tangent)
+    return follow(system, x, Settings(trivial="M2", limits={"kappa_n": (lowest, 100)}, max_step=1.0), tangent)
 
 
 @functools.cache
