@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from contin import _checks
 from contin.compilation import Batch, argument_count, check_statement, outputs
 from contin.errors import ProblemError
 from contin.events import hopf
@@ -46,6 +47,10 @@ class AlgebraicProblem:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
+        _checks.truth("dynamics", self.dynamics)
+        if self.count is not None:
+            _checks.whole("count", self.count, 1, 100_000)
+        _checks.function("residual", self.residual)
         arguments = argument_count(self.residual)
         if arguments not in (2, 3):
             raise ProblemError(f"residual takes {arguments} arguments, must take 2 (or 3, to fill the last)")

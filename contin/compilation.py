@@ -25,10 +25,13 @@ import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from contin import _checks
 from contin._analytic import AnalyticCompiler
 from contin._cache import cache_directory, write_source
 from contin.errors import ProblemError
 
+#: More states than any mesh has room for.
+_MOST_STATES = 10_000
 #: Part of every fingerprint: changes when functions are compiled by other rules (the template has its own part).
 _RULES = 5
 
@@ -123,7 +126,7 @@ class _Prepared:
         """
         function = getattr(function, "py_func", function)
         if not isinstance(function, types.FunctionType):
-            raise ProblemError(f"{function!r} must be a plain Python function (def or lambda)")
+            raise ProblemError(f"{_checks.shown(function)} must be a plain Python function (def or lambda)")
         if function in self._open:
             raise ProblemError(f"function {function.__name__!r} calls itself; write a loop instead")
         if function not in self._done:
@@ -221,10 +224,12 @@ def _replacement(value: object) -> object | None:
 
 def check_names(kind: str, names: Sequence[str]) -> tuple[str, ...]:
     """``names`` as a tuple, or a :class:`ProblemError` that says which one cannot be used."""
-    names = tuple(names)
+    names = tuple(_checks.sequence(kind, names, "names"))
     for name in names:
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
-            raise ProblemError(f"{kind}: {name!r} is not usable as a name (a Python identifier, no keyword, no leading _)")
+            raise ProblemError(
+                f"{kind}: {_checks.shown(name)} is not usable as a name (a Python identifier, no keyword, no leading _)"
+            )
         if names.count(name) > 1:
             raise ProblemError(f"{kind}: the name {name!r} stands twice")
     return names
@@ -232,14 +237,19 @@ def check_names(kind: str, names: Sequence[str]) -> tuple[str, ...]:
 
 def check_statement(states, parameters, functionals) -> tuple[str, ...]:
     """The names of states (u0, u1, ... for a number), after names and values of a problem were checked."""
-    names = check_names("states", [f"u{i}" for i in range(states)] if isinstance(states, int) else states)
-    if not names:
-        raise ProblemError("states: there must be at least one")
-    check_names("parameters", parameters)
-    check_names("functionals", [*functionals, *parameters])
+    if isinstance(states, (int, np.integer)):
+        _checks.whole("states", states, 1, _MOST_STATES)
+        states = [f"u{i}" for i in range(states)]
+    names = check_names("states", states)
+    if not 1 <= len(names) <= _MOST_STATES:
+        raise ProblemError(f"states: there must be at least one, and at most {_MOST_STATES}")
+    check_names("parameters", tuple(_checks.mapping("parameters", parameters, "numbers")))
+    check_names("functionals", [*_checks.mapping("functionals", functionals, "functions"), *parameters])
     for name, value in parameters.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating)) or not math.isfinite(value):
-            raise ProblemError(f"parameters: {name} = {value!r} must be a finite number")
+        if not _checks.is_number(value) or not math.isfinite(value):
+            raise ProblemError(f"parameters: {name} = {_checks.shown(value)} must be a finite number")
+    for name, value in functionals.items():
+        _checks.function(f"functionals: {name}", value)
     return names
 
 
@@ -251,7 +261,8 @@ def outputs(function: Callable, arguments: Sequence[tuple[str, ...] | None], wha
         with np.errstate(all="ignore"):
             result = plain(*values)
     except Exception as error:
-        raise ProblemError(f"{what} cannot be called: {type(error).__name__}: {error}") from error
+        reason = " ".join(str(error).split())
+        raise ProblemError(f"{what} cannot be called: {type(error).__name__}: {reason}") from error
     return len(result) if isinstance(result, (tuple, list, np.ndarray)) else 0
 
 
@@ -366,5 +377,14 @@ def _explain(name: str, error: Exception) -> str:
 
 
 def argument_count(function: Callable) -> int:
-    """Number of positional arguments of a user's function."""
-    return len(inspect.signature(getattr(function, "py_func", function)).parameters)
+    """Number of positional arguments of a user's function.
+
+    Raises
+    ------
+    ProblemError
+        It is no function, or one that does not say.
+    """
+    try:
+        return len(inspect.signature(getattr(function, "py_func", function)).parameters)
+    except (TypeError, ValueError):
+        raise ProblemError(f"{_checks.shown(function)} must be a plain Python function (def or lambda)") from None

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.errors import ConvergenceError, ProblemError
+from contin import _checks
+from contin.errors import ConvergenceError
 
 
 @dataclass(frozen=True)
@@ -20,10 +21,8 @@ class Newton:
     max_iterations: int = 10
 
     def __post_init__(self):
-        if not 0 < self.tolerance < 1:
-            raise ProblemError(f"newton tolerance: {self.tolerance} must lie between 0 and 1")
-        if self.max_iterations < 1:
-            raise ProblemError(f"max_iterations: {self.max_iterations} must be at least 1")
+        _checks.number("newton tolerance", self.tolerance, 0, 1)
+        _checks.whole("max_iterations", self.max_iterations, 1, 10_000)
 
 
 @dataclass(frozen=True)

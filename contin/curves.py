@@ -14,11 +14,12 @@ import dataclasses
 
 import numpy as np
 
+from contin import _checks
 from contin.arclength import follow
 from contin.branch import Branch, Point
 from contin.errors import ProblemError
 from contin.events import Monitor
-from contin.settings import Settings
+from contin.settings import Settings, settings_with
 from contin.switching import BranchPoint, _Bordered, locate_branch_point
 
 #: Cosine between a border and the null vector that it stands for, below which it is renewed.
@@ -261,12 +262,14 @@ def curve(start: Point, second: str, settings: Settings | None = None, **options
     ProblemError
         The start is neither, or the name is no further parameter.
     """
+    _checks.instance("start", start, Point, "a Point")
+    _checks.instance("second", second, str, "a name")
     system = start.system
     if second in system.free or second not in system.problem.parameters:
         raise ProblemError(f"second: {second!r} must be a parameter that is not free ({', '.join(system.problem.parameters)})")
     options.setdefault("primary", second)
     options.setdefault("branch_points", False)
-    settings = dataclasses.replace(settings or Settings(), **options)
+    settings = settings_with(settings, options)
     base, x = system.with_free((*system.free, second), start.x)
     if isinstance(start.details, BranchPoint):
         extended, x = BranchPointCurve(base), np.append(x, 0.0)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from contin import _checks
 from contin.arclength import Continuation
 from contin.branch import Branch, Point, Stop
 from contin.errors import ConvergenceError
-from contin.settings import Settings
+from contin.settings import Settings, settings_with
 from contin.switching import BranchPoint, inner
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -204,6 +205,11 @@ def diagram(
     Diagram
         Failed switches are recorded at their junction.
     """
-    settings = dataclasses.replace(settings or Settings(), **options)
-    system, x = (start.system, start.x) if free is None else start.system.with_free(free, start.x)
+    _checks.instance("start", start, Point, "a Point")
+    _checks.whole("depth", depth, 0, 1000)
+    _checks.number("tolerance", tolerance, 0)
+    for symmetry in _checks.sequence("symmetries", symmetries, "functions"):
+        _checks.function("symmetries", symmetry)
+    settings = settings_with(settings, options)
+    system, x = (start.system, start.x) if free is None else start.system.with_free(_checks.names("free", free), start.x)
     return _Explorer(settings, symmetries, tolerance).run(system, x, depth)

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contin import _checks
 from contin.errors import ProblemError
+
+#: More intervals than any machine has room for.
+MOST_INTERVALS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -30,12 +34,12 @@ class MeshControl:
     every: int = 3
 
     def __post_init__(self):
-        if not 0 < self.tolerance < 1:
-            raise ProblemError(f"mesh tolerance: {self.tolerance} must lie between 0 and 1")
-        if not 1 <= self.min_intervals <= self.max_intervals:
-            raise ProblemError(f"intervals: {self.min_intervals} to {self.max_intervals} must be at least 1, in order")
-        if self.every < 0:
-            raise ProblemError(f"adapt every: {self.every} must be 0 (never) or more")
+        _checks.number("mesh tolerance", self.tolerance, 0, 1)
+        _checks.whole("min_intervals", self.min_intervals, 1, MOST_INTERVALS)
+        _checks.whole("max_intervals", self.max_intervals, 1, MOST_INTERVALS)
+        if self.min_intervals > self.max_intervals:
+            raise ProblemError(f"intervals: {self.min_intervals} to {self.max_intervals} must be in order")
+        _checks.whole("every", self.every, 0, 1_000_000)
 
 
 def density(system, x):

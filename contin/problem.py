@@ -6,8 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from contin import _checks
 from contin.compilation import Batch, argument_count, check_statement, outputs
 from contin.errors import ProblemError
+
+_MOST_CONDITIONS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +61,10 @@ class BoundaryValueProblem:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
-        a, b = self.domain
-        if not (math.isfinite(a) and math.isfinite(b) and a < b):
-            raise ProblemError(f"domain: {self.domain} must be two finite numbers, the first the smaller")
+        ends = tuple(_checks.sequence("domain", self.domain, "two finite numbers, the first the smaller"))
+        numbers = len(ends) == 2 and all(_checks.is_number(end) and math.isfinite(end) for end in ends)
+        if not (numbers and ends[0] < ends[1]):
+            raise ProblemError(f"domain: {_checks.shown(self.domain)} must be two finite numbers, the first the smaller")
         p, u = tuple(self.parameters), self.states
         counts = {
             "rhs": self._count("rhs", self.rhs, (None, u, p), len(u)),
@@ -74,14 +78,16 @@ class BoundaryValueProblem:
 
     @staticmethod
     def _count(name, function, arguments, given):
-        if function is None:
+        if function is None and name == "integrals":
             return 0
+        _checks.function(name, function)
         expected = len(arguments)
         if (found := argument_count(function)) not in (expected, expected + 1):
             raise ProblemError(f"{name} takes {found} arguments, must take {expected} (or {expected + 1}, to fill the last)")
         if found == expected + 1:
             if given is None:
                 raise ProblemError(f"{name} fills an array: say how many values with {name.rstrip('s')}_count")
+            _checks.whole(f"{name.rstrip('s')}_count", given, 1, _MOST_CONDITIONS)
             return given
         return max(outputs(function, arguments, name), 1)
 

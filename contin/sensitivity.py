@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from contin import _checks
 from contin.branch import Point
 from contin.errors import ProblemError
 from contin.events import Trial
@@ -39,14 +40,17 @@ def sensitivities(
     ProblemError
         A name that is not a parameter that is held fixed on the branch.
     """
+    _checks.instance("point", point, Point, "a Point")
     system = point.system
     others = [name for name in system.problem.parameters if name not in system.free]
-    by = others if by is None else list(by)
+    by = others if by is None else list(_checks.names("by", by))
     for name in by:
         if name not in others:
             raise ProblemError(f"by: {name!r} must be one of the parameters that are not free ({', '.join(others)})")
     if not by:
         return {}
+    if len(system.free) != system.problem.free_size:
+        raise ProblemError("point: must be one of a branch, with the free parameters of a curve")
     wide, x = system.with_free((*system.free, *by), point.x)
     if point.label == "LP":
         return _of_fold(point, wide, x, by)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
+from contin import _checks
 from contin.corrector import Newton
 from contin.errors import ProblemError
 from contin.events import Monitor
@@ -66,17 +69,45 @@ class Settings:
     mesh: MeshControl = field(default_factory=MeshControl)
 
     def __post_init__(self):
-        if self.direction not in (1, -1):
-            raise ProblemError(f"direction: {self.direction} must be +1 or -1")
-        if not 0 < self.min_step <= self.step <= self.max_step:
-            raise ProblemError(
-                f"step: {self.step} must be positive and lie between min_step {self.min_step} and max_step {self.max_step}"
-            )
-        if self.max_points < 1:
-            raise ProblemError(f"max_points: {self.max_points} must be at least 1")
+        for name in ("primary", "trivial"):
+            if getattr(self, name) is not None:
+                _checks.instance(name, getattr(self, name), str, "a name")
+        for name in ("folds", "branch_points", "errors"):
+            _checks.truth(name, getattr(self, name))
+        if not _checks.is_number(self.direction) or self.direction not in (1, -1):
+            raise ProblemError(f"direction: {_checks.shown(self.direction)} must be +1 or -1")
+        for name in ("step", "min_step"):
+            _checks.number(name, getattr(self, name), 0)
+        if not _checks.is_number(self.max_step) or not self.min_step <= self.step <= self.max_step:
+            bounds = f"min_step = {self.min_step:g} and max_step = {_checks.shown(self.max_step)}"
+            raise ProblemError(f"step: {self.step:g} must lie between {bounds}")
+        _checks.whole("max_points", self.max_points, 1, 10**9)
         for name in ("angle", "accuracy", "change"):
-            if not 0 < getattr(self, name) < 1.5:
-                raise ProblemError(f"{name}: {getattr(self, name)} must lie between 0 and 1.5")
-        for name, ends in self.limits.items():
-            if len(ends) != 2 or not ends[0] < ends[1]:
-                raise ProblemError(f"limits: {name}: {ends} must be two numbers, the first the smaller")
+            _checks.number(name, getattr(self, name), 0, 1.5)
+        for name, ends in _checks.mapping("limits", self.limits, "pairs of numbers").items():
+            pair = tuple(_checks.sequence(f"limits: {name}", ends, "two numbers, the first the smaller"))
+            if len(pair) != 2 or not all(map(_checks.is_number, pair)) or not pair[0] < pair[1]:
+                raise ProblemError(f"limits: {name}: {_checks.shown(ends)} must be two numbers, the first the smaller")
+        for name, values in _checks.mapping("zeros", self.zeros, "lists of numbers").items():
+            for value in _checks.sequence(f"zeros: {name}", values, "numbers"):
+                _checks.number(f"zeros: {name}", value)
+        for monitor in _checks.sequence("monitors", self.monitors, "Monitor"):
+            _checks.instance("monitors", monitor, Monitor, "a Monitor")
+        _checks.instance("newton", self.newton, Newton, "a Newton")
+        _checks.instance("mesh", self.mesh, MeshControl, "a MeshControl")
+
+
+def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:
+    """The settings with some fields changed.
+
+    Raises
+    ------
+    ProblemError
+        A field that there is not, or a value that it cannot have.
+    """
+    _checks.instance("settings", settings, (Settings, type(None)), "a Settings")
+    known = [entry.name for entry in dataclasses.fields(Settings)]
+    for name in options:
+        if name not in known:
+            raise ProblemError(f"there is no setting {name!r}; known are {', '.join(known)}")
+    return dataclasses.replace(settings or Settings(), **options)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from contin import _checks
 from contin.algebraic import Algebraic, AlgebraicProblem
 from contin.arclength import follow
 from contin.branch import Branch, Point
-from contin.collocation import Collocation
+from contin.collocation import DEGREES, Collocation
 from contin.corrector import Newton, correct
 from contin.errors import ConvergenceError, ProblemError
 from contin.events import Trial
-from contin.mesh import MeshControl
+from contin.mesh import MOST_INTERVALS, MeshControl
 from contin.problem import BoundaryValueProblem
-from contin.settings import Settings
+from contin.settings import Settings, settings_with
 from contin.switching import BranchPoint, inner
 
 Guess = Callable | Point | Sequence[float] | tuple[np.ndarray, np.ndarray] | None
@@ -55,13 +55,23 @@ def solve(
     ------
     ConvergenceError, ProblemError
     """
-    parameters, control = dict(parameters or {}), mesh or MeshControl()
+    _checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
+    parameters, control = _parameters(parameters), MeshControl() if mesh is None else mesh
+    free = _checks.names("free", free)
+    _checks.whole("intervals", intervals, 1, MOST_INTERVALS)
+    _checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
+    _checks.instance("mesh", control, MeshControl, "a MeshControl")
+    _checks.instance("newton", newton, Newton, "a Newton")
+    for other in _checks.sequence("others", others, "Point"):
+        _checks.instance("others", other, Point, "a Point")
     if isinstance(guess, Point):
         parameters = {**guess.parameters, **parameters}
     needed = problem.free_size - 1
     if len(free) != needed:
         raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {max(needed, 0)} (conditions - states)")
-    system, x = _first(problem, guess, parameters, tuple(free), intervals, degree)
+    system, x = _first(problem, guess, parameters, free, intervals, degree)
+    if not np.all(np.isfinite(x)):
+        raise ProblemError("guess: its values must be finite numbers")
     for _ in range(4):
         done = _correct_away(system, x, others, newton) if others else correct(system, x, newton=newton)
         adapted = system.adapted(done.x, control)
@@ -72,42 +82,72 @@ def solve(
     return point_of(system, done.x, done.iterations, done.error)
 
 
+def _parameters(values) -> dict[str, float]:
+    """Values of parameters as a user gives them."""
+    if values is None:
+        return {}
+    for name, value in _checks.mapping("parameters", values, "numbers").items():
+        _checks.number(f"parameters: {name}", value)
+    return dict(values)
+
+
+def _numbers(values, count: int | None = None):
+    """A guess as an array of numbers, shape (count,) where that is given."""
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ProblemError(f"guess: {_checks.shown(values)} must be numbers") from None
+    if count is not None and array.size != count:
+        raise ProblemError(f"guess: {array.size} numbers, must be the {count} states")
+    return array if count is None else array.ravel()
+
+
 def _first(problem, guess, parameters, free, intervals, degree):
     """System and first guess."""
     if isinstance(problem, AlgebraicProblem):
         system = Algebraic(problem, free, parameters)
         states = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
-        states = np.zeros(system.state_size) if states is None else np.asarray(states, dtype=float).ravel()
-        if states.size != system.state_size:
-            raise ProblemError(f"guess: {states.size} numbers for the {system.state_size} states")
+        states = np.zeros(system.state_size) if states is None else _numbers(states, system.state_size)
         return system, system.pack(states, {**problem.parameters, **parameters})
     a, b = problem.domain
     points = np.linspace(a, b, intervals + 1)
     if isinstance(guess, Point):
         points, degree = guess.system.mesh, guess.system.degree
-    elif isinstance(guess, tuple) and len(guess) == 2 and np.ndim(guess[0]) == 1:
-        given = np.asarray(guess[0], dtype=float)
-        if np.any(np.diff(given) <= 0) or given[0] > a or given[-1] < b:
+    elif _is_pair(guess):
+        given = _numbers(guess[0])
+        if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a or not given[-1] >= b:
             raise ProblemError(f"guess: its t must increase and cover the domain {a:g} ... {b:g}")
     system = Collocation(problem, points, degree, free, parameters)
-    states = _sampled(guess, system.nodes)
-    if states.shape != (len(system.nodes), len(problem.states)):
-        raise ProblemError(f"guess: {states.shape[1:]} values at a point, must be the {len(problem.states)} states")
+    states = _sampled(guess, system.nodes, len(problem.states))
     return system, system.pack(states, {**problem.parameters, **parameters})
 
 
-def _sampled(guess, nodes):
-    """The states (K, n) of a guess at the nodes."""
+def _is_pair(guess) -> bool:
+    """Whether a guess is (t, states)."""
+    return isinstance(guess, tuple) and len(guess) == 2 and isinstance(guess[0], (list, tuple, np.ndarray))
+
+
+def _sampled(guess, nodes, count):
+    """The states (K, count) of a guess at the nodes."""
     if isinstance(guess, Point):
-        return guess.system.evaluate(guess.x, nodes)
+        states = guess.system.evaluate(guess.x, nodes)
+        if states.shape[1] != count:
+            raise ProblemError(f"guess: a Point of {states.shape[1]} states for a problem of {count}")
+        return states
     if callable(guess):
-        return np.array([np.asarray(guess(t), dtype=float).ravel() for t in nodes])
-    if isinstance(guess, tuple) and len(guess) == 2 and np.ndim(guess[0]) == 1:
-        t, values = np.asarray(guess[0], dtype=float), np.asarray(guess[1], dtype=float)
-        return np.stack([np.interp(nodes, t, column) for column in values.reshape(len(t), -1).T], axis=1)
+        try:
+            values = [guess(t) for t in nodes]
+        except Exception as error:
+            raise ProblemError(f"guess cannot be called: {type(error).__name__}: {error}") from error
+        return np.array([_numbers(value, count) for value in values])
+    if _is_pair(guess):
+        t, values = _numbers(guess[0]), _numbers(guess[1])
+        if values.size != len(t) * count:
+            raise ProblemError(f"guess: {values.size} numbers for {len(t)} places t and {count} states")
+        return np.stack([np.interp(nodes, t, column) for column in values.reshape(len(t), count).T], axis=1)
     if guess is None:
         raise ProblemError("guess: a boundary value problem needs one (a function of t, arrays, or numbers)")
-    return np.tile(np.asarray(guess, dtype=float).ravel(), (len(nodes), 1))
+    return np.tile(_numbers(guess, count), (len(nodes), 1))
 
 
 def point_of(system, x, iterations: int = 0, error: float = 0.0) -> Point:
@@ -182,12 +222,14 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     ------
     ProblemError, ConvergenceError
     """
-    settings = dataclasses.replace(settings or Settings(), **options)
+    _checks.instance("start", start, Point, "a Point")
+    settings = settings_with(settings, options)
     system, x = start.system, start.x
-    if free is not None and tuple(free) != system.free:
+    if free is not None and _checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
     if branch is None:
         return follow(system, x, settings)
+    _checks.whole("branch", branch, 0, 10)
     if not isinstance(start.details, BranchPoint):
         raise ProblemError("branch: the start is not a branch point")
     if not 0 <= branch < len(start.details.tangents):
