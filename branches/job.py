@@ -11,6 +11,7 @@ from branches.config import Config, ConfigError, dump, parse
 from branches.files import StoreError, prepare
 from branches.store import BranchWriter, open_branch, read_state
 from contin import Continuation, ConvergenceError, MeshControl, Settings
+from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 from ribbon_model.seeds import half_loop_branch, primary_branch
 
@@ -104,11 +105,16 @@ def _watch(config: Config, system, x):
     return Watch(LAWS[config.law], system, x)
 
 
+def _monitors(config: Config, watch) -> list:
+    """Events of the index, where it is watched, and the end of the law, where it has one."""
+    return [*(watch.monitors if watch else ()), *convexity.monitors(LAWS[config.law])]
+
+
 def _begun(config: Config):
     """The run from the branch's first point, and its watch."""
     system, x, tangent = seed(config)
     watch = _watch(config, system, x)
-    return Continuation(system, x, settings_of(config, watch.monitors if watch else ()), tangent), watch
+    return Continuation(system, x, settings_of(config, _monitors(config, watch)), tangent), watch
 
 
 def _resumed(config: Config, path: Path):
@@ -123,7 +129,7 @@ def _resumed(config: Config, path: Path):
             raise ConfigError(
                 f"limits: {name}: {low:g}, {high:g} must contain the place to go on from, {name} = {last[name]:.6g}"
             )
-    settings = settings_of(config, watch.monitors if watch else ())
+    settings = settings_of(config, _monitors(config, watch))
     return (Continuation(state.system, state.x, settings, state=state, start=start), watch), image
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import contin
 from contin import Settings, follow
-from ribbon_model import exact_finite_width, finite_width
+from ribbon_model import convexity, exact_finite_width, finite_width
 from ribbon_model.equilibrium import half_loop
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, from_label, label
 from ribbon_model.linear import circle, covering, index, stability_interval, thresholds
@@ -185,6 +185,15 @@ def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
     system = middle.system
     strip = closed_strip(FINITE_WIDTH, system.nodes, system.states(middle.x), system.degree, middle.parameters)
     assert strip.closure() < 1e-10
+
+
+def test_a_branch_stops_where_the_law_ends():
+    """(3, 1) at Gamma = 10 runs off to where U loses its convexity; the quadrature is lost at the same kappa_n."""
+    found = branch(3, 1, 10.0, monitors=convexity.monitors(FINITE_WIDTH))
+    assert found.stop.reason == "event" and convexity.NAME in found.stop.message
+    lost = exact_finite_width.curve(3, 1, NU, 10.0)[-1]
+    assert lost.label == "MX" and lost.kappa_n == pytest.approx(found.points[-1]["kappa_n"], abs=0.05)
+    assert not convexity.monitors(RIBBON)
 
 
 def test_a_flat_rod_of_no_width():

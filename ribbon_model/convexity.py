@@ -1,0 +1,72 @@
+"""Where a law that is given by its strain energy ends: U must be convex at every strain along the strip.
+
+Beyond, H = max(M.omega - U) has several values or none. A branch comes there either smoothly, with strains that grow like a
+square root, or through a jump: two neighbouring places of the strip take different minima of U - M.omega.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from contin import Monitor
+from contin.compilation import Batch
+from ribbon_model.finite_width import strain_energy
+from ribbon_model.laws import FINITE_WIDTH, Law
+from ribbon_model.shape import frames
+
+NAME = "the end of the convex strain energy"
+
+
+def margin(law: Law) -> Callable | None:
+    """``margin(system, x)``: the least det D2U / (U_11 U_33) along the strip, 1 on planar circles, -1 without a response.
+
+    It is looked at for the strains at the nodes and halfway between those of neighbours, which finds jumps. None for a law
+    whose H is a closed expression: its domain is known without.
+    """
+    if law is not FINITE_WIDTH:
+        return None
+    response = law.response
+
+    def strains(u, p):
+        H, w1, w2, w3, conjugate = response(u.M1, u.M2, u.M3, p.kappa_n, p.nu, p.Gamma)
+        return w1, w3
+
+    def curvatures(u, p):
+        U, U1, U3, U11, U13, U33, Uk, U1k, U3k = strain_energy(u.w1, u.w3, p.kappa_n, p.nu, p.Gamma)
+        return U11, U13, U33
+
+    names = ("kappa_n", *law.parameters)
+    at, second = (
+        Batch([function], [count], states, names, times=False)
+        for function, count, states in ((strains, 2, ("M1", "M2", "M3")), (curvatures, 3, ("w1", "w3")))
+    )
+
+    def least(system, x):
+        values = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+        p = np.array([values[name] for name in names])
+        w = _values(at, _moments(system.states(x), values), p)
+        U11, U13, U33 = _values(second, np.concatenate([w, (w[1:] + w[:-1]) / 2]), p).T
+        ratio = np.where((U11 > 0) & (U33 > 0), (U11 * U33 - U13**2) / (U11 * U33), -1.0)
+        return float(np.nan_to_num(ratio, nan=-1.0).min())
+
+    return least
+
+
+def _values(batch, u, p):
+    return batch.values(np.zeros(len(u)), np.ascontiguousarray(u), np.empty((0, u.shape[1])), p)
+
+
+def _moments(states, values):
+    """Components of M on the directors at the nodes, shape (K, 3)."""
+    moment, force = (np.array([values.get(f"{letter}{i}", 0.0) for i in (1, 2, 3)]) for letter in "MR")
+    if states.shape[1] > 4:
+        moment = moment - np.cross(states[:, 4:7], force)
+    return np.einsum("kij,kj->ki", frames(states), np.broadcast_to(moment, (len(states), 3)))
+
+
+def monitors(law: Law) -> list[Monitor]:
+    """The event that ends a run where the law ends; none for a law with a closed expression for H."""
+    least = margin(law)
+    return [Monitor("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []
