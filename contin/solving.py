@@ -161,7 +161,7 @@ def point_of(system, x, iterations: int = 0, error: float = 0.0) -> Point:
 _SAME = 1e-6
 #: Where a deflated Newton iteration starts, as multiples of the guess's distance from the nearest known solution, and its
 #: longest step. It wanders before it converges, and may not come back; then it is the turn of the next.
-_STARTS = ((1.0, 3.0), (1.0, 1.0), (-1.0, 3.0), (-1.0, 1.0), (5.0, 3.0), (-5.0, 3.0), (5.0, 0.5), (-5.0, 0.5))
+_STARTS = [(m, longest) for longest in (3.0, 1.0, 0.3) for m in (1.0, -1.0, 5.0, -5.0, 20.0, -20.0, 50.0, -50.0)]
 
 
 def _correct_away(system, x, others, newton: Newton):

@@ -86,10 +86,10 @@ def test_deflation_finds_the_other_solution():
 @pytest.mark.parametrize("lam", [1.0, 2.0, 3.0])
 @pytest.mark.parametrize("guess", ([0, 0.1], [1, 0], [0.3, 0.1], None))
 def test_deflation_from_many_guesses(lam, guess):
-    """Also from the known solution itself; the value from the closed form."""
+    """Also from the known solution itself; the value from the closed form, at a place between mesh points."""
     first = solve(bratu(), [0, 0], {"lam": lam}, degree=8)
     second = solve(bratu(), first if guess is None else guess, {"lam": lam}, degree=8, others=[first])
-    assert middle(second) == pytest.approx(bratu_values(lam)[1], abs=1e-10)
+    assert middle(second) == pytest.approx(bratu_values(lam)[1], abs=1e-8)
 
 
 def test_eigenvalue_as_a_free_parameter():
