@@ -73,8 +73,20 @@ Interval = Annotated[tuple[float, float], BeforeValidator(_two_ordered_numbers)]
 Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]
 
 
+#: The domain on which a secondary branch is followed, by the reversal of S that it keeps.
+DOMAINS = {"mirror": "half loop", "axis": "half loop between axes"}
+
+
+class OriginConfig(_Strict):
+    """Where a secondary branch leaves the primary branch (m, n)."""
+
+    kappa_n: float = Field(description="natural curvature there")
+    kappa_star: float = Field(description="conjugate curvature there, which tells the place from others at this kappa_n")
+    mode: str = Field(description="class of the critical mode, as the labelled point SB of the primary branch is named")
+
+
 class Config(_Strict):
-    """One primary branch: the mode of wavenumber n on the m-covered circle, followed to its end."""
+    """One branch, followed to its end: that of the mode of wavenumber n on the m-covered circle, or one that leaves it."""
 
     title: str = ""
     law: Literal["ribbon", "flat rod", "isotropic rod", "finite width"] = "ribbon"
@@ -82,7 +94,8 @@ class Config(_Strict):
     Gamma: float | None = Field(None, ge=0, le=1e12, description="w^2 / (h L/2pi), width and thickness; law finite width only")
     m: int = Field(ge=1, le=1000, description="covering index of the circle that the branch leaves")
     n: int = Field(ge=1, le=1000, description="wavenumber of the mode")
-    domain: Literal["cell", "half loop"] = "cell"
+    domain: Literal["cell", "half loop", "half loop between axes"] = "cell"
+    origin: OriginConfig | None = Field(None, description="follow the secondary branch that leaves (m, n) there instead")
     limits: dict[Column, Interval] = Field(default_factory=lambda: {"kappa_n": (-100.0, 100.0)})
     zeros: dict[Column, Annotated[list[float], Field(max_length=100)]] = Field(
         default_factory=dict, description="values to label UZ"
@@ -94,15 +107,30 @@ class Config(_Strict):
 
     @model_validator(mode="after")
     def _bifurcation_exists(self):
-        if self.domain == "cell" and self.m % (2 * self.n) == 0:
+        if (self.domain == "cell" or self.origin) and self.m % (2 * self.n) == 0:
             raise ValueError(f"m = {self.m}, n = {self.n}: m / n must not be even on the cell, where the loop would stay open")
-        start = self.at_bifurcation()
+        self._origin_fits()
+        start = self.at_bifurcation() if self.origin is None else self.origin.model_dump()
         for name, (low, high) in self.limits.items():
-            if not low < start[name] < high:
+            if name in start and not low < start[name] < high:
                 raise ValueError(
                     f"limits: {name}: {low:g}, {high:g} must contain the start of the branch, {name} = {start[name]:.6g}"
                 )
         return self
+
+    def _origin_fits(self) -> None:
+        """ValueError where the domain is not one that a branch from this origin can be followed on."""
+        if self.origin is None:
+            if self.domain == "half loop between axes":
+                raise ValueError("domain: the half loop between axes is for secondary branches, which have an origin")
+            return
+        from ribbon_model.secondary import breaking  # brings the engine along: not for every scene
+
+        allowed = [DOMAINS[reversal] for reversal in breaking(self.n, self.origin.mode).keeps]
+        if not allowed:
+            raise ValueError(f"origin: {self.origin.mode!r} keeps no mirror and no axis, and is not followed")
+        if self.domain not in allowed:
+            raise ValueError(f"domain: {self.domain!r} must be {' or '.join(map(repr, allowed))} for {self.origin.mode!r}")
 
     def at_bifurcation(self) -> dict[Column, float]:
         """What the columns are on the circle where the branch starts (there the strain is omega = (m, 0, 0)).
@@ -164,6 +192,8 @@ def _diagram(values: dict, name: str, settings: list[str]) -> DiagramConfig:
     for key, entries in lists.items():
         if not entries:
             raise ConfigError(f"{name}: {key}: the list is empty")
+    if "origin" in values:
+        raise ConfigError(f"{name}: origin: belongs to a scene of one branch, not of many")
     pairs = _pairs(values, lists, name)
     families = _families(lists)
     if len(families) * len(pairs) > _MOST_BRANCHES:

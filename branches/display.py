@@ -137,15 +137,19 @@ class Display:
 
 def name_of(config) -> str:
     """The branch in words."""
-    return f"{config.material}, (m, n) = ({config.m}, {config.n}), nu = {config.nu:g}"
+    what = "secondary branch from " if config.origin else ""
+    return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {config.nu:g}"
 
 
 def _describe(config, event) -> str:
     label, name = event["label"], event["name"].decode()
     place = f"kappa_n L/2pi = {event['kappa_n']:.10f}"
-    held = label == b"UZ" or (label == b"EP" and name != "trivial branch")  # kappa_n was given, not found
+    found = name in ("trivial branch", "primary branch")
+    held = label == b"UZ" or (label == b"EP" and not found)  # kappa_n was given, not found
     error = event["error_kappa_n"]
     certain = "" if held or math.isnan(error) else f" (± {error:.0e})"
+    if name == "start" and config.origin:
+        return f"leaves the branch ({config.m}, {config.n}) at {place}{certain}, {config.origin.mode}"
     if name == "start":
         return f"leaves the {config.m}-covered circle at {place}{certain}"
     if name == "trivial branch":

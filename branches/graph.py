@@ -13,13 +13,18 @@ from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from ribbon_model.laws import from_label, label
 from ribbon_model.linear import circle, covering
 
 #: Columns of a branch that an edge carries.
 COLUMNS = ("arclength", "kappa_n", "kappa_star", "energy")
 _SPECIAL = (b"LP", b"BP", b"SB", b"EP", b"MX")
-_TOLERANCE = 1e-7
+#: Where a secondary branch meets a primary one, the second where the diagram holds no such point of a primary branch.
+_MEETINGS = ("secondary bifurcation", "primary branch")
+#: Points that agree in kappa_n, kappa* and energy to this, relative to 1 + their size, are one up to symmetry.
+_SAME = 1e-6
 
 
 def new_graph(title: str = ""):
@@ -42,18 +47,47 @@ def add_branch(graph, branch, name: str) -> bool:
     Returns
     -------
     bool
-        False if it is in the diagram already, computed from its other end.
+        False if it is in the diagram already, computed from its other end. (From a bifurcation one branch emanates on each
+        domain, and its images under the symmetries of the primary branch.)
     """
     config = branch.config
     family = {"law": label(config["law"], config["Gamma"]), "nu": config["nu"], "m": config["m"], "n": config["n"]}
+    if config["origin"]:
+        family |= {"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"], "domain": config["domain"]}
     special = [event for event in branch.events if event["label"] in _SPECIAL]
     nodes = [_node_of(event, family, branch.reason) for event in special]
+    if config["origin"]:
+        nodes = [_known(graph, node) or node for node in nodes]
+        start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
+        if any(data.get("domain") == family["domain"] for _, _, data in start):
+            return False
     rows = [branch.points[first["point"] : last["point"] + 1] for first, last in pairwise(special)]
     pieces = [{column: piece[column].tolist() for column in COLUMNS} for piece in rows]
+    if config["origin"]:
+        for piece, values in zip(pieces, rows):
+            piece["force"] = np.sqrt(values["R1"] ** 2 + values["R2"] ** 2 + values["R3"] ** 2).tolist()
     if "index" in branch.points.dtype.names:
         for piece, values in zip(pieces, rows):
             piece["index"] = _common_index(values["index"])
     return connect(graph, family, nodes, pieces, file=name)
+
+
+def _known(graph, node):
+    """The node of a diagram that is where a secondary branch meets a primary one, if it holds that."""
+    _, values = node
+    if values["kind"] not in _MEETINGS:
+        return None
+    for name, other in graph.nodes(data=True):
+        same_strip = (other["law"], other["nu"]) == (values["law"], values["nu"])
+        if other["kind"] in _MEETINGS and same_strip and same_place(other, values):
+            return name, other
+    return None
+
+
+def same_place(a: dict, b: dict) -> bool:
+    """Whether two special points agree in what neither a rigid motion nor another start on the loop changes."""
+    columns = [column for column in COLUMNS[1:] if column in a and column in b]
+    return all(abs(a[column] - b[column]) < _SAME * (1 + abs(b[column])) for column in columns)
 
 
 def _common_index(values) -> int:
@@ -85,13 +119,16 @@ def node(family: dict, kind: str, values: dict, number: int) -> tuple[str, dict]
     """Identifier and attributes of a special point, the ``number``-th point of its branch.
 
     A circle has one identifier whichever branch meets it there: its covering index (negative where it is curled against its
-    natural curvature) and the wavenumber.
+    natural curvature) and the wavenumber. Other points name the branch (m, n) that they were found on.
     """
     attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
     if kind == "circle":
         index = covering(attributes["kappa_n"], attributes["kappa_star"], attributes["energy"])
         return _circle(family, index), attributes | {"covering": index, "mode": family["n"]}
-    return f"{family['law']} nu={family['nu']:g} ({family['m']},{family['n']}) {kind} {number}", attributes
+    branch = f"({family['m']},{family['n']})"
+    if "origin" in family:
+        branch += f" from {family['origin']:.9g} on the {family['domain']}"
+    return f"{family['law']} nu={family['nu']:g} {branch} {kind} {number}", attributes | {"m": family["m"], "n": family["n"]}
 
 
 def _node_of(event, family, reason):
@@ -101,8 +138,12 @@ def _node_of(event, family, reason):
     kind = {b"LP": "fold", b"BP": "branch point", b"SB": "secondary bifurcation", b"MX": "lost"}.get(event["label"], "end")
     if kind == "end" and reason == "limit":
         kind = "leaves"
-    if values["what"] in ("start", "trivial branch"):
+    if "origin" in family and values["what"] == "start":
+        kind = "secondary bifurcation"
+    elif values["what"] in ("start", "trivial branch"):
         kind = "circle"
+    elif values["what"] == "primary branch":
+        kind = "primary branch"
     return node(family, kind, values, int(event["point"]))
 
 
@@ -110,9 +151,30 @@ def _node_of(event, family, reason):
 
 
 def families(graph) -> list[tuple]:
-    """The (law, nu, m, n) of all branches, in order; each is known by the end it was followed from."""
-    found = {(data["law"], data["nu"], data["m"], data["n"]) for _, _, data in graph.edges(data=True)}
-    return sorted(found)
+    """The (law, nu, m, n) of all primary branches, in order; each is known by the end it was followed from."""
+    return sorted({family_of(data) for _, _, data in graph.edges(data=True) if "origin" not in data})
+
+
+def pieces(graph, family: tuple) -> list[tuple]:
+    """The edges (a, b, columns) of the primary branch (law, nu, m, n), from end to end."""
+    found = [edge for edge in graph.edges(data=True) if family_of(edge[2]) == family and "origin" not in edge[2]]
+    return sorted(found, key=lambda edge: edge[2]["arclength"][0])
+
+
+def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """The secondary branches: what they left and where (family, origin, mode, domain, file), edges from end to end, nodes."""
+    found = {}
+    for edge in graph.edges(data=True):
+        data = edge[2]
+        if "origin" in data and law in (None, data["law"]) and nu in (None, data["nu"]):
+            found.setdefault(data["file"], []).append(edge)
+    result = []
+    for edges in found.values():
+        edges.sort(key=lambda edge: edge[2]["arclength"][0])
+        first = edges[0][2]
+        about = {name: first[name] for name in ("origin", "mode", "domain", "file")}
+        result.append({"family": family_of(first), **about, "edges": edges, "nodes": _in_order(graph, edges)})
+    return sorted(result, key=lambda branch: (branch["family"], -branch["origin"], branch["domain"]))
 
 
 def course(graph, m: int, n: int, law: str | None = None, nu: float | None = None) -> list[dict]:
@@ -127,9 +189,7 @@ def course(graph, m: int, n: int, law: str | None = None, nu: float | None = Non
     for law_, nu_, m_, n_ in families(graph):
         if n_ != n or law not in (None, law_) or nu not in (None, nu_):
             continue
-        edges = [(a, b, data) for a, b, data in graph.edges(data=True) if _family(data) == (law_, nu_, m_, n_)]
-        edges.sort(key=lambda edge: edge[2]["arclength"][0])
-        nodes = _in_order(graph, edges)
+        nodes = _in_order(graph, pieces(graph, (law_, nu_, m_, n_)))
         if nodes[-1].get("covering") == m:
             nodes.reverse()
         if nodes[0].get("covering") == m:
@@ -139,7 +199,7 @@ def course(graph, m: int, n: int, law: str | None = None, nu: float | None = Non
     return result
 
 
-def _family(data) -> tuple:
+def family_of(data) -> tuple:
     return data["law"], data["nu"], data["m"], data["n"]
 
 
@@ -170,7 +230,8 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
     for _, _, data in graph.edges(data=True):
         if law in (None, data["law"]) and nu in (None, data["nu"]):
             for place in _crossings(data, kappa_n):
-                found.append({"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **place})
+                left = {"origin": data["origin"]} if "origin" in data else {}
+                found.append({"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **left, **place})
     return sorted(found, key=lambda state: (state["law"], state["nu"], state["energy"]))
 
 
@@ -183,7 +244,6 @@ def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
 
 def _crossings(data, kappa_n):
     """Places on one piece of a branch where kappa_n takes a value."""
-    import numpy as np
     from scipy.interpolate import CubicSpline
 
     s, keep = np.unique(data["arclength"], return_index=True)
@@ -292,9 +352,13 @@ def _answers(graph, options) -> Iterable[str]:
     if options.where:
         for branch in course(graph, *options.where):
             yield f"{branch['law']}, nu = {branch['nu']:g}: " + " -> ".join(map(_describe, branch["nodes"]))
+        for branch in secondaries(graph):
+            if branch["family"][2:] == tuple(options.where):
+                yield f"  {describe_secondary(branch)}"
     if options.at is not None:
         for state in states_at(graph, options.at):
             what = f"{state['circle']}-covered circle" if "circle" in state else f"branch {state['branch']}"
+            what = f"secondary {what}, from {state['origin']:.6f}" if "origin" in state else what
             values = f"kappa* = {state['kappa_star']:.8f}, energy = {state['energy']:.8f}"
             yield f"{state['law']}, nu = {state['nu']:g}: {what}, {values}"
     if options.folds:
@@ -310,6 +374,11 @@ def _answers(graph, options) -> Iterable[str]:
 def describe(graph, m: int, n: int, law: str, nu: float) -> str:
     """Where one branch goes, in a line."""
     return " -> ".join(map(_describe, course(graph, m, n, law, nu)[0]["nodes"]))
+
+
+def describe_secondary(branch: dict) -> str:
+    """Where a secondary branch, as of :func:`secondaries`, goes, in a line."""
+    return f"{branch['mode']}, {branch['domain']}: " + " -> ".join(map(_describe, branch["nodes"]))
 
 
 def _describe(node) -> str:

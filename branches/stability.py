@@ -8,6 +8,7 @@ from threadpoolctl import ThreadpoolController
 from contin import Monitor
 from ribbon_model.laws import Law
 from ribbon_model.second_variation import from_solution
+from ribbon_model.secondary import force
 from ribbon_model.stability import Stability, index
 
 #: Label of a secondary bifurcation: one that breaks a symmetry of the domain, which its own equations cannot see.
@@ -17,6 +18,10 @@ UNDECIDED = -1
 #: An eigenvalue this close to zero is wanted to this part of itself, so that its zero can be located; but no better than that.
 _NEAR_ZERO, _PART, _FINEST = 1e-4, 1e-3, 1e-11
 _ON_CIRCLE = 1e-6
+#: Beside a primary branch, with less force than this, ...
+_LITTLE_FORCE = 0.5
+#: ... an eigenvalue below this may be one that vanishes there, and its sign says nothing.
+_ZERO_BESIDE = 1e-8
 #: The class that keeps all symmetry: an eigenvalue of it passes zero at folds, which the engine finds by itself.
 _FULL = (0, "even")
 
@@ -29,10 +34,12 @@ class Watch:
     law : Law
     system, x :
         The first point: what symmetry the branch has.
+    from_circle : bool
+        Whether the branch comes from a circle, and may end on one.
     """
 
-    def __init__(self, law: Law, system, x):
-        self._law, self._known, self._blas = law, [], ThreadpoolController()
+    def __init__(self, law: Law, system, x, from_circle: bool = True):
+        self._law, self._known, self._blas, self._from_circle = law, [], ThreadpoolController(), from_circle
         names = [entry.name for entry in self.at(system, x).classes]
         self.monitors = [self._monitor(name) for name in names if name != _FULL]
 
@@ -62,6 +69,9 @@ class Watch:
         def determinant(trial):
             entry = self.at(trial.system, trial.x)[name]
             values = entry.eigenvalues
+            if not self._from_circle:
+                beside = force(trial) < _LITTLE_FORCE and abs(values[entry.nearest]) < _ZERO_BESIDE
+                return np.nan if beside else float(np.prod(values))
             if name[0] == 0 and abs(trial["M2"]) < _ON_CIRCLE:  # of a circle, rotations that the branch's own phase replaces
                 values = values[np.abs(values) > _ON_CIRCLE]
             return float(np.prod(values))

@@ -48,6 +48,7 @@ MEANINGS = {
     "R2": "force along d2 at S = 0",
     "R3": "force along d3 at S = 0",
     "length": "length of the domain, in units of L / 2 pi",
+    "axes": "1: the ends of the half loop are two-fold axes along d2, not mirrors",
     "turn": "angle by which d2 turns about the moment over the cell",
     "sense": "sign of the moment on the circle",
     "unfold": "unfolding parameter of closure, zero",

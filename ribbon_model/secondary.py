@@ -104,10 +104,12 @@ def breaking(n: int, name: str) -> Breaking:
     ValueError
         It is no such name.
     """
-    words = name.split()
-    if len(words) != 3 or words[0] != "wavenumber" or not words[1].isdigit() or words[2] not in ("even", "odd", "pair"):
-        raise ValueError(f"{name!r} is no mode; must be as in 'wavenumber 1 pair', with even, odd or pair")
-    return Breaking(n, int(words[1]), "" if words[2] == "pair" else words[2])
+    known = [f"wavenumber {j} {parity}" for j in (0, n) for parity in ("even", "odd")][1:]
+    known += [f"wavenumber {j} pair" for j in range(1, n)]
+    if name not in known:
+        raise ValueError(f"mode: {name!r} must be {', '.join(known[:-1])} or {known[-1]} for n = {n}")
+    _, wavenumber, parity = name.split()
+    return Breaking(n, int(wavenumber), "" if parity == "pair" else parity)
 
 
 def unfolded(law: Law, t, states, degree: int, parameters: Mapping[str, float], reversal: str):

@@ -1,8 +1,8 @@
 """The closed strip in space: centreline, directors and surface, from the solution on a domain.
 
 The cell carries a mirror at S = 0 (plane through x(0), normal to d3) and a two-fold axis along d2 at its other end; the half
-loop carries mirrors at both ends, or two-fold axes along d2. These symmetries unfold a solution to the whole loop; where the plane and the axis (or the
-planes) meet, the copies turn about one line, so the centreline closes.
+loop carries mirrors at both ends, or two-fold axes along d2. These symmetries unfold a solution to the whole loop; where
+the plane and the axis (or the planes) meet, the copies turn about one line, so the centreline closes.
 """
 
 from __future__ import annotations

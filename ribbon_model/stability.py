@@ -40,7 +40,7 @@ class SymmetryClass:
         j: from one part of the loop to the next the perturbation gains the factor exp(2 pi i j / order), besides the motion
         that takes one part to the next. j = 0 keeps the symmetry.
     parity : str
-        'even' or 'odd' under the mirror (or the two-fold axis) at S = 0; '' where that takes j to another class, or is not there.
+        'even' or 'odd' under the mirror (or two-fold axis) at S = 0; '' where that takes j to another class, or there is none.
     multiplicity : int
         2 if the class -j, which has the same eigenvalues, is another one: then modes come in pairs.
     eigenvalues : ndarray

@@ -1,0 +1,314 @@
+"""``python -m branches.secondary RESULT``: follow what leaves the primary branches where their index changes.
+
+A secondary branch is a scene of its own, with an ``origin``: `branches.run` computes it like any other. This program makes
+those scenes from the labelled points SB of a result, runs them, and puts the branches into the diagram.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import dataclasses
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from branches import graph as diagram
+from branches.config import DOMAINS, Config, ConfigError, dump, parse
+from branches.display import Display, complain, write_output
+from branches.files import StoreError, prepare, write_bytes
+from branches.read import StoredBranch, read_branch
+from contin import ContinError, Continuation, Stop
+from contin.switching import BranchPoint
+from ribbon_model.laws import LAWS
+from ribbon_model.secondary import breaking, force, secondary_branch
+
+#: A force below this is none: what branches from a primary one has |R| of order one.
+_NO_FORCE = 1e-7
+#: Closer than this to a primary branch, kappa_n turns because the bifurcation is a pitchfork.
+_BESIDE = 1e-2
+#: Two values of kappa* closer than this, relative to 1 + their size, are the same place at the same kappa_n.
+_SAME_PLACE = 1e-6
+
+
+# --- one branch -----------------------------------------------------------------------------------------------------
+
+
+class UntilPrimary(Continuation):
+    """A run along a secondary branch that ends where it comes to a primary one: at a branch point with R = 0.
+
+    Beyond it the branch would be its own image.
+    """
+
+    def __iter__(self):
+        for point in super().__iter__():
+            if point.label == "LP" and force(point) < _BESIDE:
+                continue
+            if point.name != "start" and isinstance(point.details, BranchPoint) and force(point) < _NO_FORCE:
+                self.stop = Stop("primary branch", "came to a primary branch, where R = 0")
+                point = dataclasses.replace(point, label="EP", name="primary branch")
+            yield point
+            if self.stop is not None:
+                return
+
+
+def leave(config: Config):
+    """System, first point and tangent of the scene of a secondary branch; the primary one is followed to its origin.
+
+    Raises
+    ------
+    ConfigError
+        The primary branch does not pass there, or nothing leaves it there.
+    """
+    reversal = next(name for name, domain in DOMAINS.items() if domain == config.domain)
+    point = _at_origin(config)
+    solution = point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
+    try:
+        return secondary_branch(LAWS[config.law], *solution, reversal)
+    except (ContinError, ValueError) as error:
+        raise ConfigError(f"origin: {error}") from error
+
+
+def _at_origin(config: Config):
+    """The point of the primary branch."""
+    from branches.job import seed, settings_of
+
+    origin = config.origin
+    primary = Config(law=config.law, nu=config.nu, Gamma=config.Gamma, m=config.m, n=config.n, mesh=config.mesh)
+    reach = 10 * (1 + max(abs(origin.kappa_n), abs(primary.at_bifurcation()["kappa_n"])))
+    primary = primary.model_copy(update={"limits": {"kappa_n": (-reach, reach)}, "zeros": {"kappa_n": [origin.kappa_n]}})
+    system, x, tangent = seed(primary)
+    for point in Continuation(system, x, settings_of(primary), tangent):
+        same = abs(point["kappa_star"] - origin.kappa_star) < _SAME_PLACE * (1 + abs(origin.kappa_star))
+        if point.label == "UZ" and same:
+            return point
+    raise ConfigError(
+        f"origin: kappa_n = {origin.kappa_n:.10g}, kappa_star = {origin.kappa_star:.10g} is no point of the branch "
+        f"(m, n) = ({config.m}, {config.n})"
+    )
+
+
+# --- all that leave the branches of a result ------------------------------------------------------------------------
+
+
+def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[dict]:
+    """Follow every secondary branch of a result, in the same folder as a diagram with the primary ones.
+
+    Parameters
+    ----------
+    result : Path
+        A branch file, or the folder of a diagram.
+    folder : Path
+        Where files and diagram go.
+    settings : list of str
+        ``key=value`` over the scenes of the secondary branches, which otherwise take those of the primary ones.
+    tell : callable
+        Gets a line of text for every attempt.
+
+    Returns
+    -------
+    list of dict
+        Every attempt to switch branches, as kept in the diagram under ``switches`` (JSON).
+
+    Raises
+    ------
+    StoreError, ConfigError
+        A result that cannot be used; a setting that cannot be.
+    """
+    primaries = _primaries(result)
+    prepare(folder / "diagram.json")
+    graph = _diagram_in(folder)
+    old = _remove_secondaries(graph, primaries)
+    there = {data["file"] for _, _, data in graph.edges(data=True)}
+    for name, branch in primaries.items():
+        write_bytes(folder / name, (result if result.is_file() else result / name).read_bytes())
+        if name not in there:
+            diagram.add_branch(graph, branch, name)
+    switches = []
+    for name, branch in primaries.items():
+        for event in branch.events[branch.events["label"] == b"SB"]:
+            for switch in _attempts(graph, branch, name, event, folder, settings):
+                switches.append(switch)
+                tell(_line(switch))
+    graph.graph["switches"] = json.dumps(old + switches)
+    diagram.save(graph, folder)
+    return switches
+
+
+def _primaries(result: Path) -> dict[str, StoredBranch]:
+    """The primary branches of a result that have the index along them, by file name.
+
+    Raises
+    ------
+    StoreError
+        There is none.
+    """
+    if result.is_dir():
+        edges = diagram.read(result).edges(data=True)
+        names = sorted({data["file"] for _, _, data in edges if "origin" not in data})
+        found = {name: read_branch(result / name) for name in names}
+    else:
+        found = {result.name: read_branch(result)}
+    found = {name: one for name, one in found.items() if one.config["stability"] and one.config["domain"] == "cell"}
+    if not found:
+        raise StoreError(f"{str(result)!r} holds no branch with its index on the cell; run its scene with stability: true")
+    return found
+
+
+def _diagram_in(folder: Path):
+    """The diagram of a folder, or a new one."""
+    return diagram.read(folder) if (folder / "diagram.json").exists() else diagram.new_graph()
+
+
+def _remove_secondaries(graph, primaries) -> list[dict]:
+    """Take what this program added earlier for these primary branches out of a diagram; the attempts for others."""
+    switches = json.loads(graph.graph.get("switches", "[]"))
+    files = {switch["file"] for switch in switches if switch["primary"] in primaries and "file" in switch}
+    edges = graph.edges(keys=True, data=True)
+    graph.remove_edges_from([(a, b, key) for a, b, key, data in edges if data["file"] in files])
+    graph.remove_nodes_from([name for name, degree in list(graph.degree) if degree == 0])
+    return [switch for switch in switches if switch["primary"] not in primaries]
+
+
+def _attempts(graph, branch: StoredBranch, name: str, event, folder: Path, settings):
+    """Leave one bifurcation by every kind of branch, one after the other: records of what came of it."""
+    config = branch.config
+    where = {column: float(event[column]) for column in ("kappa_n", "kappa_star")}
+    about = {key: config[key] for key in ("law", "Gamma", "nu", "m", "n")} | where | {"mode": event["name"].decode()}
+    record = {"primary": name, **about}
+    try:
+        how = breaking(config["n"], about["mode"])
+    except ValueError as error:
+        yield record | {"outcome": "failed", "reason": str(error)}
+        return
+    record["dimension"] = how.dimension
+    if not how.keeps:
+        yield record | {"outcome": "failed", "reason": "its modes keep no mirror and no axis: they need the whole loop"}
+    for reversal in how.keeps:
+        this = record | {"keeps": how.kept(reversal), "breaks": how.broken(reversal), "domain": DOMAINS[reversal]}
+        yield this | _attempt(graph, branch, event, reversal, folder, settings)
+
+
+def _attempt(graph, branch: StoredBranch, event, reversal: str, folder: Path, settings) -> dict:
+    """Follow one branch, put it into the diagram: how it ended."""
+    config = _scene(branch.config, event, reversal, settings)
+    file = _file_name(config)
+    known = _arrived_before(graph, config)
+    if known:
+        return {"outcome": "known", "reason": f"the other end of {known}", "file": known}
+    try:
+        stored = _computed(folder / file, config)
+    except (ConfigError, ContinError) as error:
+        return {"outcome": "failed", "reason": str(error)}
+    diagram.add_branch(graph, stored, file)
+    points = stored.points
+    strength = np.sqrt(points["R1"] ** 2 + points["R2"] ** 2 + points["R3"] ** 2)
+    found = {"file": file, "force": [float(strength.min()), float(strength.max())], "goes": _goes(graph, file)}
+    if "index" in points.dtype.names:
+        found["index"] = [int(i) for i, last in zip(points["index"], [-1, *points["index"]]) if i >= 0 and i != last]
+        found["index"] = [i for k, i in enumerate(found["index"]) if k == 0 or i != found["index"][k - 1]]
+    return found | {"outcome": "failed" if stored.status == "lost" else "followed", "reason": stored.stop}
+
+
+def _scene(primary: dict, event, reversal: str, settings: list[str]) -> Config:
+    """The scene of a secondary branch: as that of the primary one, where that makes sense on another domain."""
+    kept = {name: primary[name] for name in ("law", "nu", "Gamma", "m", "n", "steps", "stability", "stride")}
+    kept["mesh"] = primary["mesh"]
+    kept["limits"] = {name: list(ends) for name, ends in primary["limits"].items() if name not in ("M1", "M2")}
+    origin = {name: float(event[name]) for name in ("kappa_n", "kappa_star")} | {"mode": event["name"].decode()}
+    text = dump(Config.model_validate(kept | {"domain": DOMAINS[reversal], "origin": origin}))
+    return parse(text, "scene", settings)
+
+
+def _file_name(config: Config) -> str:
+    """The file of a secondary branch: that of its primary one, with the place and the domain."""
+    from branches.diagram import file_name
+
+    return f"{file_name(config)[:-3]}_from{config.origin.kappa_n:.6g}_{config.domain.replace(' ', '_')}.h5"
+
+
+def _arrived_before(graph, config: Config) -> str:
+    """The file of a branch on this domain that begins or ends at the origin, if the diagram has it."""
+    origin = config.origin.model_dump(exclude={"mode"})
+    for branch in diagram.secondaries(graph, config.material, config.nu):
+        ends = branch["nodes"][0], branch["nodes"][-1]
+        if branch["domain"] == config.domain and any(diagram.same_place(end, origin) for end in ends):
+            return branch["file"]
+    return ""
+
+
+def _computed(path: Path, config: Config) -> StoredBranch:
+    """The branch of a scene: the one in the file if it is complete, or computed."""
+    from branches.job import compute_branch
+
+    with contextlib.suppress(StoreError):
+        stored = read_branch(path)
+        if stored.status == "complete" and stored.config == config.model_dump():
+            return stored
+    image, _ = compute_branch(config, Display(silent=True))
+    write_bytes(path, image)
+    return read_branch(path)
+
+
+def _goes(graph, file: str) -> str:
+    """Where a branch of the diagram ends, in words."""
+    (branch,) = (branch for branch in diagram.secondaries(graph) if branch["file"] == file)
+    end = branch["nodes"][-1]
+    if end["kind"] == "secondary bifurcation":
+        return f"the branch ({end['m']}, {end['n']}) at {end['kappa_n']:.8f}"
+    if end["kind"] == "primary branch":
+        return f"a primary branch that the diagram does not hold, at {end['kappa_n']:.8f}"
+    return f"the limit {end['what']}" if end["kind"] == "leaves" else f"its end, {end['what']}, at {end['kappa_n']:.6f}"
+
+
+# --- command line ---------------------------------------------------------------------------------------------------
+
+
+def _line(switch: dict) -> str:
+    """An attempt in words."""
+    start = f"({switch['m']}, {switch['n']}) at {switch['kappa_n']:.8f}, {switch['mode']}"
+    if "keeps" not in switch:
+        return f"{start}: {switch['outcome']}: {switch['reason']}"
+    start += f", kernel of dimension {switch['dimension']}, keeps {switch['keeps']}"
+    if "goes" not in switch:
+        return f"{start}: {switch['outcome']}: {switch['reason']}"
+    index = f", index {', '.join(map(str, switch['index']))}" if "index" in switch else ""
+    lost = f" (lost: {switch['reason']})" if switch["outcome"] == "failed" else ""
+    return f"{start}: goes to {switch['goes']}, |R| up to {switch['force'][1]:.4f}{index}{lost}"
+
+
+def main(argv=None) -> int:
+    """Run the command; the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m branches.secondary", allow_abbrev=False,
+        description="Follow the branches that leave a primary branch at its secondary bifurcations, and put them in a diagram.",
+        epilog="Exit code: 0 done, 1 some branch could not be followed to its end (the diagram says why), 2 bad input.",
+    )  # fmt: skip
+    parser.add_argument("result", help="file of a primary branch with its index (stability: true), or a diagram's folder")
+    parser.add_argument("--out", metavar="DIR", help="folder (default: the diagram's own; NAME_secondary beside a file)")
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field of the scenes of secondary branches"
+    )
+    parser.add_argument("--quiet", action="store_true", help="print where the result is only")
+    options = parser.parse_args(argv)
+    result = Path(options.result)
+    folder = Path(options.out) if options.out else result if result.is_dir() else result.with_name(f"{result.stem}_secondary")
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise ConfigError(f"--out {str(folder)!r}: must be a folder")
+        switches = follow_all(result, folder, options.set, lambda text: options.quiet or write_output(text + "\n"))
+    except (ConfigError, StoreError, ContinError) as error:
+        complain(f"error: {error}")
+        return 2
+    counts = {outcome: sum(switch["outcome"] == outcome for switch in switches) for outcome in ("followed", "known", "failed")}
+    write_output(
+        f"{counts['followed']} secondary branches, {counts['known']} other ends of them, {counts['failed']} not followed; "
+        f"written to {folder}\n"
+    )
+    return 1 if counts["failed"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
