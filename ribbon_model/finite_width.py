@@ -31,8 +31,8 @@ from fractions import Fraction
 #: Below this x**4 the series of g is used: the closed form cancels. (Its radius of convergence is 4.730**4/4 = 125.)
 SERIES_LIMIT = 16.0
 _STEPS = 80
-#: Relative size of the last Newton step in real numbers: the error left is its square, and one more step follows.
-_TOLERANCE = 1e-7
+#: Relative size of the last Newton step in real numbers: the error left is about its square, and one more step follows.
+_TOLERANCE = 1e-6
 
 
 def _series(terms: int) -> tuple[float, ...]:
@@ -166,7 +166,10 @@ def _start(M1, M3, kappa_n, nu, Gamma):
     eta = M3 / (2 * a)
     w1 = (nu * kappa_n + a) / (1 + eta * eta)
     w3 = eta * w1
-    if flat1 > -_region(nu, Gamma):
+    region = _region(nu, Gamma)
+    if p > 0 and w1 > 10 * region:  # x > 3: like a ribbon
+        return w1, w3
+    if flat1 > -region:
         ribbon = strain_energy(w1, w3, kappa_n, nu, Gamma)[0] - M1 * w1 - M3 * w3
         flat = strain_energy(flat1, flat3, kappa_n, nu, Gamma)[0] - M1 * flat1 - M3 * flat3
         if flat < ribbon:
@@ -175,7 +178,7 @@ def _start(M1, M3, kappa_n, nu, Gamma):
         _, _, _, U11, U13, U33, _, _, _ = strain_energy(w1, w3, kappa_n, nu, Gamma)
         if U11 > 0 and U11 * U33 > U13 * U13:
             break
-        w1 = 1.2 * w1 + _region(nu, Gamma)
+        w1 = 1.2 * w1 + region
     return w1, w3
 
 
@@ -187,27 +190,26 @@ def _strains(M1, M3, kappa_n, nu, Gamma):
     """
     w1, w3 = _start(M1, M3, kappa_n, nu, Gamma)
     region = _region(nu, Gamma)
-    best, d1, d3, size, convex = math.inf, 0.0, 0.0, math.inf, False
+    best, d1, d3, convex = math.inf, 0.0, 0.0, False
     for _ in range(_STEPS):
         U, U1, U3, U11, U13, U33, _, _, _ = strain_energy(w1 + d1, w3 + d3, kappa_n, nu, Gamma)
         value = U - M1 * (w1 + d1) - M3 * (w3 + d3)
         mean, spread = (U11 + U33) / 2, math.sqrt((U11 - U33) * (U11 - U33) / 4 + U13 * U13)
         was_convex, convex = convex, mean - spread > 1e-9 * (mean + spread)
         if value > best + 1e-11 * (abs(U) + abs(best)) or (was_convex and not convex):
-            d1, d3, size, convex = d1 / 2, d3 / 2, math.inf, was_convex
+            d1, d3, convex = d1 / 2, d3 / 2, was_convex
             continue
         w1, w3, best = w1 + d1, w3 + d3, value
-        if convex and size < _TOLERANCE * (1e-3 + abs(w1) + abs(w3)):
-            return w1, w3
         shift = 0.0 if convex else 1.2 * spread - mean + 0.1
         A, B = U11 + shift, U33 + shift
         determinant = A * B - U13 * U13
         d1 = (B * (M1 - U1) - U13 * (M3 - U3)) / determinant
         d3 = (A * (M3 - U3) - U13 * (M1 - U1)) / determinant
-        size = abs(d1) + abs(d3) if convex else math.inf
+        if convex and abs(d1) + abs(d3) < _TOLERANCE * (1e-3 + abs(w1) + abs(w3)):
+            return w1 + d1, w3 + d3
         largest = 0.7 * abs(w1) + region
         if abs(d1) > largest:
-            d1, d3, size = d1 * largest / abs(d1), d3 * largest / abs(d1), math.inf
+            d1, d3 = d1 * largest / abs(d1), d3 * largest / abs(d1)
     return math.nan, math.nan
 
 
