@@ -10,7 +10,7 @@ from pathlib import Path
 from branches import graph as diagram_graph
 from branches.config import Config, DiagramConfig, dump
 from branches.executor import WAIT, executor, run_jobs, trouble
-from branches.files import StoreError, prepare, write_bytes
+from branches.files import StoreError, only_run, prepare, write_bytes
 
 
 def compute(text: str) -> tuple[bytes, str]:
@@ -86,29 +86,37 @@ def run_diagram(
     Raises
     ------
     StoreError
-        The folder cannot be written to, or holds another scene's result.
+        The folder cannot be written to, or another run is writing to it.
     ExecutorError
         The scheduler cannot be used.
     """
     began, folder, graph = time.perf_counter(), Path(folder), diagram_graph.new_graph(config.title)
     prepare(folder / "diagram.json")
+    with only_run(folder / "diagram.json"):
+        run = executor(scheduler, workers, time_limit)
+        failed, left_out = _compute_missing(config, folder, graph, display, run, overwrite)
+        graph.graph.update({"config": dump(config), "failed": json.dumps(failed), "absent": json.dumps(config.absent)})
+        diagram_graph.save(graph, folder)
+    display.diagram_summary(_summary(config, graph, failed, left_out, time.perf_counter() - began, folder))
+    return "lost" if failed else "complete"
+
+
+def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[dict[str, str], list[Config]]:
+    """Compute what the folder does not hold; what failed, by file name with the reason, and what was there already."""
     configs = config.branches
     fresh = [one for one in configs if overwrite or not _stored(folder, one, graph)]
     plan, failed = _Plan(configs, fresh, graph), {}
     display.begin_diagram(config, len(configs), len(configs) - len(fresh))
     if fresh:
         _load_kernels(fresh)
-        with executor(scheduler, workers, time_limit) as (submit, limit):
+        with run as (submit, limit):
             for one, result in run_jobs(plan.next, _compute_one, submit, limit):
                 problem = _take(folder, one, result, graph)
                 if problem:
                     failed[file_name(one)] = problem
                 place = "" if problem else diagram_graph.describe(graph, one.m, one.n, one.material, one.nu)
                 display.branch_done(one, problem, place)
-    graph.graph.update({"config": dump(config), "failed": json.dumps(failed), "absent": json.dumps(config.absent)})
-    diagram_graph.save(graph, folder)
-    display.diagram_summary(_summary(config, graph, failed, plan.left_out, time.perf_counter() - began, folder))
-    return "lost" if failed else "complete"
+    return failed, plan.left_out
 
 
 def _summary(config, graph, failed, left_out, seconds, folder) -> list[str]:

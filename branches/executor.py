@@ -7,6 +7,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 
@@ -26,7 +27,7 @@ def executor(
     scheduler : str, optional
         Address of a Dask scheduler, as in ``tcp://host:8786``; local processes without.
     workers : int, optional
-        Local processes; as many as this process may use cores by default.
+        Local processes; :func:`cores` by default.
     time_limit : float, optional
         Seconds after which a job in a local process is killed; its future then raises TimeoutError. A process that dies takes
         its own job with it and no other.
@@ -40,11 +41,8 @@ def executor(
         from pebble import CONSTS, ProcessPool
 
         CONSTS.sleep_unit = 0.02  # seconds between its looks at its processes, the last of which the end of a run waits for
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-        count = workers or cores or 1
-        # a forked process has the compiled kernels already; where there is no fork each one loads them
-        methods = multiprocessing.get_all_start_methods()
-        context = multiprocessing.get_context("fork" if "fork" in methods else None)
+        count = workers or cores()
+        context = multiprocessing.get_context(_start_method())
         with ProcessPool(count, initializer=_begin_worker, context=context) as pool:
             yield lambda function, job: pool.schedule(function, [job], timeout=time_limit), count
         return
@@ -58,6 +56,22 @@ def executor(
         raise ExecutorError(f"--scheduler {scheduler!r}: no Dask scheduler answers there") from error
     with client:
         yield client.get_executor().submit, max(1, sum(client.nthreads().values()))
+
+
+#: What the schedulers of clusters (Slurm, PBS, Grid Engine, LSF) call the cores that a job was given.
+_GRANTED = ("SLURM_CPUS_PER_TASK", "PBS_NUM_PPN", "NSLOTS", "LSB_DJOB_NUMPROC")
+
+
+def cores() -> int:
+    """How many cores this process may use: those it is bound to, but no more than a cluster's scheduler granted."""
+    bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    granted = [os.environ.get(name, "") for name in _GRANTED]
+    return min([bound, *(int(text) for text in granted if text.isdecimal() and int(text) > 0)])
+
+
+def _start_method() -> str:
+    """A forked process has the compiled kernels already; elsewhere than on Linux forks are not safe or not there."""
+    return "fork" if sys.platform.startswith("linux") else "spawn"
 
 
 def _begin_worker():

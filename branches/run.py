@@ -148,14 +148,22 @@ def output_path(options):
     return path
 
 
+def _unlock() -> None:
+    files = sys.modules.get("branches.files")
+    if files is not None and hasattr(files, "unlock_all"):  # it may be half imported
+        files.unlock_all()
+
+
 def _leave(number, frame):
     """Ctrl-C before the first point: nothing is lost, and an exception amid a compilation would end in noise."""
+    _unlock()
     os.write(2, b"interrupted\n")
     os._exit(EXIT_INTERRUPTED)
 
 
 def _leave_diagram(number, frame):
     """Ctrl-C: every finished branch is in its file; processes that compute others end when this one does."""
+    _unlock()
     os.write(2, b"\ninterrupted; finished branches are kept, and the same command computes what is missing\n")
     os._exit(EXIT_INTERRUPTED)
 

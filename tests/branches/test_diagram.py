@@ -12,11 +12,13 @@ import pytest
 
 from branches import diagram as diagrams
 from branches import draw_diagram
+from branches import executor as executors
 from branches import graph as diagram
 from branches.config import ConfigError, parse
 from branches.diagram import file_name, run_diagram
 from branches.display import Display
 from branches.executor import ExecutorError, executor
+from branches.files import StoreError, only_run
 from branches.preview import preview
 from branches.read import read_branch
 from ribbon_model import exact
@@ -142,6 +144,37 @@ def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatc
     monkeypatch.undo()
     assert run_diagram(scene, tmp_path, Display(), workers=2) == "complete"
     assert "1 of them computed before" in capsys.readouterr().out
+
+
+def test_where_processes_cannot_be_forked(tmp_path, monkeypatch):
+    """As on Windows and macOS: each process starts from nothing; the same bits come out."""
+    scene = parse("{m: [3], n: [4, 5], stride: 20}", "scene")
+    run_diagram(scene, tmp_path / "fork", Display(silent=True), workers=2)
+    monkeypatch.setattr(executors, "_start_method", lambda: "spawn")
+    run_diagram(scene, tmp_path / "spawn", Display(silent=True), workers=2)
+    for config in scene.branches:
+        a, b = (read_branch(tmp_path / place / file_name(config)).points for place in ("fork", "spawn"))
+        assert np.array_equal(a, b)
+
+
+def test_two_runs_into_one_folder(tmp_path):
+    scene = parse("{m: [3], n: [4, 5], stride: 20}", "scene")
+    with only_run(tmp_path / "diagram.json"), pytest.raises(StoreError, match="another run"):
+        run_diagram(scene, tmp_path, Display(silent=True))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("variables", "expected"), [
+    ({}, 4), ({"SLURM_CPUS_PER_TASK": "2"}, 2), ({"NSLOTS": "3", "PBS_NUM_PPN": "16"}, 3), ({"SLURM_CPUS_PER_TASK": "all"}, 4),
+    ({"SLURM_CPUS_PER_TASK": "0", "LSB_DJOB_NUMPROC": "1"}, 1),
+])  # fmt: skip
+def test_no_more_processes_than_cores_that_were_granted(monkeypatch, variables, expected):
+    for name in executors._GRANTED:
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1, 2, 5}, raising=False)
+    assert executors.cores() == expected
 
 
 def test_a_scheduler_that_is_not_there():

@@ -286,6 +286,22 @@ def test_killed_again_and_again(command, scene, undisturbed, tables):
     assert tables(path) == undisturbed(config)
 
 
+@pytest.mark.parametrize("option", ["--resume", "--overwrite", "--quiet"])
+def test_a_second_run_on_the_same_file_is_refused(command, scene, undisturbed, tables, option):
+    """Whatever it wants to do with the file; the first one loses nothing."""
+    path = command.folder / "x.h5"
+    first = command.start(scene, "--out", path, "--quiet", *LONG_SETTINGS)
+    while not path.exists() and first.poll() is None:
+        time.sleep(0.01)
+    second = command(scene, "--out", path, *LONG_SETTINGS, option)
+    assert first.poll() is None, "the first run was too short for this test"
+    assert (second.returncode, second.out) == (2, "")
+    assert second.err.startswith(f"error: another run (process {first.pid} on ") and second.err.count("\n") == 1
+    assert first.communicate()[1] == "" and first.returncode == 0
+    assert tables(path) == undisturbed(Config(m=1, n=2, **LONG))
+    assert sorted(os.listdir(command.folder)) == ["scene.yaml", "x.h5"]
+
+
 def test_ctrl_c_before_the_first_point(command, scene, tmp_path_factory):
     """While the kernels are being compiled: no traceback, no file."""
     cache = tmp_path_factory.mktemp("cache")

@@ -3,6 +3,7 @@
 import errno
 import os
 import re
+import signal
 import stat
 import time
 from pathlib import Path
@@ -211,3 +212,94 @@ def test_files_of_another_version_or_with_parts_missing(tmp_path, results, chang
 def test_an_error_of_the_reader_is_not_called_damage(results):
     with pytest.raises(ZeroDivisionError), open_branch(results / "m1_n2.h5"):
         1 / 0  # noqa: B018
+
+
+# --- two runs on one file -------------------------------------------------------------------------------------------
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from branches.files import only_run
+with only_run(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_a_file_has_one_run_at_a_time_and_a_killed_one_blocks_nobody(command, tmp_path):
+    path = tmp_path / "x.h5"
+    for _ in range(3):
+        process = command.start(path, program=("-c", HOLD))
+        assert process.stdout.readline() == "held\n"
+        with pytest.raises(StoreError) as caught, files.only_run(path):
+            pass
+        assert str(caught.value).startswith(f"another run (process {process.pid} on ") and "wait for its end" in str(
+            caught.value
+        )
+        process.kill()
+        process.communicate()
+        assert os.listdir(tmp_path) == [".x.h5.lock"]
+        with files.only_run(path):
+            pass
+        assert os.listdir(tmp_path) == []
+
+
+def test_one_run_at_a_time_within_a_process_too(tmp_path):
+    with files.only_run(tmp_path / "x.h5"):
+        for _ in range(2):  # to look is not to take the lock away
+            with pytest.raises(StoreError, match="of this process"), files.only_run(tmp_path / "x.h5"):
+                pass
+        with files.only_run(tmp_path / "y.h5"):
+            pass
+        assert os.listdir(tmp_path) == [".x.h5.lock"]
+
+
+def test_processes_that_a_run_starts_do_not_keep_its_lock(command, tmp_path):
+    """Workers may live a moment longer than the run that was killed."""
+    code = "import multiprocessing\n" + HOLD.replace(
+        "    print",
+        "    multiprocessing.get_context('fork').Process(target=time.sleep, args=[20], daemon=True).start()\n    print",
+    )
+    process = command.start(tmp_path / "x.h5", program=("-c", code), start_new_session=True)
+    assert process.stdout.readline() == "held\n"
+    process.kill()
+    process.wait()
+    with files.only_run(tmp_path / "x.h5"):
+        pass
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+
+
+def test_where_there_are_no_locks_there_is_no_lock(tmp_path, monkeypatch):
+    def unsupported(file):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(files, "_lock_open_file", unsupported)
+    for path in (tmp_path / "x.h5", tmp_path / "none" / "x.h5"):
+        with files.only_run(path):
+            pass
+
+
+def test_two_processes_never_hold_it_both(command, tmp_path):
+    """Four processes take it and give it up all the time; each writes a file of its own name while it has it."""
+    code = """
+import os, sys, time
+from pathlib import Path
+from branches.files import StoreError, only_run
+folder, ends, times = Path(sys.argv[1]), time.monotonic() + 1, 0
+while time.monotonic() < ends:
+    try:
+        with only_run(folder / "x.h5"):
+            mark = folder / f"{os.getpid()}.mark"
+            mark.touch()
+            assert len(list(folder.glob("*.mark"))) == 1
+            mark.unlink()
+            times += 1
+    except StoreError:
+        pass
+print(times)
+"""
+    processes = [command.start(tmp_path, program=("-c", code)) for _ in range(4)]
+    ended = [process.communicate(timeout=60) for process in processes]
+    assert all(err == "" for _, err in ended) and sum(int(out) for out, _ in ended) > 100
+    assert os.listdir(tmp_path) == []
