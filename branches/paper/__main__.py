@@ -35,6 +35,7 @@ ITEMS: dict[str, Callable[[Path], Section]] = {
     "fig10": _later("branches.paper.circles", "fig10"),
     "fig11": _later("branches.paper.diagram", "fig11"),
     "fig12": _later("branches.paper.diagram", "fig12"),
+    "fig12b": _later("branches.paper.stability", "fig12b"),
 }
 
 

@@ -4,19 +4,45 @@ import pytest
 
 from branches.paper.__main__ import ITEMS, main
 from branches.paper.page import Row
+from ribbon_model import exact
 
 #: Rows with a verdict of each item: all numbers that the paper prints.
-NUMBERS = {"table1": 1, "table2": 8, "table3": 24, "fig6": 1, "fig9": 2, "fig10": 8, "fig11": 3, "fig12": 9}
+NUMBERS = {"table1": 1, "table2": 8, "table3": 24, "fig6": 1, "fig9": 2, "fig10": 8, "fig11": 3, "fig12": 9, "fig12b": 0}
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory):
+    """Sections by name, each computed once, and the folder that they wrote to."""
+    folder, sections = tmp_path_factory.mktemp("paper"), {}
+
+    def section(name):
+        if name not in sections:
+            sections[name] = ITEMS[name](folder)
+        return sections[name], folder
+
+    return section
 
 
 @pytest.mark.parametrize("name", ITEMS)
-def test_every_published_number_within_its_printed_digits(name, tmp_path):
-    section = ITEMS[name](tmp_path)
+def test_every_published_number_within_its_printed_digits(name, computed):
+    section, tmp_path = computed(name)
     verdicts = [row.verdict for row in section.rows]
     assert "no" not in verdicts
     assert verdicts.count("yes") == NUMBERS[name]
     for picture in section.pictures:
         assert all((tmp_path / f"{picture}{suffix}").stat().st_size > 10_000 for suffix in (".png", ".svg"))
+
+
+def test_where_stable_buckled_states_exist(computed):
+    """Ribbon: from the thresholds of (27) to the folds of the quadrature, and no others; one rod breaks the paper's rule."""
+    rows = {row.what: row for row in computed("fig12b")[0].rows if "branch" in row.what}
+    for m, n in ((1, 2), (3, 4)):
+        ends = exact.bifurcation(m, n, 0.3), exact.folds(m, n, 0.3)[0].kappa_n
+        assert rows[f"ribbon: branch ({m}, {n}) stable for κₙL/2π in"].ours == f"({ends[0]:.4f}, {ends[1]:.4f})"
+    assert sum(what.startswith("ribbon") for what in rows) == 2
+    assert [what for what, row in rows.items() if row.remark != "agrees"] == [
+        "isotropic rod: branch (3, 1) stable for κₙL/2π in"
+    ]
 
 
 def test_verdicts_are_those_of_the_printed_digits():

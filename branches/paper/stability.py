@@ -1,0 +1,159 @@
+"""Fig. 12b of Audoly & Seffen (2015): where stable planar and stable buckled states exist; the paper guessed, this computes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from branches import graph as diagram
+from branches.config import parse
+from branches.diagram import run_diagram
+from branches.display import Display
+from branches.files import write_picture
+from branches.job import run_branch
+from branches.paper.diagram import FIG12, LAWS, NU, WINDOW
+from branches.paper.draw import STABLE, UNSTABLE
+from branches.paper.page import Row, Section
+from branches.read import read_branch
+from ribbon_model.laws import LAWS as LAW_OBJECTS
+from ribbon_model.linear import energy_interval
+from ribbon_model.linear import index as index_of_circle
+from ribbon_model.second_variation import from_solution
+from ribbon_model.stability import index
+
+COVERINGS = (1, 3, 5, 7)
+#: A solution of every so many points is looked at.
+STRIDE = 3
+
+
+def fig12b(folder: Path) -> Section:
+    """Intervals of kappa_n with stable states, for the three laws."""
+    scene = parse(FIG12.replace("stride: 20", f"stride: {STRIDE}"), "fig12b")
+    run_diagram(scene, folder / "fig12b", Display(quiet=True))
+    graph = diagram.read(folder / "fig12b")
+    found = {law: _stable_pieces(graph, folder / "fig12b", law) for law in LAWS}
+    rows = []
+    for law in LAWS:
+        for m in COVERINGS:
+            low, high = (m * end for end in energy_interval(LAW_OBJECTS[law], m, NU))
+            rows.append(Row(f"{law}: {m}-covered circle stable for κₙL/2π in", "", _interval(low, high)))
+        pieces, guesses = found[law], _guesses(graph, law)
+        for branch in sorted(set(pieces) | set(guesses)):
+            guess, ours = guesses.get(branch, []), pieces.get(branch, [])
+            remark = "agrees" if _same(guess, ours) else "the generic scenario of section 6.3 does not hold here"
+            words = [", ".join(_interval(*piece) for piece in pieces) or "none" for pieces in (guess, ours)]
+            rows.append(Row(f"{law}: branch {branch} stable for κₙL/2π in", words[0], words[1], remark))
+    notes = [
+        f"The index (negative directions of the energy on closed perturbations) is computed at every {STRIDE}rd point of every "
+        f"branch with {WINDOW[0]:g} ≤ κₙL/2π ≤ {WINDOW[1]:g}; it is 0 on the pieces shown and nowhere else. Their ends are "
+        "folds, circles, and secondary bifurcations, each located.",
+        "'Published' is the paper's rule applied to these branches: stable past a supercritical pitchfork of a stable circle, "
+        "up to the first fold; unstable past a subcritical one. The paper draws the result for the ribbon only.",
+        "No contact, no friction: a multi-covered circle lies in itself.",
+    ]
+    pictures = [_draw(found, folder)]
+    return Section("Fig. 12b: where stable states exist, ν = .3", rows, pictures, notes)
+
+
+def _interval(low, high) -> str:
+    return f"({'−∞' if low == -math.inf else f'{low:.4f}'}, {'∞' if high == math.inf else f'{high:.4f}'})"
+
+
+def _same(guess, ours) -> bool:
+    return len(guess) == len(ours) and np.allclose(guess, ours, atol=1e-6)
+
+
+def _guesses(graph, law) -> dict[tuple[int, int], list[tuple[float, float]]]:
+    """The branches that the paper's rule has stable: from where a circle loses stability to the first fold or the other end."""
+    result = {}
+    for family in diagram.families(graph):
+        if family[0] != law:
+            continue
+        _, nu, m, n = family[:4]
+        (branch,) = diagram.course(graph, m, n, law, nu)
+        nodes = branch["nodes"]
+        for path in (nodes, nodes[::-1]):
+            start, following = path[0], path[1]
+            if start["kind"] != "circle" or start["covering"] < 1:
+                continue
+            side = math.copysign(1e-6, following["kappa_n"] - start["kappa_n"])
+            m_here = start["covering"]
+            beyond, before = (index_of_circle(LAW_OBJECTS[law], m_here, start["kappa_n"] + s, nu) for s in (side, -side))
+            if before == 0 and beyond > 0:
+                result[m, n] = [tuple(sorted((start["kappa_n"], following["kappa_n"])))]
+    return result
+
+
+def _stable_pieces(graph, folder: Path, law) -> dict[tuple[int, int], list[tuple[float, float]]]:
+    """The pieces between special points on which the index is 0, of branches that have any."""
+    result = {}
+    for family in diagram.families(graph):
+        if family[0] != law:
+            continue
+        pieces = [data for _, _, data in graph.edges(data=True) if (data["law"], data["m"], data["n"]) == (law, *family[2:4])]
+        values = _indices(read_branch(folder / pieces[0]["file"]), LAW_OBJECTS[law])
+        seen = [_seen(values, data) for data in pieces]
+        if any(0 in indices and indices != {0} for indices in seen):  # it changes between folds: locate where
+            pieces = _with_secondary_bifurcations(folder, *family[:4])
+            seen = [{data["index"]} for data in pieces]
+        stable = [tuple(sorted((d["kappa_n"][0], d["kappa_n"][-1]))) for d, indices in zip(pieces, seen) if indices == {0}]
+        if stable:
+            result[family[2:4]] = stable
+    return result
+
+
+def _seen(values, data) -> set[int]:
+    first, last = data["arclength"][0], data["arclength"][-1]
+    return {value for s, value in values if first < s < last and value is not None}
+
+
+def _with_secondary_bifurcations(folder: Path, law, nu, m, n) -> list[dict]:
+    """The pieces of a branch, cut where its index changes."""
+    path = folder / f"index_{law.replace(' ', '_')}_m{m}_n{n}.h5"
+    scene = f"{{law: {law}, nu: {nu}, m: {m}, n: {n}, stability: true, limits: {{kappa_n: [-100, 100]}}, stride: 50}}"
+    run_branch(parse(scene, "fig12b"), path, Display(silent=True), overwrite=True)
+    graph = diagram.new_graph()
+    diagram.add_branch(graph, read_branch(path), path.name)
+    return [data for _, _, data in graph.edges(data=True)]
+
+
+def _indices(branch, law):
+    """(arclength, index or None where undecided) of kept regular points inside the window."""
+    result = []
+    with threadpool_limits(1, "blas"):
+        for number in branch.kept():
+            row = branch.points[number]
+            if row["label"] == b"" and WINDOW[0] <= row["kappa_n"] <= WINDOW[1]:
+                found = index(from_solution(law, *branch.solution(int(number))))
+                result.append((row["arclength"], found.index if found.decided else None))
+    return result
+
+
+def _draw(found, folder: Path) -> str:
+    """A bar for each circle, hatched pieces for buckled states above it."""
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+    figure = Figure(figsize=(11, 6), layout="constrained")
+    panels = figure.subplots(len(LAWS), 1, sharex=True)
+    for axes, law in zip(panels, LAWS):
+        for row, m in enumerate(COVERINGS):
+            low, high = np.clip([m * end for end in energy_interval(LAW_OBJECTS[law], m, NU)], *WINDOW)
+            axes.barh(row, high - low, left=low, height=0.36, color=STABLE, lw=0)
+        for (m, n), low, high in ((branch, *piece) for branch, pieces in found[law].items() for piece in pieces):
+            row = COVERINGS.index(m)
+            axes.barh(row + 0.34, high - low, left=low, height=0.24, facecolor=UNSTABLE, hatch="////", edgecolor="white", lw=0)
+            axes.annotate(f"({m}, {n})", (high, row + 0.34), xytext=(4, 0), textcoords="offset points", va="center", fontsize=9)
+        axes.set(yticks=range(len(COVERINGS)), yticklabels=COVERINGS, ylim=(-0.5, len(COVERINGS) - 0.2), xlim=WINDOW)
+        axes.set(ylabel="covering index", title=law)
+        axes.grid(alpha=0.2, axis="x")
+    panels[-1].set_xlabel(r"natural curvature $\kappa_n L/2\pi$")
+    handles = [Patch(facecolor=STABLE, label="stable circle"), Patch(facecolor=UNSTABLE, hatch="////", edgecolor="white",
+               label="stable buckled state of the branch (m, n)")]  # fmt: skip
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
+    for suffix in (".png", ".svg"):
+        write_picture(figure, folder / f"fig12b{suffix}")
+    return "fig12b"
