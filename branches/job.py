@@ -10,7 +10,7 @@ from pathlib import Path
 from branches.config import Config, ConfigError, dump, parse
 from branches.files import StoreError, only_run, prepare
 from branches.store import BranchWriter, open_branch, read_state
-from contin import Continuation, ConvergenceError, MeshControl, Settings
+from contin import Continuation, ConvergenceError, MeshControl, Newton, Settings
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 from ribbon_model.seeds import half_loop_branch, primary_branch
@@ -22,10 +22,12 @@ _CHANGEABLE = ("title", "limits", "zeros", "stride")
 def settings_of(config: Config, monitors=()) -> Settings:
     """The engine's settings for a scene, with further events."""
     mesh, steps = config.mesh, config.steps
+    # beside a bifurcation that the branch leaves slowly, round-off moves solutions by as much along its kernel
+    newton = Newton(1e-8) if config.origin else Newton()
     return Settings(
         primary="kappa_n", step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
-        max_points=steps.max_points, angle=steps.angle, limits=config.limits, zeros=config.zeros, trivial="M2", errors=True,
-        monitors=monitors,
+        max_points=steps.max_points, angle=steps.angle, limits=config.limits, zeros=config.zeros, errors=True,
+        trivial=None if config.origin else "M2", monitors=monitors, newton=newton,
         mesh=MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every),
     )  # fmt: skip
 
@@ -36,8 +38,12 @@ def seed(config: Config):
     Raises
     ------
     ConfigError
-        The first mesh is too coarse to see the mode, or sees another one in its place.
+        The first mesh is too coarse to see the mode, or sees another one in its place; an origin that is none.
     """
+    if config.origin:
+        from branches.secondary import leave
+
+        return leave(config)
     start = primary_branch if config.domain == "cell" else half_loop_branch
     coarse = ConfigError(
         f"mesh: {config.mesh.intervals} intervals of degree {config.mesh.degree} do not resolve the mode "
@@ -112,7 +118,16 @@ def _watch(config: Config, system, x):
         return None
     from branches.stability import Watch
 
-    return Watch(LAWS[config.law], system, x)
+    return Watch(LAWS[config.law], system, x, from_circle=config.origin is None)
+
+
+def _kind(config: Config) -> type[Continuation]:
+    """What follows the branch."""
+    if config.origin is None:
+        return Continuation
+    from branches.secondary import UntilPrimary
+
+    return UntilPrimary
 
 
 def _monitors(config: Config, watch) -> list:
@@ -124,7 +139,7 @@ def _begun(config: Config):
     """The run from the branch's first point, and its watch."""
     system, x, tangent = seed(config)
     watch = _watch(config, system, x)
-    return Continuation(system, x, settings_of(config, _monitors(config, watch)), tangent), watch
+    return _kind(config)(system, x, settings_of(config, _monitors(config, watch)), tangent), watch
 
 
 def _resumed(config: Config, path: Path):
@@ -140,7 +155,7 @@ def _resumed(config: Config, path: Path):
                 f"limits: {name}: {low:g}, {high:g} must contain the place to go on from, {name} = {last[name]:.6g}"
             )
     settings = settings_of(config, _monitors(config, watch))
-    return (Continuation(state.system, state.x, settings, state=state, start=start), watch), image
+    return (_kind(config)(state.system, state.x, settings, state=state, start=start), watch), image
 
 
 def _follow(run: Continuation, writer: BranchWriter, display) -> str:
