@@ -21,6 +21,11 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def plain(name: str) -> str:
+    """A name that may be any text, as it is or in quotes."""
+    return name if name.isidentifier() else shown(name)
+
+
 def is_number(value: object) -> bool:
     """Whether it is a real number, NaN and infinity included; a truth value is none, nor an integer beyond all floats."""
     if isinstance(value, int):

@@ -85,12 +85,13 @@ class Settings:
         for name in ("angle", "accuracy", "change"):
             _checks.number(name, getattr(self, name), 0, 1.5)
         for name, ends in _checks.mapping("limits", self.limits, "pairs of numbers").items():
-            pair = tuple(_checks.sequence(f"limits: {name}", ends, "two numbers, the first the smaller"))
+            what, allowed = f"limits: {_checks.plain(name)}", "two numbers, the first the smaller"
+            pair = tuple(_checks.sequence(what, ends, allowed))
             if len(pair) != 2 or not all(map(_checks.is_number, pair)) or not pair[0] < pair[1]:
-                raise ProblemError(f"limits: {name}: {_checks.shown(ends)} must be two numbers, the first the smaller")
+                raise ProblemError(f"{what}: {_checks.shown(ends)} must be {allowed}")
         for name, values in _checks.mapping("zeros", self.zeros, "lists of numbers").items():
-            for value in _checks.sequence(f"zeros: {name}", values, "numbers"):
-                _checks.number(f"zeros: {name}", value)
+            for value in _checks.sequence(f"zeros: {_checks.plain(name)}", values, "numbers"):
+                _checks.number(f"zeros: {_checks.plain(name)}", value)
         for monitor in _checks.sequence("monitors", self.monitors, "Monitor"):
             _checks.instance("monitors", monitor, Monitor, "a Monitor")
         _checks.instance("newton", self.newton, Newton, "a Newton")

@@ -87,7 +87,7 @@ def _parameters(values) -> dict[str, float]:
     if values is None:
         return {}
     for name, value in _checks.mapping("parameters", values, "numbers").items():
-        _checks.number(f"parameters: {name}", value)
+        _checks.number(f"parameters: {_checks.plain(name)}", value)
     return dict(values)
 
 
