@@ -1,0 +1,163 @@
+"""Secondary branches: what leaves a primary branch, in the smallest domain that holds it, against the whole loop."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from contin import ConvergenceError, MeshControl, Newton, Settings, correct, follow
+from ribbon_model.equilibrium import directors, on_directors
+from ribbon_model.laws import FLAT_ROD, RIBBON
+from ribbon_model.second_variation import Symmetry, from_solution
+from ribbon_model.secondary import Breaking, breaking, force, secondary_branch, unfolded
+from ribbon_model.seeds import primary_branch, whole_loop
+from ribbon_model.shape import closed_strip
+from ribbon_model.stability import index
+
+NU = 0.3
+
+
+def solution(point):
+    return point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
+
+
+def at(law, m, n, kappa_n):
+    """The solution on the cell of the branch (m, n) at kappa_n, where it has one only."""
+    system, x, tangent = primary_branch(law, m, n, NU, 10, 7)
+    ends = sorted([kappa_n, x[system.parameter_index("kappa_n")]])
+    settings = Settings(trivial="M2", limits={"kappa_n": (ends[0] - 1, ends[1] + 1)}, zeros={"kappa_n": [kappa_n]})
+    (point,) = follow(system, x, settings, tangent).labelled("UZ")
+    return point
+
+
+def leave(law, m, n, kappa_n, reversal, sense=1, zeros=()):
+    """The first points of a secondary branch."""
+    system, x, tangent = secondary_branch(law, *solution(at(law, m, n, kappa_n)), reversal)
+    newton = Newton(1e-8)  # beside the bifurcation round-off is that large along its kernel
+    settings = Settings(max_points=12, mesh=MeshControl(1e-11), newton=newton, zeros={"kappa_n": zeros})
+    return follow(system, x, settings, sense * tangent)
+
+
+#: Where, from the index along the primary branch (an eigenvalue in Fourier coefficients passes zero), which knows nothing of
+#: the half loops.
+PLACES = [
+    (RIBBON, 3, 1, -21.6268175, "mirror"), (RIBBON, 3, 1, -114.3093551, "mirror"), (RIBBON, 5, 1, -23.6345784, "mirror"),
+    (RIBBON, 5, 1, -24.4451886, "axis"), (RIBBON, 5, 1, -29.4587214, "axis"), (RIBBON, 5, 2, -20.0441574, "mirror"),
+    (RIBBON, 5, 2, -20.0441574, "axis"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("law", "m", "n", "kappa_n", "reversal"), PLACES)
+def test_a_bifurcation_is_simple_on_the_half_loop_with_its_symmetry(law, m, n, kappa_n, reversal):
+    primary = at(law, m, n, kappa_n)
+    system, x = unfolded(law, *solution(primary), reversal)
+    assert np.abs(system.residual(x)).max() < 1e-9
+    system, x, tangent = secondary_branch(law, *solution(primary), reversal)
+    assert x[system.parameter_index("kappa_n")] == pytest.approx(kappa_n, abs=3e-7)
+    values = dict(zip(system.problem.functionals, system.functionals(x)))
+    assert values["energy"] == pytest.approx(primary["energy"], abs=1e-5)
+    assert abs(tangent[system.parameter_index("kappa_n")]) < 1e-4  # a pitchfork
+
+
+@pytest.mark.parametrize(("m", "kappa_n", "other"), [(3, -21.6268175, "axis"), (5, -24.4451886, "mirror")])
+def test_a_simple_mode_does_not_leave_the_other_half_loop(m, kappa_n, other):
+    with pytest.raises((ValueError, ConvergenceError)):
+        secondary_branch(RIBBON, *solution(at(RIBBON, m, 1, kappa_n)), other)
+
+
+@pytest.mark.parametrize(("m", "n", "kappa_n", "reversal"), [(5, 1, -24.4451886, "axis"), (5, 2, -20.0441574, "mirror")])
+def test_the_loop_closes_and_is_in_equilibrium(m, n, kappa_n, reversal):
+    """The half loop unfolded satisfies the equations of the whole loop, and an integration by DOP853 comes back."""
+    point = leave(RIBBON, m, n, kappa_n, reversal).points[-1]
+    assert force(point) > 0.5
+    assert closed_strip(RIBBON, *solution(point)).closure() < 1e-9
+    system, guess = whole_loop(RIBBON, *solution(point))
+    assert np.abs(system.residual(guess)).max() < 1e-8
+    assert system.functionals(guess) == pytest.approx([point["kappa_star"], point["energy"]], abs=1e-8)
+    p = point.parameters
+    M, R = (np.array([p[f"{name}{i}"] for i in (1, 2, 3)]) for name in "MR")
+
+    def rate(s, y):
+        _, w1, w2, w3, _ = RIBBON.response(*on_directors(*y[:4], *(M - np.cross(y[4:], R))), p["kappa_n"], NU)
+        turn = np.array([[0, -w1, -w2, -w3], [w1, 0, w3, -w2], [w2, -w3, 0, w1], [w3, w2, -w1, 0]])
+        return np.concatenate([turn @ y[:4] / 2, directors(*y[:4])[6:]])
+
+    end = solve_ivp(rate, (0, 2 * np.pi), [1.0, *np.zeros(6)], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    assert np.abs(end[1:]).max() < 1e-8
+
+
+def test_newton_on_the_whole_loop_stays():
+    """Between mirrors only: on a two-fold axis M3, which fixes the phase of the loop, is stationary."""
+    point = leave(RIBBON, 5, 2, -20.0441574, "mirror").points[-1]
+    system, guess = whole_loop(RIBBON, *solution(point))
+    row = np.zeros(system.size)
+    row[system.parameter_index("kappa_n")] = 1.0
+    done = correct(system, guess, row, point["kappa_n"], Newton(1e-8))
+    assert np.abs(done.x - guess).max() < 1e-6
+
+
+@pytest.mark.parametrize("reversal", ["mirror", "axis"])
+def test_the_index_by_symmetry_is_that_of_the_loop_without(reversal):
+    point = leave(RIBBON, 5, 2, -20.0441574, reversal).points[-1]
+    equilibrium = from_solution(RIBBON, *solution(point))
+    assert equilibrium.symmetry == Symmetry(mirror=reversal == "mirror", axis=reversal == "axis")
+    plain = dataclasses.replace(equilibrium, symmetry=Symmetry())
+    ours, theirs = index(equilibrium), index(plain)
+    assert ours.decided and theirs.decided and ours.index == theirs.index
+    both = np.sort(np.concatenate([entry.eigenvalues for entry in ours.classes]))[:8]
+    assert both == pytest.approx(theirs.classes[0].eigenvalues[:8], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("law", "m", "n", "kappa_n", "reversal", "more"),
+    [(RIBBON, 3, 1, -21.6268175, "mirror", 1), (RIBBON, 5, 1, -24.4451886, "axis", 1),
+     (RIBBON, 5, 2, -20.0441574, "mirror", 2), (RIBBON, 5, 2, -20.0441574, "axis", 1)],
+)  # fmt: skip
+def test_stability_is_exchanged(law, m, n, kappa_n, reversal, more):
+    """A pitchfork to the side where the primary branch has fewer negative directions has one more of them, the way it goes.
+
+    Of the two kinds of branches that leave by a pair of modes, one has another, from the mode that is not its own.
+    """
+    before, after = (index(from_solution(law, *solution(at(law, m, n, kappa_n + d)))).index for d in (0.2, -0.2))
+    assert before - after == (1 if n == 1 else 2)
+    point = leave(law, m, n, kappa_n, reversal).points[-1]
+    found = index(from_solution(law, *solution(point)))
+    assert found.decided
+    assert found.index == after + more if point["kappa_n"] < kappa_n else before - more
+
+
+def test_both_ways_along_the_kernel_are_images():
+    """The rotary reflection changes the sign of the mode, so the two half-branches are one up to symmetry."""
+    pair = [leave(RIBBON, 5, 1, -24.4451886, "axis", sense, [-24.5]).labelled("UZ")[0] for sense in (1, -1)]
+    assert np.abs(pair[0]["R1"] - pair[1]["R1"]) > 0.1
+    for name in ("kappa_star", "energy"):
+        assert pair[0][name] == pytest.approx(pair[1][name], abs=1e-8)
+    assert force(pair[0]) == pytest.approx(force(pair[1]), abs=1e-7)
+
+
+def test_what_modes_keep():
+    assert breaking(1, "wavenumber 1 even") == Breaking(1, 1, "even")
+    one = breaking(2, "wavenumber 1 pair")
+    assert (one.dimension, one.keeps, one.symmetric) == (2, ("mirror", "axis"), True)
+    assert one.kept("axis") == "one two-fold axis"
+    assert one.broken("axis") == "2 mirrors, one two-fold axis, 4-fold rotary reflection"
+    assert breaking(3, "wavenumber 3 odd").kept("axis") == "3 two-fold axes, 3-fold rotation"
+    assert breaking(1, "wavenumber 0 odd").keeps == ()
+    third = breaking(3, "wavenumber 2 pair")  # comes back after three rotary reflections, which exchange mirrors and axes
+    assert (third.keeps, third.symmetric) == (("mirror",), False)
+    assert third.kept("mirror") == "one mirror, one two-fold axis, 2-fold rotary reflection"
+
+
+def test_a_mode_that_is_none_is_named():
+    with pytest.raises(ValueError, match="must be .*wavenumber 1 pair"):
+        breaking(2, "wavenumber 1 even")
+
+
+def test_a_rod_loses_its_symmetry_too():
+    """The flat rod's (3, 1) changes its index by one, and there the half loop between mirrors has a branch point."""
+    kappa_n = 1.0104548
+    counts = [index(from_solution(FLAT_ROD, *solution(at(FLAT_ROD, 3, 1, kappa_n + d)))).index for d in (0.01, -0.01)]
+    assert abs(counts[0] - counts[1]) == 1
+    system, x, _ = secondary_branch(FLAT_ROD, *solution(at(FLAT_ROD, 3, 1, kappa_n)), "mirror")
+    assert x[system.parameter_index("kappa_n")] == pytest.approx(kappa_n, abs=1e-6)
