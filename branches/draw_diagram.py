@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from branches.graph import families
+from branches.graph import families, pieces, secondaries
 
 STABLE, UNSTABLE, FOLD, DOT, SECONDARY = "#000000", "#9a9a9a", "#D55E00", "#000000", "#CC79A7"
 #: Okabe-Ito colours and a line style for each wavenumber: told apart without colour too.
@@ -15,6 +15,7 @@ STYLES = {
     5: ("#56B4E9", (0, (6, 1.5))), 6: ("#E69F00", (0, (4, 1, 1, 1))), 7: ("#882255", (0, (4, 1, 1, 1))),
 }  # fmt: skip
 _OTHER = ("#444444", ":")
+_SECONDARY_STYLE = (SECONDARY, (0, (3, 1)))
 _MARKS = {"fold": ("*", FOLD, 90), "circle": ("o", DOT, 16), "secondary bifurcation": ("D", SECONDARY, 26)}
 #: Shapes of the way of a branch from one circle to the other in the disentangled picture, sigma -> sigma ** power.
 _POWERS = (1.0, 1.7, 0.6, 3.0, 0.35)
@@ -27,7 +28,7 @@ class Line:
     Attributes
     ----------
     n : int
-        Wavenumber.
+        Wavenumber; 0 for a secondary branch.
     kappa_n, kappa_star : ndarray, shape (K,)
         From end to end.
     stable : ndarray of bool, shape (K,)
@@ -107,7 +108,7 @@ def schematic(axes, graph, law: str, nu: float, window) -> None:
 
 
 def _draw(axes, line, height, at):
-    colour, dashes = STYLES.get(line.n, _OTHER)
+    colour, dashes = STYLES.get(line.n, _OTHER) if line.n else _SECONDARY_STYLE
     axes.plot(line.kappa_n, height, color=colour, linestyle=dashes, lw=1.3, zorder=2)
     if line.stable.any():
         axes.plot(line.kappa_n, np.where(line.stable, height, np.nan), color=colour, lw=4, zorder=2, solid_capstyle="butt")
@@ -160,6 +161,9 @@ def legend(graph, law: str, nu: float) -> list:
         Line2D([], [], color=UNSTABLE, lw=1, label="circle, unstable"),
         Line2D([], [], marker="o", color=DOT, ls="", ms=5, label="bifurcation of a circle"),
     ]
+    if secondaries(graph, law, nu):
+        colour, dashes = _SECONDARY_STYLE
+        handles.append(Line2D([], [], color=colour, ls=dashes, label="secondary branch"))
     kinds = {data["kind"] for _, data in graph.nodes(data=True) if (data["law"], data["nu"]) == (law, nu)}
     if any(data.get("index") == 0 for _, _, data in graph.edges(data=True) if (data["law"], data["nu"]) == (law, nu)):
         handles.append(Line2D([], [], color="#666666", lw=4, label="buckled, stable (index 0)"))
@@ -174,21 +178,19 @@ def legend(graph, law: str, nu: float) -> list:
 
 
 def lines(graph, law: str, nu: float) -> list[Line]:
-    """The branches of one law and nu, smooth from end to end."""
+    """The branches of one law and nu, smooth from end to end: the primary ones, then the secondary ones."""
+    branches = [(family[3], pieces(graph, family)) for family in families(graph) if family[:2] == (law, nu)]
+    branches += [(0, branch["edges"]) for branch in secondaries(graph, law, nu)]
     result = []
-    for family in families(graph):
-        if family[:2] != (law, nu):
-            continue
-        pieces = [(a, b, d) for a, b, d in graph.edges(data=True) if (d["law"], d["nu"], d["m"], d["n"]) == family]
-        pieces.sort(key=lambda piece: piece[2]["arclength"][0])
-        curves = [smooth(d["arclength"], d["kappa_n"], d["kappa_star"]) for _, _, d in pieces]
-        names = dict.fromkeys(node for a, b, _ in pieces for node in (a, b))
+    for n, edges in branches:
+        curves = [smooth(d["arclength"], d["kappa_n"], d["kappa_star"]) for _, _, d in edges]
+        names = dict.fromkeys(node for a, b, _ in edges for node in (a, b))
         nodes = [graph.nodes[name] for name in names]
         marks = [(node["kappa_n"], node["kappa_star"], node["kind"]) for node in nodes]
         kappa_n, kappa_star = (np.concatenate([curve[i] for curve in curves]) for i in (0, 1))
-        stable = np.concatenate([np.full(len(c[0]), d.get("index") == 0) for c, (_, _, d) in zip(curves, pieces)])
+        stable = np.concatenate([np.full(len(c[0]), d.get("index") == 0) for c, (_, _, d) in zip(curves, edges)])
         returns = sum(node["kind"] == "circle" for node in nodes) > 1
-        result.append(Line(family[3], kappa_n, kappa_star, stable, marks, returns))
+        result.append(Line(n, kappa_n, kappa_star, stable, marks, returns))
     return result
 
 
