@@ -182,6 +182,17 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
     return points
 
 
+def initial_slope(m, n, nu, law="ribbon", root=0):
+    """d kappa_n / dA where the branch leaves the m-covered circle, A the squared amplitude: its sign is the pitchfork's sense.
+
+    Zero where a fold is born out of the pitchfork. Raises as `curve` does.
+    """
+    family = _family(law, m, n, nu, root)
+    defect, numerator, denominator = FLOAT.gradients(family.parts, family.circle(m))
+    gradient = (numerator[1] * denominator[0] - numerator[0] * denominator[1]) / denominator[0] ** 2
+    return float(gradient[0] - gradient[1] * defect[1][0] / defect[1][1])  # along the branch, log(1 + A) being A to first order
+
+
 def coordinates(point):
     """Where a point of `curve` lies in the plane of the unknowns, shape (2,) or (3,), on which the branch is a smooth curve."""
     if hasattr(point, "Gamma"):

@@ -36,6 +36,7 @@ ITEMS: dict[str, Callable[[Path], Section]] = {
     "fig11": _later("branches.paper.diagram", "fig11"),
     "fig12": _later("branches.paper.diagram", "fig12"),
     "fig12b": _later("branches.paper.stability", "fig12b"),
+    "curves": _later("branches.paper.curves", "curves"),
 }
 
 

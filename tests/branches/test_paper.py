@@ -7,7 +7,18 @@ from branches.paper.page import Row
 from ribbon_model import exact
 
 #: Rows with a verdict of each item: all numbers that the paper prints.
-NUMBERS = {"table1": 1, "table2": 8, "table3": 24, "fig6": 1, "fig9": 2, "fig10": 8, "fig11": 3, "fig12": 9, "fig12b": 0}
+NUMBERS = {
+    "table1": 1,
+    "table2": 8,
+    "table3": 24,
+    "fig6": 1,
+    "fig9": 2,
+    "fig10": 8,
+    "fig11": 3,
+    "fig12": 9,
+    "fig12b": 0,
+    "curves": 0,
+}
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +54,16 @@ def test_where_stable_buckled_states_exist(computed):
     assert [what for what, row in rows.items() if row.remark != "agrees"] == [
         "isotropic rod: branch (3, 1) stable for κₙL/2π in"
     ]
+
+
+def test_where_folds_are_born(computed):
+    """Two routes: the quadrature's slope at the circle, and the collocation's curve of folds, extrapolated."""
+    rows = computed("curves")[0].rows
+    births = [(float(row.ours), float(rows[i + 1].ours)) for i, row in enumerate(rows) if "exists for" in row.what]
+    assert len(births) == 2
+    assert all(by_quadrature == pytest.approx(by_collocation, abs=1e-6) for by_quadrature, by_collocation in births)
+    at_03 = [row.ours for row in rows if row.what == "secondary bifurcation of (3, 1) at ν = 0.3: κₙL/2π ="]
+    assert float(at_03[0]) == pytest.approx(-21.62681748742, abs=1e-8)  # the half loop's branch point
 
 
 def test_verdicts_are_those_of_the_printed_digits():
