@@ -28,9 +28,9 @@ from ribbon_model import linear
 from ribbon_model.finite_width import strain_energy
 from ribbon_model.laws import FINITE_WIDTH
 
-_FEWEST, _MOST = 32, 1024  # nodes of a quarter wave
+_FEWEST, _MOST = 32, 512  # nodes of a quarter wave
 _DIFFERENCE = 1e-5
-_FIRST, _SHORTEST = 0.02, 1e-5  # steps; the first is sqrt(A) of the first point, and off the circle
+_FIRST, _SHORTEST = 0.02, 1e-3  # steps; the first is sqrt(A) of the first point, and off the circle
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,8 @@ def quadratures(kappa_n, omega, root_A, nu, Gamma) -> np.ndarray:
     nodes, before = _FEWEST, None
     while nodes <= _MOST:
         now = _quadratures(kappa_n, omega, root_A, nu, Gamma, nodes)
+        if not np.isfinite(now).all():
+            return now
         if before is not None and np.abs(now - before).max() < 1e-13 * (1 + np.abs(now).max()):
             return now
         nodes, before = 2 * nodes, now
