@@ -1,0 +1,290 @@
+"""A closed strip of segments, on each of which the strains are constant: energy, closure and their exact derivatives.
+
+The loop is cut into N segments of length h. On each the frame turns about a fixed axis and the centreline is an arc of a helix,
+both in closed form. Closure is six conditions, that the frame and the centreline come back. So every closed strip of this kind
+is a state of the continuous strip, and its energy, the mean of U(omega), exceeds the minimum over all by O(h**2). For the laws
+with omega_2 = 0 the unknowns are omega_1 and omega_3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ribbon_model.equilibrium import LENGTH
+from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
+from ribbon_model.second_variation import Equilibrium, cross_matrix
+
+_CLOSED = 1e-12  # what is left of the conditions of closure
+
+# sin(p)/p, (1 - cos p)/p^2 and (p - sin p)/p^3 as series in p^2, exact to round-off for |p| < pi
+_SINE, _COSINE, _REST = (Polynomial([(-1) ** k / math.factorial(2 * k + i) for k in range(15)]) for i in (1, 2, 3))
+#: Cross matrices of the axes.
+_GENERATORS = np.array([cross_matrix(axis) for axis in np.eye(3)])
+
+
+# --- the energy ---------------------------------------------------------------------------------------------------------
+
+
+def strain_energy(law: Law, strain, kappa_n: float, nu: float):
+    """U = max over M of M . omega - H(M), the moment dU/d(omega) and the stiffness D2U, at strains (..., 3).
+
+    For the ribbon, with c = (omega_1**2 + omega_3**2)/omega_1 and a = c - nu kappa_n where that is positive, else 0,
+
+        U = a**2/2 - (1 - nu) kappa_n omega_1 - (nu kappa_n)**2/2,
+
+    which is (7) of Audoly & Seffen (2015) where a > 0, and its convex envelope elsewhere; U = inf for omega_1 <= 0. Where
+    a = 0 the stiffness is singular. A component omega_2 that a law has not is passed over; its moment here is 0.
+
+    Returns
+    -------
+    U, moment, stiffness : ndarray, shapes (...), (..., 3), (..., 3, 3)
+
+    Raises
+    ------
+    ValueError
+        A law that is not one of the paper's.
+    """
+    strain = np.asarray(strain)
+    if law is RIBBON:
+        return _ribbon_energy(strain, kappa_n, nu)
+    if law not in (FLAT_ROD, ISOTROPIC_ROD):
+        raise ValueError(f"law {law.name!r}: descents are for {RIBBON.name!r}, {FLAT_ROD.name!r} and {ISOTROPIC_ROD.name!r}")
+    compliance = np.diag(law.linearized(np.zeros((1, 3)), 0.0, nu)[1][0])
+    moduli = np.array([0.0 if value == 0 else 1 / value for value in compliance])
+    moment = moduli * strain - kappa_n * np.array([1.0, 0.0, 0.0])
+    U = np.sum(moduli * strain * strain, axis=-1) / 2 - kappa_n * strain[..., 0]
+    return U, moment, np.broadcast_to(np.diag(moduli), (*strain.shape, 3))
+
+
+def _ribbon_energy(strain, kappa_n, nu):
+    w1, w3 = strain[..., 0], strain[..., 2]
+    kind = np.result_type(strain, kappa_n)
+    moment, stiffness = np.zeros(strain.shape, kind), np.zeros((*strain.shape, 3), kind)
+    safe = np.where(w1.real > 0, w1, 1.0)
+    eta = w3 / safe
+    a = safe * (1 + eta * eta) - nu * kappa_n
+    convex = a.real > 0
+    a = np.where(convex, a, 0.0)
+    slope = np.stack([1 - eta * eta, 2 * eta], axis=-1)  # of c, by omega_1 and omega_3
+    ratio = np.stack([-eta, np.ones_like(eta)], axis=-1)
+    bend = (2 / safe)[..., None, None] * ratio[..., None] * ratio[..., None, :]
+    moment[..., ::2] = a[..., None] * slope
+    moment[..., 0] -= (1 - nu) * kappa_n
+    stiffness[..., ::2, ::2] = convex[..., None, None] * slope[..., None] * slope[..., None, :] + a[..., None, None] * bend
+    U = a * a / 2 - (1 - nu) * kappa_n * w1 - (nu * kappa_n) ** 2 / 2
+    return np.where(w1.real > 0, U, np.inf), moment, stiffness
+
+
+# --- the discrete strip -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """A strip of segments of constant strain; B = 1, L = 2 pi. The directors at S = 0 are the lab axes, x(0) is the origin.
+
+    Attributes
+    ----------
+    law : Law
+    nu, kappa_n : float
+    strains : ndarray, shape (N, 3)
+        Components of omega on the directors, segment by segment.
+    """
+
+    law: Law
+    nu: float
+    kappa_n: float
+    strains: np.ndarray
+
+    @property
+    def segment(self) -> float:
+        """Length of a segment."""
+        return LENGTH / len(self.strains)
+
+    @property
+    def free(self) -> list[int]:
+        """The components of the strains that may change."""
+        return [0, 2] if self.law.constrained else [0, 1, 2]
+
+    @cached_property
+    def density(self):
+        """U, moment and stiffness on the segments: `strain_energy`."""
+        return strain_energy(self.law, self.strains, self.kappa_n, self.nu)
+
+    @cached_property
+    def energy(self) -> float:
+        """Mean of U, without the constant kappa_n**2/2."""
+        return float(np.mean(self.density[0]))
+
+    @cached_property
+    def kappa_star(self) -> float:
+        """-dE/dkappa_n, the conjugate curvature (28), with U as in `strain_energy`."""
+        step = 1e-30
+        varied = strain_energy(self.law, self.strains, self.kappa_n + 1j * step, self.nu)[0]
+        return float(-np.mean(varied.imag) / step)
+
+    @property
+    def slack(self) -> int:
+        """Segments on which U is not strictly convex (ribbon: c <= nu kappa_n)."""
+        return int(np.sum(np.any(np.diagonal(self.density[2], axis1=1, axis2=2)[:, self.free] == 0, axis=1)))
+
+    @cached_property
+    def _local(self):
+        """a = h omega, its cross matrix, and the matrix V of a segment: means of the rotation along it."""
+        a = self.segment * self.strains
+        z = np.sum(a * a, axis=1)[:, None, None]
+        cross = np.einsum("kb,bij->kij", a, _GENERATORS)
+        square = cross @ cross
+        return a, z, cross, square, np.eye(3) + _COSINE(z) * cross + _REST(z) * square
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """Directors at the ends of the segments, shape (N + 1, 3, 3); columns are d1, d2, d3."""
+        _, z, cross, square, _ = self._local
+        product = np.eye(3) + _SINE(z) * cross + _COSINE(z) * square
+        reach = 1
+        while reach < len(product):  # products of 2, 4, 8 ... neighbours
+            product[reach:] = product[:-reach] @ product[reach:]
+            reach *= 2
+        return np.concatenate([np.eye(3)[None], product])
+
+    @cached_property
+    def centreline(self) -> np.ndarray:
+        """x at the ends of the segments, shape (N + 1, 3)."""
+        steps = self.segment * np.einsum("kij,kj->ki", self.axes[:-1], self._local[4][:, :, 2])
+        return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+    @cached_property
+    def closure(self) -> np.ndarray:
+        """Rotation vector of the last frame, and the last x: shape (6,), zero on a closed strip."""
+        last = self.axes[-1]
+        vector = np.array([last[2, 1] - last[1, 2], last[0, 2] - last[2, 0], last[1, 0] - last[0, 1]]) / 2
+        sine = np.linalg.norm(vector)
+        angle = math.atan2(sine, (np.trace(last) - 1) / 2)
+        return np.concatenate([vector * (angle / sine if sine > 0 else 1.0), self.centreline[-1]])
+
+    @cached_property
+    def turning(self) -> np.ndarray:
+        """Rotation vectors (N, 3, 3), component by column, that a unit of each strain gives to all that follows."""
+        return self.segment * self.axes[:-1] @ self._local[4]
+
+    @cached_property
+    def _slopes(self):
+        """dV/da_b, shape (N, b, 3, 3), and d2(V e3)/da_a da_b, shape (N, a, b, 3)."""
+        a, z, cross, square, _ = self._local
+        f, f1, f2 = _COSINE(z), 2 * _COSINE.deriv()(z), 4 * _COSINE.deriv(2)(z)
+        g, g1, g2 = _REST(z), 2 * _REST.deriv()(z), 4 * _REST.deriv(2)(z)
+        both = _GENERATORS @ cross[:, None] + cross[:, None] @ _GENERATORS
+        along = a[:, :, None, None]
+        first = along * (f1 * cross + g1 * square)[:, None] + f[..., None] * _GENERATORS + g[..., None] * both
+        outer = a[:, :, None] * a[:, None, :]
+        scale = [(s1 * np.eye(3) + s2 * outer)[..., None] for s1, s2 in ((f1, f2), (g1, g2))]
+        second = scale[0] * cross[:, None, None, :, 2] + scale[1] * square[:, None, None, :, 2]
+        for slope, part in ((f1, np.broadcast_to(_GENERATORS[:, :, 2], (len(a), 3, 3))), (g1, both[..., 2])):
+            term = slope[..., None] * a[:, :, None, None] * part[:, None]
+            second = second + term + term.transpose(0, 2, 1, 3)
+        pairs = (_GENERATORS[:, None] @ _GENERATORS + _GENERATORS @ _GENERATORS[:, None])[..., 2]
+        return first, second + g[..., None] * pairs
+
+    @cached_property
+    def own(self) -> np.ndarray:
+        """What a unit of each strain adds to the step of its own segment, shape (N, 3, 3), component by column."""
+        return self.segment**2 * np.einsum("kij,kbj->kib", self.axes[:-1], self._slopes[0][..., 2])
+
+    @cached_property
+    def closure_slopes(self) -> np.ndarray:
+        """Derivatives of `closure` by the strains, shape (6, N, 3); those of the rotation are exact on closed strips."""
+        turning = self.turning
+        arm = self.centreline[-1] - self.centreline[1:]
+        shift = self.own + np.cross(turning, arm[:, :, None], axis=1)
+        return np.concatenate([turning, shift], axis=1).transpose(1, 0, 2)
+
+    def closure_curvature(self, multipliers) -> np.ndarray:
+        """Second derivatives of multipliers . closure by the strains on a closed strip, shape (N, 3, N, 3)."""
+        rotation, position = np.split(np.asarray(multipliers), 2)
+        turning, shift = self.turning, self.closure_slopes[3:].transpose(1, 0, 2)
+        # a segment turns all that follows: its rotation vector times what a later one does
+        lever = -cross_matrix(position) @ shift - cross_matrix(rotation) @ turning / 2
+        count = len(turning)
+        later = np.triu(np.ones((count, count)), 1)[:, None, :, None]
+        result = np.einsum("kia,lib->kalb", turning, lever, optimize=True) * later
+        result += result.transpose(2, 3, 0, 1)
+        first, second = self._slopes
+        turned = self.segment**2 * np.einsum("kij,kbja->kiab", self.axes[:-1], first)
+        arm = (self.centreline[-1] - self.centreline[1:])[:, :, None, None]
+        pair = np.cross(turning[:, :, :, None], turning[:, :, None, :], axis=1)  # v_a x v_b
+        inner = np.cross(turning[:, :, None, :], arm, axis=1)  # v_b x arm
+        local = self.segment**3 * np.einsum("kij,kabj->kiab", self.axes[:-1], second)
+        local += np.cross(turned, arm, axis=1) + np.cross(turning[:, :, :, None], inner, axis=1)
+        local = np.einsum("i,kiab->kab", position, local) + np.einsum("i,kiab->kab", rotation, turned + pair / 2)
+        result[np.arange(count), :, np.arange(count)] += local
+        return result
+
+    def linearized(self):
+        """Moments (n,), slopes of closure (6, n) and the Hessian of the Lagrangian (n, n) by the free strains, times N.
+
+        The multipliers are those that leave the least gradient.
+        """
+        free, count = self.free, len(self.strains)
+        _, moment, stiffness = self.density
+        gradient = moment[:, free].ravel()
+        slopes = self.closure_slopes[:, :, free].reshape(6, -1)
+        multipliers = -np.linalg.lstsq(slopes.T, gradient, rcond=None)[0]
+        hessian = self.closure_curvature(multipliers)[:, free][:, :, :, free]
+        hessian[np.arange(count), :, np.arange(count)] += stiffness[:, free][:, :, free]
+        return gradient, slopes, hessian.reshape(len(gradient), -1), multipliers
+
+    def moved(self, change) -> Strip:
+        """The strip with the free strains changed by (n,), closed again by the smallest further change.
+
+        Raises
+        ------
+        ValueError
+            It cannot be closed from there.
+        """
+        strip = self._changed(change)
+        for _ in range(12):
+            if np.abs(strip.closure).max() < _CLOSED:
+                return strip
+            if not np.abs(strip.closure).max() < 1.0:
+                break
+            slopes = strip.closure_slopes[:, :, strip.free].reshape(6, -1)
+            strip = strip._changed(-np.linalg.lstsq(slopes, strip.closure, rcond=None)[0])
+        raise ValueError("the strip cannot be closed by a small change of its strains")
+
+    def along(self, stations) -> tuple[np.ndarray, np.ndarray]:
+        """Directors (K, 3, 3), as columns, and centreline (K, 3) at places S in [0, L]."""
+        number = np.minimum((np.asarray(stations) / self.segment).astype(int), len(self.strains) - 1)
+        part = np.asarray(stations) - number * self.segment
+        a = part[:, None] * self.strains[number]
+        cross, z = np.einsum("kb,bij->kij", a, _GENERATORS), np.sum(a * a, axis=1)[:, None, None]
+        square, first = cross @ cross, self.axes[number]
+        mean = np.eye(3) + _COSINE(z) * cross + _REST(z) * square
+        x = self.centreline[number] + part[:, None] * np.einsum("kij,kj->ki", first, mean[:, :, 2])
+        return first @ (np.eye(3) + _SINE(z) * cross + _COSINE(z) * square), x
+
+    def _changed(self, change) -> Strip:
+        strains = self.strains.copy()
+        strains[:, self.free] += np.reshape(change, (len(strains), -1))
+        return replace(self, strains=strains)
+
+
+def discretized(equilibrium: Equilibrium, segments: int) -> Strip:
+    """The strip that has the strains of an equilibrium in the middle of each segment, closed.
+
+    Raises
+    ------
+    ValueError
+        It cannot be closed: too few segments.
+    """
+    middle = (np.arange(segments) + 0.5) * (LENGTH / segments)
+    directors = equilibrium.directors(middle)
+    edges = np.cumsum(directors[:, 2], axis=0) * (LENGTH / segments)
+    moment = equilibrium.moment - np.cross(edges - directors[:, 2] * (LENGTH / segments / 2), equilibrium.force)
+    strains = equilibrium.response(np.einsum("kij,kj->ki", directors, moment))[0]
+    strip = Strip(equilibrium.law, equilibrium.nu, equilibrium.kappa_n, strains)
+    return strip.moved(np.zeros(segments * len(strip.free)))
