@@ -7,6 +7,7 @@ comparisons decide on real parts. Both are put in place by a compiler pass that 
 from __future__ import annotations
 
 import operator
+from typing import Any
 
 from numba import types
 from numba.core import ir
@@ -150,7 +151,7 @@ class _UseStandIns(FunctionPass):
         for block in blocks.values():
             body = []
             for statement in block.body:
-                value = getattr(statement, "value", None)
+                value: Any = getattr(statement, "value", None)
                 binary = isinstance(statement, ir.Assign) and isinstance(value, ir.Expr)
                 if binary and value.op in ("binop", "inplace_binop") and value.fn in _STAND_INS:
                     function = block.scope.redefine("$stand_in", value.loc)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -58,10 +58,12 @@ def instance(what: str, value: Any, kind: type | tuple[type, ...], called: str) 
         raise ProblemError(f"{what}: {shown(value)} must be {called}")
 
 
-def function(what: str, value: Any) -> None:
+def function(what: str, value: Any) -> Callable[..., Any]:
     """Something that can be called."""
     if not callable(value):
         raise ProblemError(f"{what}: {shown(value)} must be a function")
+    found: Callable[..., Any] = value
+    return found
 
 
 def mapping(what: str, value: Any, holds: str) -> Mapping[str, Any]:
@@ -76,7 +78,8 @@ def sequence(what: str, value: Any, holds: str) -> Sequence[Any]:
     array = isinstance(value, np.ndarray) and value.ndim == 1
     if not array and (not isinstance(value, Sequence) or isinstance(value, (str, bytes))):
         raise ProblemError(f"{what}: {shown(value)} must be a list of {holds}")
-    return value
+    found: Sequence[Any] = value
+    return found
 
 
 def names(what: str, value: Any) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import contextlib
 import functools
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar, overload
 
 import numba
 from numba.core import sigutils
@@ -43,6 +43,17 @@ def _not_kept(folder: str, reason: str) -> None:
     print(
         f"contin: compiled code is not kept in {folder} ({reason}); set CONTIN_CACHE_DIR and NUMBA_CACHE_DIR", file=sys.stderr
     )
+
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+@overload
+def njit(signature: _Function, **options: Any) -> _Function: ...
+
+
+@overload
+def njit(signature: str | None = None, *, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]: ...
 
 
 def njit(signature: str | Callable[..., Any] | None = None, *, cache: bool = False, **options: Any) -> Any:

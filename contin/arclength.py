@@ -12,7 +12,7 @@ refine the mesh. The loop knows of a system only its interface (residual, linear
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from contin.branch import Branch, Point, Stop
 from contin.corrector import correct
 from contin.errors import ConvergenceError, ProblemError
 from contin.events import Monitor, Trial, fold, limit, sign_changed, user_zero
-from contin.location import Segment, refined
+from contin.interface import Array, Discretization
+from contin.location import Segment, Start, refined
 from contin.settings import Settings
 from contin.steps import State, corrected, hidden_turn, predict, sharpened, tangent_error, turn, unit_tangent
 from contin.switching import calm, crossings, inner, quotients
@@ -63,7 +64,15 @@ class Continuation:
         The first point cannot be corrected.
     """
 
-    def __init__(self, system, x, settings: Settings = Settings(), tangent=None, state: State | None = None, start=None):
+    def __init__(
+        self,
+        system: Discretization,
+        x: Array,
+        settings: Settings = Settings(),
+        tangent: Array | None = None,
+        state: State | None = None,
+        start: Start | None = None,
+    ) -> None:
         self.settings = settings
         self.stop: Stop | None = None
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
@@ -77,7 +86,7 @@ class Continuation:
         self._resumed = state is not None
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
-    def _check(self, system):
+    def _check(self, system: Discretization) -> None:
         if len(system.free) != system.problem.free_size:
             raise ProblemError(
                 f"free parameters: {len(system.free)} given ({', '.join(system.free)}), a curve of this problem needs "
@@ -92,7 +101,7 @@ class Continuation:
             if name not in known:
                 raise ProblemError(f"{name!r} is neither a parameter nor a functional ({', '.join(known)})")
 
-    def _all_monitors(self):
+    def _all_monitors(self) -> list[Monitor]:
         settings = self.settings
         monitors = [user_zero(name, value) for name, values in settings.zeros.items() for value in values]
         monitors += [limit(name, end, side) for name, ends in settings.limits.items() for end, side in zip(ends, (-1, 1))]
@@ -100,7 +109,7 @@ class Continuation:
 
     # --- the first point -----------------------------------------------------------------------------------------
 
-    def _first(self, system, x, tangent) -> State:
+    def _first(self, system: Discretization, x: Array, tangent: Array | None) -> State:
         settings = self.settings
         if tangent is not None:
             tangent = tangent / np.sqrt(inner(system, tangent, tangent))
@@ -119,7 +128,7 @@ class Continuation:
         sign = system.linearize(x, (system.weights * tangent,))[1].sign
         return State(system, x, tangent, None, 1.0, settings.step, sign, 0.0, 0, False)
 
-    def _first_correction(self, system, x):
+    def _first_correction(self, system: Discretization, x: Array) -> tuple[Array, Array]:
         """x corrected at fixed primary parameter or, where that is singular (at a fold), across a random direction."""
         fixed = np.zeros(system.size)
         fixed[system.parameter_index(self.primary)] = 1.0
@@ -133,7 +142,7 @@ class Continuation:
                 raise error from None
 
     @staticmethod
-    def _tangent(system, x, row):
+    def _tangent(system: Discretization, x: Array, row: Array) -> Array:
         """The unit vector along the curve at x with row.tangent > 0."""
         return unit_tangent(system, system.linearize(x, (row,))[1])
 
@@ -151,7 +160,7 @@ class Continuation:
         while self.stop is None:
             yield from self._advance()
 
-    def _out_of_limits(self, trial) -> Stop | None:
+    def _out_of_limits(self, trial: Trial) -> Stop | None:
         for name, (low, high) in self.settings.limits.items():
             if not low - _SLACK * (1 + abs(low)) <= trial[name] <= high + _SLACK * (1 + abs(high)):
                 return Stop("limit", f"{name} = {trial[name]:g} at the start lies outside {low:g} ... {high:g}")
@@ -244,13 +253,13 @@ class Continuation:
             raise ConvergenceError("another branch was met right beside the branch point")
         return low, aside
 
-    def _may_turn(self, trial: Trial, residual) -> bool:
+    def _may_turn(self, trial: Trial, residual: Array) -> bool:
         """Whether the primary parameter is so near to turning that an approximate tangent may have the wrong sign."""
         at = trial.system.parameter_index(self.primary)
         component = abs(trial.tangent[at])
         return component < _STEEP and not abs(tangent_error(trial, residual)[at]) < _DOUBT * component
 
-    def _exact_tangent(self, state: State):
+    def _exact_tangent(self, state: State) -> Array:
         """The tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""
         row = state.system.weights * state.tangent
         tangent = self._tangent(state.system, state.x, row)
@@ -304,7 +313,7 @@ class Continuation:
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
         )  # fmt: skip
 
-    def _refine(self):
+    def _refine(self) -> None:
         """Adapt the mesh now and then, and correct the point on it."""
         control, state = self.settings.mesh, self.state
         due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
@@ -335,9 +344,17 @@ class Continuation:
     # --- what comes out ------------------------------------------------------------------------------------------
 
     def _point(
-        self, label, name, trial: Trial, gone: float, state: State | None = None, details=None, monitor: Monitor | None = None
+        self,
+        label: str,
+        name: str,
+        trial: Trial,
+        gone: float,
+        state: State | None = None,
+        details: object = None,
+        monitor: Monitor | None = None,
     ) -> Point:
-        arclength, errors = (state or self.state).arclength + gone, {}
+        arclength = (state or self.state).arclength + gone
+        errors: Mapping[str, float] = {}
         if label and label != "MX" and name != "closed" and self.settings.errors:  # closed: the first point once more
             trial, errors, details = refined(label, trial, details, monitor, self.settings)
         system = trial.system
@@ -348,7 +365,7 @@ class Continuation:
         )  # fmt: skip
 
 
-def follow(system, x, settings: Settings = Settings(), tangent=None) -> Branch:
+def follow(system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None) -> Branch:
     """Run to the end and return the branch: :class:`Continuation` as one call."""
     run = Continuation(system, x, settings, tangent)
     points = list(run)

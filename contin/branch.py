@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+
+from contin.interface import Array, Discretization
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +25,7 @@ class Point:
         All parameters; the problem's functionals.
     x, tangent : ndarray, shape (size,)
         Unknowns of ``system``, and the unit tangent (``nan`` at a branch point, which has several).
-    system : object
+    system : Discretization
         The discretized problem of this point.
     arclength : float
         Distance travelled from the branch's first point, in the weighted norm.
@@ -39,14 +42,14 @@ class Point:
     name: str
     parameters: Mapping[str, float]
     functionals: Mapping[str, float]
-    x: np.ndarray
-    tangent: np.ndarray
-    system: object
+    x: Array
+    tangent: Array
+    system: Discretization
     arclength: float
     iterations: int
     newton_error: float
     errors: Mapping[str, float] = field(default_factory=dict)
-    details: object = None
+    details: Any = None
 
     def __getitem__(self, name: str) -> float:
         """A parameter or functional by name."""
@@ -75,10 +78,10 @@ class Branch:
     def __len__(self) -> int:
         return len(self.points)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Point]:
         return iter(self.points)
 
-    def column(self, name: str) -> np.ndarray:
+    def column(self, name: str) -> Array:
         """A parameter or functional over all points."""
         return np.array([point[name] for point in self.points])
 

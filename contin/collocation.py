@@ -8,16 +8,22 @@ satisfies the equation at the d Gauss points: error O(h^(2 d)) at the mesh point
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin._kernels import njit
 from contin.condensation import Factorization
 from contin.errors import ProblemError
+from contin.interface import Array, Carrier, Discretization, Factors
 from contin.mesh import MeshControl, adapted_mesh
 from contin.problem import BoundaryValueProblem
 from contin.system import System
+
+if TYPE_CHECKING:
+    from contin.events import Monitor
 
 DEGREES = range(2, 9)
 
@@ -32,14 +38,14 @@ class Basis:
     """
 
     degree: int
-    nodes: np.ndarray
-    node_weights: np.ndarray
-    points: np.ndarray
-    weights: np.ndarray
-    value: np.ndarray
-    slope: np.ndarray
-    highest: np.ndarray
-    barycentric: np.ndarray
+    nodes: Array
+    node_weights: Array
+    points: Array
+    weights: Array
+    value: Array
+    slope: Array
+    highest: Array
+    barycentric: Array
     constant: float
 
 
@@ -68,17 +74,18 @@ def basis(degree: int) -> Basis:
     return Basis(degree, *tables, constant)
 
 
-def interpolation(nodes, barycentric, at):
+def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
     """Matrix (len(at), len(nodes)) that evaluates the polynomial through the nodes ``at`` points (barycentric form)."""
     distance = at[:, None] - nodes
     exact = distance == 0
     terms = barycentric / np.where(exact, 1.0, distance)
     matrix = terms / terms.sum(axis=1, keepdims=True)
-    return np.where(exact.any(axis=1, keepdims=True), exact, matrix)
+    result: Array = np.where(exact.any(axis=1, keepdims=True), exact, matrix)
+    return result
 
 
 @njit(inline="always", error_model="numpy")
-def _scaled(target, factor, source):
+def _scaled(target: Array, factor: float, source: Array) -> None:
     """target = factor * source, a loop from 0 so that it becomes vector instructions."""
     for b in range(target.size):
         target[b] = factor * source[b]
@@ -89,7 +96,19 @@ def _scaled(target, factor, source):
     "f8[:,::1])",
     cache=True, error_model="numpy", nogil=True,
 )  # fmt: skip
-def assemble(value, slope, weights, h, jacobian, n, columns, rows, local, border, corner):
+def assemble(
+    value: Array,
+    slope: Array,
+    weights: Array,
+    h: Array,
+    jacobian: Array,
+    n: int,
+    columns: Array,
+    rows: Array,
+    local: Array,
+    border: Array,
+    corner: Array,
+) -> None:
     """Fill the blocks that :class:`contin.condensation.Factorization` takes.
 
     ``jacobian`` (points, n + n_int, n + k) of rhs and integrands; ``columns`` (c, equations) and ``rows`` (r, unknowns)
@@ -163,7 +182,16 @@ class Collocation(System):
         An unknown parameter, a bad mesh or degree.
     """
 
-    def __init__(self, problem: BoundaryValueProblem, mesh, degree: int, free, parameters):
+    problem: BoundaryValueProblem
+
+    def __init__(
+        self,
+        problem: BoundaryValueProblem,
+        mesh: Sequence[float] | Array,
+        degree: int,
+        free: Sequence[str],
+        parameters: Mapping[str, float],
+    ) -> None:
         super().__init__(problem, free, parameters)
         self.degree = degree
         self.basis = basis(degree)
@@ -172,7 +200,7 @@ class Collocation(System):
         a, b = problem.domain
         if self.mesh.ndim != 1 or self.mesh.size < 2 or not np.all(self._h > 0) or self.mesh[0] != a or self.mesh[-1] != b:
             raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
-        self._n, self._d, self.intervals = len(problem.states), degree, self._h.size
+        self._n, self._d, self.intervals = len(problem.state_names), degree, self._h.size
         self._times = (self.mesh[:-1, None] + self._h[:, None] * self.basis.points).ravel()
         self._h_points = np.repeat(self._h, degree)[:, None]
         self._quadrature = np.tile(self.basis.weights, self.intervals) * self._h_points[:, 0]
@@ -190,45 +218,48 @@ class Collocation(System):
     # --- vectors of unknowns -------------------------------------------------------------------------------------
 
     @property
-    def nodes(self):
+    def nodes(self) -> Array:
         """All nodes, shape (N d + 1,)."""
         inner = (self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel()
         return np.append(inner, self.mesh[-1])
 
-    def states(self, x):
+    def states(self, x: Array) -> Array:
         """States at the nodes, a view of shape (N d + 1, n)."""
         return x[: self.state_size].reshape(-1, self._n)
 
-    def _local(self, states):
+    def _local(self, states: Array) -> Array:
         """States by interval, shape (N, d + 1, n)."""
-        return states[self._by_interval]
+        local: Array = states[self._by_interval]
+        return local
 
-    def at_gauss_points(self, x):
+    def at_gauss_points(self, x: Array) -> Array:
         """States at the Gauss points, shape (N d, n)."""
-        return np.matmul(self.basis.value, self._local(self.states(x))).reshape(-1, self._n)
+        points: Array = np.matmul(self.basis.value, self._local(self.states(x))).reshape(-1, self._n)
+        return points
 
-    def evaluate(self, x, times):
+    def evaluate(self, x: Array, times: Array) -> Array:
         """States at ``times`` (m,), shape (m, n), by the piecewise polynomial."""
         j = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, self.intervals - 1)
         matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
-        return np.einsum("ij,ijk->ik", matrix, self._local(self.states(x))[j])
+        states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self.states(x))[j])
+        return states
 
     # --- the discrete equations ----------------------------------------------------------------------------------
 
-    def _residual(self, x, states, field, boundary):
+    def _residual(self, x: Array, states: Array, field: Array, boundary: Array) -> Array:
         n = self._n
         slope = np.matmul(self.basis.slope, self._local(states)).reshape(-1, n)
         collocation = slope - self._h_points * field[:, :n]
         return np.concatenate([collocation.ravel(), boundary[0], self._quadrature @ field[:, n:]])
 
-    def residual(self, x):
+    def residual(self, x: Array) -> Array:
         """Residual of the discrete equations at x, shape (equations,)."""
         p, u = self.all_parameters(x), self.states(x)
         field = self.problem.batch("field").values(self._times, self.at_gauss_points(x), _NONE(self._n), p)
         boundary = self.problem.batch("boundary").values(_TIME, u[:1], u[-1:], p)
         return self._residual(x, u, field, boundary)
 
-    def _blocks(self, x, rows, columns):
+    def _blocks(self, x: Array, rows: Array, columns: Array) -> tuple[Array, tuple[Array, Array, Array, Array, Array]]:
         """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as :class:`Factorization` takes them."""
         problem, n, d, k = self.problem, self._n, self._d, len(self.free)
         p, u = self.all_parameters(x), self.states(x)
@@ -248,7 +279,9 @@ class Collocation(System):
         first = np.ascontiguousarray(ends[0, :, :n])
         return self._residual(x, u, field, boundary), (local, border, corner, first, np.ascontiguousarray(last))
 
-    def linearize(self, x, rows=(), columns=()):
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
         """Residual at x, and the factored matrix [[F_x, columns^T], [rows]].
 
         ``rows`` (r, size + c) and ``columns`` (c, equations) make it square: size + c = equations + r. Equations of
@@ -259,7 +292,7 @@ class Collocation(System):
         residual, blocks = self._blocks(x, rows, columns)
         return residual, Factorization(*blocks)
 
-    def parameter_columns(self, x, names):
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
         n, p, u = self._n, self.all_parameters(x), self.states(x)
         which = self._indices(names)
@@ -268,7 +301,7 @@ class Collocation(System):
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
         return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self._quadrature, field[:, n:])])
 
-    def transposed_product(self, x, w):
+    def transposed_product(self, x: Array, w: Array) -> Array:
         """F_x^T w, shape (size,), for w (equations,)."""
         n = self._n
         _, (local, border, corner, first, last) = self._blocks(x, np.empty((0, self.size)), np.empty((0, self.equations)))
@@ -288,46 +321,47 @@ class Collocation(System):
         result[self.state_size :] += inside[:, inner + 2 * n :].sum(axis=0) + corner.T @ w[conditions:]
         return result
 
-    def monitors(self):
+    def monitors(self) -> list[Monitor]:
         """Events of this kind of problem beyond folds and branch points: none."""
         return []
 
-    def functionals(self, x):
+    def functionals(self, x: Array) -> Array:
         """Values of the problem's functionals, in their order, by the same quadrature."""
         if not self.problem.functionals:
             return np.empty(0)
         batch = self.problem.batch("functionals")
         values = batch.values(self._times, self.at_gauss_points(x), _NONE(self._n), self.all_parameters(x))
-        return self._quadrature @ values
+        integrals: Array = self._quadrature @ values
+        return integrals
 
     # --- meshes --------------------------------------------------------------------------------------------------
 
-    def carrier(self, other):
+    def carrier(self, other: Discretization) -> Carrier:
         """The function that carries vectors of unknowns from this mesh to the mesh of another system."""
         nodes = other.nodes
         return lambda x: np.concatenate([self.evaluate(x, nodes).ravel(), x[self.state_size :]])
 
-    def on_mesh(self, mesh):
+    def on_mesh(self, mesh: Array) -> tuple[Collocation, Carrier]:
         """The same problem on another mesh, and the function that carries vectors of unknowns over to it."""
         values = dict(zip(self.problem.parameters, self.parameters))
         other = Collocation(self.problem, mesh, self.degree, self.free, values)
         return other, self.carrier(other)
 
-    def refined(self):
+    def refined(self) -> tuple[Collocation, Carrier]:
         """The same problem with every interval halved, and the carrier."""
         return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
 
-    def adapted(self, x, control: MeshControl):
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
         """The same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
         mesh = adapted_mesh(self, x, control) if control.every else None
         return None if mesh is None else self.on_mesh(mesh)
 
-    def with_parameters(self, values):
+    def with_parameters(self, values: Mapping[str, float]) -> Collocation:
         """The same problem with other values of parameters that are not free."""
         names = dict(zip(self.problem.parameters, self.parameters)) | dict(values)
         return Collocation(self.problem, self.mesh, self.degree, self.free, names)
 
-    def with_free(self, free, x):
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[Collocation, Array]:
         """The same problem with other free parameters (values from x), on the same mesh, and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
         other = Collocation(self.problem, self.mesh, self.degree, free, values)
@@ -338,6 +372,6 @@ _TIME = np.zeros(1)
 
 
 @functools.cache
-def _NONE(n):
+def _NONE(n: int) -> Array:
     """The absent second state of a function of one point."""
     return np.empty((0, n))

@@ -19,7 +19,8 @@ import math
 import sys
 import types
 from collections import namedtuple
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numba
 import numpy as np
@@ -29,6 +30,7 @@ from contin import _checks
 from contin._analytic import AnalyticCompiler
 from contin._cache import cache_directory, write_source
 from contin.errors import ProblemError
+from contin.interface import Array, Function, Indices
 
 #: More states than any mesh has room for.
 _MOST_STATES = 10_000
@@ -63,23 +65,23 @@ def evaluate(t, u, v, p, free, out, jac):
 '''
 
 
-def _analytic_abs(z):
+def _analytic_abs(z: Any) -> Any:
     return z if z.real >= 0 else -z
 
 
-def _analytic_sign(z):
+def _analytic_sign(z: Any) -> Any:
     return 1.0 if z.real > 0 else (-1.0 if z.real < 0 else 0.0)
 
 
-def _analytic_max(a, b):
+def _analytic_max(a: Any, b: Any) -> Any:
     return a + 0 * b if a.real >= b.real else b + 0 * a
 
 
-def _analytic_min(a, b):
+def _analytic_min(a: Any, b: Any) -> Any:
     return a + 0 * b if a.real <= b.real else b + 0 * a
 
 
-def _analytic_atan2(y, x):
+def _analytic_atan2(y: Any, x: Any) -> Any:
     a, b = x.real, y.real  # turned by the real angle, what is left is analytic
     return np.arctan2(b, a) + np.arctan((y * a - x * b) / (x * a + y * b))
 
@@ -96,18 +98,19 @@ _MATH_NAMES = {
     "atanh": np.arctanh, "pow": np.power,
 }  # fmt: skip
 _MATH_SAME = ("sqrt", "exp", "expm1", "log", "log1p", "log10", "sin", "cos", "tan", "sinh", "cosh", "tanh")
-_MATH = {getattr(math, name): getattr(np, name) for name in _MATH_SAME}
+_MATH: dict[Any, Function] = {getattr(math, name): getattr(np, name) for name in _MATH_SAME}
 _MATH |= {getattr(math, name): function for name, function in _MATH_NAMES.items()}
-_SCALARS = {math.fabs: _analytic_abs, abs: _analytic_abs, max: _analytic_max, min: _analytic_min}
+_SCALARS: dict[Any, Function] = {math.fabs: _analytic_abs, abs: _analytic_abs, max: _analytic_max, min: _analytic_min}
 _SCALARS |= {getattr(np, name): f for name, f in _REPLACED.items() if name not in ("max", "min")}
-_SCALARS |= {math.atan2: _analytic_atan2, np.arctan2: _analytic_atan2}
+_SCALARS |= {math.atan2: _analytic_atan2}
+_SCALARS |= {np.arctan2: _analytic_atan2}
 
 
 class _Prepared:
     """Users' functions made ready for numba: what they call compiled too, ``math`` made complex-aware, fingerprinted."""
 
     def __init__(self) -> None:
-        self._done: dict[object, tuple[Dispatcher, str]] = {}
+        self._done: dict[object, tuple[Any, str]] = {}
         self._open: set[object] = set()
         self._hashes = [hashlib.sha256()]  # of the whole, and of each function being looked at
 
@@ -118,7 +121,7 @@ class _Prepared:
         for item in what:
             self._hashes[-1].update(repr(item).encode() + b"\0")
 
-    def function(self, function: Callable) -> Dispatcher:
+    def function(self, function: Function) -> Any:
         """Compile ``function`` and all plain Python functions that it refers to.
 
         The compiled function is named after its own fingerprint: numba tells machine code apart by names, and two functions
@@ -135,12 +138,12 @@ class _Prepared:
             copy = self._copy(function)
             digest = self._hashes.pop().hexdigest()
             copy.__name__ = copy.__qualname__ = f"user_{digest[:32]}"
-            compiled = numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler)
+            compiled: Any = numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler)
             self._done[function] = compiled, digest
             self._open.discard(function)
-        compiled, digest = self._done[function]
+        kept, digest = self._done[function]
         self.note(digest)
-        return compiled
+        return kept
 
     def _copy(self, function: types.FunctionType) -> types.FunctionType:
         """The function with everything that it refers to made ready, its fingerprint taken on the way."""
@@ -210,7 +213,7 @@ class _Prepared:
         return stand_in
 
 
-def _replacement(value: object) -> object | None:
+def _replacement(value: Any) -> Any:
     """What stands for a function that is not analytic, or that exists for real numbers only; None for all others."""
     try:
         if value in _MATH:
@@ -235,7 +238,9 @@ def check_names(kind: str, names: Sequence[str]) -> tuple[str, ...]:
     return names
 
 
-def check_statement(states, parameters, functionals) -> tuple[str, ...]:
+def check_statement(
+    states: Sequence[str] | int, parameters: Mapping[str, float], functionals: Mapping[str, Function]
+) -> tuple[str, ...]:
     """The names of states (u0, u1, ... for a number), after names and values of a problem were checked."""
     if isinstance(states, (int, np.integer)):
         _checks.whole("states", states, 1, _MOST_STATES)
@@ -248,15 +253,16 @@ def check_statement(states, parameters, functionals) -> tuple[str, ...]:
     for name, value in parameters.items():
         if not _checks.is_number(value) or not math.isfinite(value):
             raise ProblemError(f"parameters: {name} = {_checks.shown(value)} must be a finite number")
-    for name, value in functionals.items():
-        _checks.function(f"functionals: {name}", value)
+    for name, function in functionals.items():
+        _checks.function(f"functionals: {name}", function)
     return names
 
 
-def outputs(function: Callable, arguments: Sequence[tuple[str, ...] | None], what: str) -> int:
+def outputs(function: Function, arguments: Sequence[tuple[str, ...] | None], what: str) -> int:
     """How many values ``function`` returns (0: a single number), found by one call in Python with NaN everywhere."""
     plain = getattr(function, "py_func", function)
-    values = [math.nan if names is None else namedtuple("Values", names)(*[math.nan] * len(names)) for names in arguments]
+    tuples: list[Any] = [None if names is None else namedtuple("Values", names) for names in arguments]
+    values = [math.nan if kind is None else kind(*[math.nan] * len(kind._fields)) for kind in tuples]
     try:
         with np.errstate(all="ignore"):
             result = plain(*values)
@@ -283,7 +289,16 @@ class Batch:
         Whether the functions take t; ``f(u, p)`` without.
     """
 
-    def __init__(self, functions, counts, states, parameters, *, ends=False, times=True):
+    def __init__(
+        self,
+        functions: Sequence[Function],
+        counts: Sequence[int],
+        states: Sequence[str],
+        parameters: Sequence[str],
+        *,
+        ends: bool = False,
+        times: bool = True,
+    ) -> None:
         self.states, self.parameters, self.ends, self.times = tuple(states), tuple(parameters), ends, times and not ends
         self.count = sum(max(count, 1) for count in counts)
         expected = 2 + self.ends + self.times
@@ -296,11 +311,11 @@ class Batch:
         names = " and ".join(function.__name__ for function in functions)
         self._evaluate = _module(prepared.fingerprint(), dispatchers, names, source).evaluate
 
-    def _source(self, counts, fills) -> str:
+    def _source(self, counts: Sequence[int], fills: Sequence[bool]) -> str:
         n, k = len(self.states), len(self.parameters)
         nv = n if self.ends else 0
 
-        def calls(indent, dtype, number, result):
+        def calls(indent: int, dtype: str, number: Callable[[str, int], str], result: Callable[[int, str], str]) -> str:
             """Lines that call every function at point i and store the results."""
             u, v, p = (
                 "".join(number(f"{letter}{j}]", slot + j) + ", " for j in range(size))
@@ -308,6 +323,7 @@ class Batch:
             )
             lines, row = [], 0
             for index, (count, fill) in enumerate(zip(counts, fills)):
+                wrap: Callable[[str, str], str]
                 wrap = (lambda name, text: f"np.array([{text}])") if fill else (lambda name, text: f"{name}({text})")
                 first = ("t[i], " if self.times else "") + wrap("U", u) + (f", {wrap('V', v)}" if self.ends else "")
                 if fill:
@@ -327,13 +343,13 @@ class Batch:
         )  # fmt: skip
         return _TEMPLATE.format(states=self.states, parameters=self.parameters, n=n, nv=nv, k=k, real=real, complex=step)
 
-    def values(self, t, u, v, p):
+    def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
         out = np.empty((len(u), self.count))
         self._evaluate(t, u, v, p, _NOTHING, out, _NO_JACOBIAN)
         return out
 
-    def jacobian(self, t, u, v, p, free):
+    def jacobian(self, t: Array, u: Array, v: Array, p: Array, free: Indices) -> tuple[Array, Array]:
         """Values and derivatives, shape (points, count, n [+ n] + len(free)): by u, by v, by the free parameters."""
         width = u.shape[1] * (2 if self.ends else 1) + free.size
         out, jac = np.empty((len(u), self.count)), np.empty((len(u), self.count, width))
@@ -353,7 +369,7 @@ def _module(key: str, dispatchers: dict[str, Dispatcher], name: str, source: str
         return known
     if not path.exists() or path.read_text(encoding="utf-8") != source:
         path = write_source(path.name, source)
-    spec = importlib.util.spec_from_file_location(f"contin_{path.stem}", path)
+    spec: Any = importlib.util.spec_from_file_location(f"contin_{path.stem}", path)
     module = importlib.util.module_from_spec(spec)
     vars(module).update(dispatchers)
     sys.modules[spec.name] = module  # numba looks it up by name when it loads the compiled code
@@ -376,7 +392,7 @@ def _explain(name: str, error: Exception) -> str:
     )
 
 
-def argument_count(function: Callable) -> int:
+def argument_count(function: Function) -> int:
     """Number of positional arguments of a user's function.
 
     Raises

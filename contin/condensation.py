@@ -18,11 +18,14 @@ Vectors of unknowns are [mesh and interior values in order | parameters]; vector
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from contin._kernels import njit
+from contin.interface import Array
 
-_OPTIONS = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
+_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
 
 
 # Loops instead of numpy assignments: numba compiles them ten times faster, and they run as fast.
@@ -377,7 +380,7 @@ class Factorization:
         If the matrix is not square.
     """
 
-    def __init__(self, local, border, corner, first, last):
+    def __init__(self, local: Array, border: Array, corner: Array, first: Array, last: Array) -> None:
         intervals, rows, width = local.shape
         r, k = corner.shape
         n = first.shape[1]
@@ -399,14 +402,14 @@ class Factorization:
         #: Sign of the determinant up to a factor that depends on the shape only.
         self.sign = sign if np.isfinite(dense[-1, -1]) else np.nan
 
-    def solve(self, b):
+    def solve(self, b: Array) -> Array:
         """The x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""
         b = np.array(b, dtype=float)
         x = np.empty((*b.shape[:-1], self._unknowns))
         (solve if b.ndim == 1 else solve_rows)(*self._factors, b, x)
         return x
 
-    def solve_transposed(self, c):
+    def solve_transposed(self, c: Array) -> Array:
         """The y (equations,) with J^T y = c (unknowns,); for several, rows of y and c (m, ...)."""
         c = np.array(c, dtype=float)
         y = np.empty((*c.shape[:-1], self._unknowns))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from contin import _checks
 from contin.errors import ConvergenceError
+from contin.interface import Array, Equations, Factors
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,7 @@ class Newton:
     tolerance: float = 1e-12
     max_iterations: int = 10
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _checks.number("newton tolerance", self.tolerance, 0, 1)
         _checks.whole("max_iterations", self.max_iterations, 1, 10_000)
 
@@ -29,8 +32,8 @@ class Newton:
 class Corrected:
     """A corrected x, the last factorization (taken at an iterate before x), and the estimated error left."""
 
-    x: np.ndarray
-    factors: object
+    x: Array
+    factors: Factors
     iterations: int
     error: float
 
@@ -43,7 +46,14 @@ _CHORDS = 4
 _ROUND_OFF = 1e-9
 
 
-def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), factors=None) -> Corrected:
+def correct(
+    system: Equations,
+    guess: Sequence[float] | Array,
+    row: Array | None = None,
+    target: Any = 0.0,
+    newton: Newton = Newton(),
+    factors: Factors | None = None,
+) -> Corrected:
     """Solve F(x) = 0 and row.x = target, starting from ``guess``.
 
     Parameters
@@ -90,7 +100,7 @@ def correct(system, guess, row=None, target=0.0, newton: Newton = Newton(), fact
     raise ConvergenceError(f"Newton did not converge (updates {updates})")
 
 
-def _rate(history, fresh, moved) -> float:
+def _rate(history: list[float], fresh: bool, moved: float) -> float:
     """Estimated ratio of the error after the last update to its size; ``moved``: distance from where the Jacobian was taken."""
     if len(history) < 2:  # nothing is known of how nonlinear the equations are
         return min(moved, _FAR) if fresh else 1.0

@@ -11,6 +11,9 @@ two branches cross on the unfolded problem; beta stays zero where the bifurcatio
 from __future__ import annotations
 
 import dataclasses
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,66 +22,82 @@ from contin.arclength import follow
 from contin.branch import Branch, Point
 from contin.errors import ProblemError
 from contin.events import Monitor
+from contin.interface import Array, Carrier, Discretization, Factors, Function, Statement
 from contin.settings import Settings, settings_with
 from contin.switching import BranchPoint, _Bordered, locate_branch_point
+from contin.system import system_of
+
+if TYPE_CHECKING:
+    from contin.compilation import Batch
+    from contin.mesh import MeshControl
+    from contin.system import System
 
 #: Cosine between a border and the null vector that it stands for, below which it is renewed.
 _FITS = 0.7
 
 
-def _cosine(a, b) -> float:
+def _cosine(a: Array, b: Array) -> float:
     return float(abs(a @ b) / np.sqrt((a @ a) * (b @ b)))
 
 
-class _Extended:
+class _Extended(Discretization):
     """What extended systems share: unknowns, names and columns are those of the underlying system."""
 
-    def __init__(self, base, borders):
-        self.base, self.borders = base, borders
+    _held: list[int]
+
+    def __init__(self, base: System, borders: tuple[Array, Array] | None) -> None:
+        self.base = base
+        self.borders: Any = borders
         self.problem, self.free = _Statement(base.problem, len(base.free)), base.free
         self.weights, self.size, self.state_size = base.weights, base.size, base.state_size
         self.intervals, self.degree = base.intervals, base.degree
 
-    nodes = property(lambda self: self.base.nodes)
-    mesh = property(lambda self: self.base.mesh)
+    @property
+    def nodes(self) -> Array:
+        """Nodes of the underlying system."""
+        return self.base.nodes
 
-    def states(self, x):
+    def states(self, x: Array) -> Array:
         """States of the underlying system."""
         return self.base.states(x[: self.base.size])
 
-    def all_parameters(self, x):
+    def all_parameters(self, x: Array) -> Array:
         """Values of all parameters."""
         return self.base.all_parameters(x[: self.base.size])
 
-    def parameter(self, x, name):
+    def parameter(self, x: Array, name: str) -> float:
         """The value of one parameter by name."""
         return self.base.parameter(x[: self.base.size], name)
 
-    def parameter_index(self, name):
+    def parameter_index(self, name: str) -> int:
         """Where the free parameter ``name`` stands in x."""
         return self.base.parameter_index(name)
 
-    def functionals(self, x):
+    def functionals(self, x: Array) -> Array:
         """Functionals of the underlying problem."""
         return self.base.functionals(x[: self.base.size])
 
-    def carrier(self, other):
+    def carrier(self, other: Any) -> Carrier:
         """Carries the unknowns of the underlying system, and what follows them."""
         inside, size = self.base.carrier(other.base), self.base.size
         return lambda x: np.concatenate([inside(x[:size]), x[size:]])
 
-    def refined(self):
+    @abstractmethod
+    def _stale(self, x: Array) -> bool:
+        """Whether the borders no longer fit."""
+
+    def refined(self) -> tuple[_Extended, Carrier] | None:
         """The extended system on every interval halved."""
         return self._on(self.base.refined())
 
-    def adapted(self, x, control):
+    def adapted(self, x: Array, control: MeshControl) -> tuple[_Extended, Carrier] | None:
         """The extended system on a better mesh, or with new borders where the old ones no longer fit; its carrier."""
         changed = self.base.adapted(x[: self.base.size], control)
         if changed is None and self._stale(x):
             changed = self.base, np.array
         return self._on(changed, x)
 
-    def _on(self, changed, x=None):
+    def _on(self, changed: tuple[System, Carrier] | None, x: Array | None = None) -> tuple[_Extended, Carrier] | None:
         if changed is None:
             return None
         other = type(self)(changed[0], None)
@@ -89,10 +108,27 @@ class _Extended:
 class _Statement:
     """The statement behind an extended system, as the loop asks for it."""
 
-    problem: object
+    problem: Statement
     free_size: int
-    parameters = property(lambda self: self.problem.parameters)
-    functionals = property(lambda self: self.problem.functionals)
+
+    @property
+    def states(self) -> Any:
+        """Names of the states."""
+        return self.problem.states
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Those of the problem."""
+        return self.problem.parameters
+
+    @property
+    def functionals(self) -> Mapping[str, Function]:
+        """Those of the problem."""
+        return self.problem.functionals
+
+    def batch(self, name: str) -> Batch:
+        """Those of the problem."""
+        return self.problem.batch(name)
 
 
 class FoldCurve(_Extended):
@@ -101,18 +137,18 @@ class FoldCurve(_Extended):
     ``base`` has one free parameter more than a curve of solutions needs; its ``free[primary]`` is the one of the folds.
     """
 
-    def __init__(self, base, borders=None, primary: int = 0):
+    def __init__(self, base: System, borders: tuple[Array, Array] | None = None, primary: int = 0) -> None:
         super().__init__(base, borders)
         self.equations = base.equations + 1
         self._held = [base.state_size + primary, base.size - 1]
 
-    def _on(self, changed, x=None):
+    def _on(self, changed: tuple[System, Carrier] | None, x: Array | None = None) -> tuple[_Extended, Carrier] | None:
         found = super()._on(changed, x)
         if found is not None:
             found[0]._held = [found[0].base.state_size + self._held[0] - self.state_size, found[0].base.size - 1]
         return found
 
-    def _null(self, x):
+    def _null(self, x: Array) -> tuple[Array, Array, float]:
         """v (size,), w (equations of F,), g, from the bordered matrix; borders are made of v and w when there are none."""
         base = self.base
         held = np.zeros((2, base.size + 1))
@@ -132,24 +168,27 @@ class FoldCurve(_Extended):
                 self.borders = (b, c)
         return v, w, g
 
-    def _stale(self, x) -> bool:
+    def _stale(self, x: Array) -> bool:
         """Whether the null vectors have turned away from the borders."""
         v, w, _ = self._null(x)
         b, c = self.borders
         root = np.sqrt(self.base.weights)
         return min(_cosine(c / root, v * root), _cosine(b, w)) < _FITS
 
-    def residual(self, x):
+    def residual(self, x: Array) -> Array:
         """F and g."""
         return np.append(self.base.residual(x), self._null(x)[2])
 
-    def _gradient(self, x, v, w):
+    def _gradient(self, x: Array, v: Array, w: Array) -> Array:
         """dg/dx, shape (size,)."""
         h = 1e-5 / max(np.abs(v).max(), 1e-300)
         change = self.base.transposed_product(x + h * v, w) - self.base.transposed_product(x - h * v, w)
-        return -change / (2 * h)
+        gradient: Array = -change / (2 * h)
+        return gradient
 
-    def linearize(self, x, rows=(), columns=()):
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
         """As the interface asks; the row of g comes first among the border rows."""
         v, w, g = self._null(x)
         extra = len(columns)
@@ -159,14 +198,14 @@ class FoldCurve(_Extended):
         residual, factors = self.base.linearize(x, np.vstack([row, rows]), columns[:, :-1])
         return np.append(residual, g), factors
 
-    def monitors(self):
+    def monitors(self) -> list[Monitor]:
         """Codimension two: cusps (w.F_zz v v = 0), and where the fold meets a branch point (w.F_lambda = 0)."""
 
-        def cusp(trial):
+        def cusp(trial: Any) -> float:
             v, w, _ = trial.system._null(trial.x)
             return float(trial.system._gradient(trial.x, v, w) @ v)
 
-        def crossing(trial):
+        def crossing(trial: Any) -> float:
             _, w, _ = trial.system._null(trial.x)
             return float(trial.system.base.transposed_product(trial.x, w)[trial.system._held[0]])
 
@@ -179,35 +218,37 @@ class BranchPointCurve(_Extended):
     ``base`` has one free parameter more than a curve of solutions needs; that last one is the second parameter.
     """
 
-    def __init__(self, base, borders=None):
+    def __init__(self, base: System, borders: tuple[Array, Array] | None = None) -> None:
         super().__init__(base, borders)
         self.size = base.size + 1
         self.equations = base.equations + 2
         self.weights = np.append(base.weights, 1.0)
 
-    def _narrow(self, x):
+    def _narrow(self, x: Array) -> tuple[System, Array]:
         """The system with the second parameter held, and its x."""
         return self.base.with_free(self.base.free[:-1], x[: self.base.size])
 
-    def _matrix(self, x):
+    def _matrix(self, x: Array) -> tuple[System, Array, _Bordered]:
         system, inside = self._narrow(x)
         if self.borders is None:
             found = locate_branch_point(system, inside)
             self.borders = (found.kernel, found.left)
         return system, inside, _Bordered(system, inside, *self.borders)
 
-    def _stale(self, x) -> bool:
+    def _stale(self, x: Array) -> bool:
         """Whether kernel and left null vector have turned away from the borders."""
         system, _, matrix = self._matrix(x)
         longest = max(np.sqrt((system.weights * v) @ v) for v in matrix.kernel)  # 1 where the kernel lies along its border
-        return min(1 / longest, _cosine(self.borders[1], _left(matrix, self.base.equations))) < _FITS
+        return bool(min(1 / longest, _cosine(self.borders[1], _left(matrix, self.base.equations))) < _FITS)
 
-    def residual(self, x):
+    def residual(self, x: Array) -> Array:
         """F + beta psi, and g."""
         system, inside, matrix = self._matrix(x)
         return np.concatenate([system.residual(inside) + x[-1] * self.borders[1], matrix.g])
 
-    def linearize(self, x, rows=(), columns=()):
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
         """As the interface asks; the gradients of g by differences of transposed products."""
         base, inside_size = self.base, self.base.size
         _, _, matrix = self._matrix(x)
@@ -227,19 +268,19 @@ class BranchPointCurve(_Extended):
         residual, factors = base.linearize(x[:inside_size], np.vstack([top, rows]), np.vstack([psi, columns[:, :-2]]))
         return np.concatenate([residual + x[-1] * psi, matrix.g]), factors
 
-    def monitors(self):
+    def monitors(self) -> list[Monitor]:
         """None."""
         return []
 
 
-def _left(matrix, equations):
+def _left(matrix: _Bordered, equations: int) -> Array:
     """The w of the transposed bordered matrix, scaled so that dg = -w.F_xy v."""
     unit = np.zeros(matrix.rows.shape[1])
     unit[-1] = 1.0
     return matrix.factors.solve_transposed(unit)[:equations]
 
 
-def curve(start: Point, second: str, settings: Settings | None = None, **options) -> Branch:
+def curve(start: Point, second: str, settings: Settings | None = None, **options: Any) -> Branch:
     """The curve of folds, or of branch points, through one, in its primary parameter and a second one.
 
     Parameters
@@ -264,7 +305,7 @@ def curve(start: Point, second: str, settings: Settings | None = None, **options
     """
     _checks.instance("start", start, Point, "a Point")
     _checks.instance("second", second, str, "a name")
-    system = start.system
+    system = system_of(start, "start")
     if second in system.free or second not in system.problem.parameters:
         raise ProblemError(f"second: {second!r} must be a parameter that is not free ({', '.join(system.problem.parameters)})")
     options.setdefault("primary", second)
@@ -272,7 +313,8 @@ def curve(start: Point, second: str, settings: Settings | None = None, **options
     settings = settings_with(settings, options)
     base, x = system.with_free((*system.free, second), start.x)
     if isinstance(start.details, BranchPoint):
-        extended, x = BranchPointCurve(base), np.append(x, 0.0)
+        extended: _Extended = BranchPointCurve(base)
+        x = np.append(x, 0.0)
     elif start.label == "LP":
         extended = FoldCurve(base, primary=system.free.index(start.name))
     else:

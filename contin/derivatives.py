@@ -7,11 +7,12 @@ import inspect
 import math
 import types
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from contin._cache import cache_directory, write_source
 
 
-def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[..., tuple]:
+def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[..., tuple[float, ...]]:
     """The function that returns (value, derivatives ``by`` these arguments), with the arguments of ``function``.
 
     ``function`` is written with arithmetic and functions of ``math``; sympy differentiates it, and common subexpressions
@@ -27,12 +28,13 @@ def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[...,
     except OSError:
         source = _derive(function, arguments, by)
         write_source(path.name, source)
-    scope = {"math": math, "__name__": function.__module__}
+    scope: dict[str, Any] = {"math": math, "__name__": function.__module__}
     exec(compile(source, f"<gradient of {function.__qualname__}>", "exec"), scope)
-    return scope["derived"]
+    derived: Callable[..., tuple[float, ...]] = scope["derived"]
+    return derived
 
 
-def _derive(function, arguments, by) -> str:
+def _derive(function: Callable[..., Any], arguments: Sequence[str], by: Sequence[str]) -> str:
     import sympy
 
     scope = {**function.__globals__, "math": sympy, **{n: getattr(sympy, n) for n in ("sqrt", "exp", "log", "sin", "cos")}}

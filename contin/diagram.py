@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from contin import _checks
 from contin.arclength import Continuation
 from contin.branch import Branch, Point, Stop
 from contin.errors import ConvergenceError
+from contin.interface import Array, Discretization
 from contin.settings import Settings, settings_with
 from contin.switching import BranchPoint, inner
+from contin.system import system_of
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -40,7 +43,7 @@ class Diagram:
     branches: list[Branch] = field(default_factory=list)
     junctions: list[Junction] = field(default_factory=list)
 
-    def graph(self):
+    def graph(self) -> Any:
         """The diagram as a ``networkx.MultiGraph``.
 
         Nodes are special points (attributes: label, name, parameters and functionals), shared where branches meet; edges are
@@ -66,7 +69,7 @@ class Diagram:
                 last, since = node, [place]
         return graph
 
-    def _node(self, point):
+    def _node(self, point: Point) -> str | None:
         for number, junction in enumerate(self.junctions):
             if any(point is other for other in (junction.point, *junction.also)):
                 return f"BP{number}"
@@ -80,12 +83,12 @@ def _values(point: Point) -> dict[str, float]:
 class _Explorer:
     """The work of :func:`diagram`."""
 
-    def __init__(self, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float):
+    def __init__(self, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float) -> None:
         self.settings, self.tolerance = settings, tolerance
         self.symmetries = [lambda t, u: u, *symmetries]
         self.result = Diagram()
 
-    def run(self, system, x, depth: int) -> Diagram:
+    def run(self, system: Discretization, x: Array, depth: int) -> Diagram:
         """Follow both ways from the start, then leave every junction of less than ``depth``."""
         for direction in (1, -1):
             settings = dataclasses.replace(self.settings, direction=direction)
@@ -102,7 +105,7 @@ class _Explorer:
                         self._leave(junction, which, way, tangent)
         return self.result
 
-    def _leave(self, junction, which, way, tangent):
+    def _leave(self, junction: Junction, which: int, way: int, tangent: Array) -> None:
         point, number = junction.point, len(self.result.branches)
         for place, side in ((which, way), *self._images(point, way * tangent)):
             junction.taken[place].setdefault(side, number)
@@ -111,7 +114,7 @@ class _Explorer:
         except ConvergenceError as error:
             junction.failed.append((which, way, str(error)))
 
-    def _follow(self, run: Continuation, depth: int, origin: Junction | None = None):
+    def _follow(self, run: Continuation, depth: int, origin: Junction | None = None) -> None:
         """One run, watched: at a junction that it comes to, what it passed through counts as taken; known ground ends it."""
         number, branch = len(self.result.branches), Branch()
         self.result.branches.append(branch)
@@ -141,7 +144,7 @@ class _Explorer:
         self.result.junctions.append(Junction(point, depth, [ahead, *({} for _ in point.details.tangents[1:])]))
         return False
 
-    def _match(self, known: Point, point: Point):
+    def _match(self, known: Point, point: Point) -> tuple[int, int] | None:
         """(tangent, way) of a known junction along which ``point``'s own branch goes, if they are one point up to symmetry."""
         a, b = known.system, point.system
         scale = 1 + np.abs(point.x[b.state_size :])
@@ -160,7 +163,7 @@ class _Explorer:
             return which, int(np.sign(cosines[which]) or 1)
         return None
 
-    def _images(self, point: Point, direction):
+    def _images(self, point: Point, direction: Array) -> list[tuple[int, int]]:
         """(tangent, way) of the half-branches at ``point`` that are images of the one along ``direction``."""
         system, result = point.system, []
         for symmetry in self.symmetries:
@@ -174,14 +177,14 @@ class _Explorer:
         return result
 
     @staticmethod
-    def _image(system, symmetry, x):
+    def _image(system: Discretization, symmetry: Symmetry, x: Array) -> Array:
         states = symmetry(system.nodes, system.states(x).copy())
         return np.concatenate([np.asarray(states).ravel(), x[system.state_size :]])
 
 
 def diagram(
     start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
-    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, **options,
+    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, **options: Any,
 ) -> Diagram:  # fmt: skip
     """Every branch that can be reached from a solution by leaving branch points, to a given depth.
 
@@ -211,5 +214,7 @@ def diagram(
     for symmetry in _checks.sequence("symmetries", symmetries, "functions"):
         _checks.function("symmetries", symmetry)
     settings = settings_with(settings, options)
-    system, x = (start.system, start.x) if free is None else start.system.with_free(_checks.names("free", free), start.x)
+    system, x = (
+        (start.system, start.x) if free is None else system_of(start, "start").with_free(_checks.names("free", free), start.x)
+    )
     return _Explorer(settings, symmetries, tolerance).run(system, x, depth)

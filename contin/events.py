@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from contin.errors import ConvergenceError
+from contin.interface import Array, ComplexArray, Discretization, Factors, Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +59,24 @@ class Trial:
     the way here.
     """
 
-    def __init__(self, system, x, tangent, sign, iterations=0, newton_error=0.0, factors=None, exact=False):
-        self.factors, self.exact, self.passed, self.crossing = factors, exact, 0, None
+    def __init__(
+        self,
+        system: Discretization,
+        x: Array,
+        tangent: Array,
+        sign: float,
+        iterations: int = 0,
+        newton_error: float = 0.0,
+        factors: Factors | None = None,
+        exact: bool = False,
+    ) -> None:
+        self.factors: Any = factors
+        self.exact, self.passed = exact, 0
+        self.crossing: Any = None
         self.system, self.x, self.tangent, self.sign = system, x, tangent, sign
         self.iterations, self.newton_error = iterations, newton_error
-        self._functionals, self._values = None, {}
+        self._functionals: dict[str, float] | None = None
+        self._values: dict[Monitor, float] = {}
 
     def value(self, monitor: Monitor) -> float:
         """The monitor's value here, computed once: a point that two steps share has one value for both."""
@@ -108,41 +123,44 @@ def hopf() -> Monitor:
     that passes zero by one. Details are the frequency of the pair.
     """
 
-    def sums(trial):
-        values = trial.system.eigenvalues(trial.x)
+    def sums(trial: Trial) -> tuple[ComplexArray, ComplexArray, Indices]:
+        system: Any = trial.system  # one with eigenvalues
+        values = system.eigenvalues(trial.x)
         i, j = np.triu_indices(len(values), 1)
         return values, values[i] + values[j], i
 
-    def function(trial):
+    def function(trial: Trial) -> float:
         values, pairs, _ = sums(trial)
         if not pairs.size:
             return 1.0
         negative = np.count_nonzero((pairs.imag == 0) & (pairs.real < 0))
         return float((-1.0) ** negative * np.abs(pairs).min())
 
-    def frequency(trial):
+    def frequency(trial: Trial) -> float:
         values, pairs, i = sums(trial)
         return float(abs(values[i[np.argmin(np.abs(pairs))]].imag))
 
-    def complex_pair(trial):
+    def complex_pair(trial: Trial) -> bool:
         return frequency(trial) > 1e-8
 
-    def unstable(trial):
-        return np.count_nonzero(trial.system.eigenvalues(trial.x).real > 0)
+    def unstable(trial: Trial) -> int:
+        return int(np.count_nonzero(sums(trial)[0].real > 0))
 
-    def several(before, after):
+    def several(before: Trial, after: Trial) -> bool:
         change = abs(unstable(after) - unstable(before))
         return change > 3 or (change > 1 and function(before) * function(after) > 0)
 
-    describe = {"confirm": complex_pair, "describe": lambda trial: {"frequency": frequency(trial)}}
-    return Monitor("HB", "Hopf", function, several=several, **describe)
+    def describe(trial: Trial) -> dict[str, float]:
+        return {"frequency": frequency(trial)}
+
+    return Monitor("HB", "Hopf", function, confirm=complex_pair, describe=describe, several=several)
 
 
 #: Steps up to so many tolerances may be round-off.
 _IDLE = 1e3
 
 
-def find_zero(function: Callable[[float], float], a, fa, b, fb, tolerance) -> float:
+def find_zero(function: Callable[[float], float], a: float, fa: float, b: float, fb: float, tolerance: float) -> float:
     """A zero of ``function`` between a and b, where its values fa and fb differ in sign.
 
     The secant method, kept inside the bracket by the Anderson-Björck rule; ends when the step is below ``tolerance``, or when

@@ -6,13 +6,16 @@ import contextlib
 import dataclasses
 import functools
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from contin.branch import Stop
 from contin.errors import ConvergenceError
 from contin.events import Monitor, Trial, find_zero, sign_changed
+from contin.interface import Array, Carrier, Discretization, Factors
 from contin.settings import Settings
 from contin.steps import State, corrected
 from contin.switching import BranchPoint, MultiplePoint, along, inner, locate_branch_point, smallest_directions
@@ -42,6 +45,11 @@ _PARTS, _CUTS = 4, 20
 #: How far outside a step a branch point may be found that changes the determinant's sign inside it (as a part of the step).
 _OUTSIDE = 1e-6
 
+#: The first point of a run: system, x, tangent.
+Start = tuple[Discretization, Array, Array]
+#: Where on a step: the distance along the state's tangent, and the point.
+Place = tuple[float, Trial]
+
 
 @dataclass(frozen=True, eq=False)
 class Event:
@@ -52,7 +60,7 @@ class Event:
     name: str
     trial: Trial
     stop: Stop | None = None
-    details: object = None
+    details: Any = None
     monitor: Monitor | None = None
 
 
@@ -75,11 +83,22 @@ class Segment:
         What vanishes where the primary parameter, its name, turns round.
     """
 
-    def __init__(self, state, before, low, trial, step, settings, start, fold=None):
+    def __init__(
+        self,
+        state: State,
+        before: Trial,
+        low: float,
+        trial: Trial,
+        step: float,
+        settings: Settings,
+        start: Start,
+        fold: Monitor | None = None,
+    ) -> None:
         self.state, self.before, self.low, self.trial, self.step = state, before, low, trial, step
-        self.settings, self.start, self.fold = settings, start, fold
+        self.settings, self.start = settings, start
+        self.fold: Any = fold
 
-    def events(self, monitors) -> list[Event]:
+    def events(self, monitors: Iterable[Monitor]) -> list[Event]:
         """What happens in the step, in order."""
         found, state, trial = [], self.state, self.trial
         home = None if state.singular else self._returned()
@@ -102,11 +121,11 @@ class Segment:
         """Whether an event is the first point of the run once more."""
         return self.state.accepted == 0 and event.stop is None and event.at < _AT_START * self.step
 
-    def _at(self, at) -> Trial:
+    def _at(self, at: float) -> Trial:
         """The point of the curve at this place along the state's tangent, with its exact tangent and factors."""
         return corrected(self.state, self._between(at), at, self.settings.newton, exact=True)
 
-    def _between(self, at):
+    def _between(self, at: float) -> Array:
         """A guess on the curve by the cubic through both ends and their tangents."""
         state, trial, step = self.state, self.trial, self.step
         s = at / step
@@ -120,7 +139,7 @@ class Segment:
         """Places inside the step where the primary parameter turns round, in order."""
         return [] if self.fold is None else self._turns_between((self.low, self.before), (self.step, self.trial))
 
-    def _turns_between(self, left, right) -> list[Event]:
+    def _turns_between(self, left: Place, right: Place) -> list[Event]:
         """Turns between two places (s, trial): where the tangent's component changes sign, once or, in a dip, twice."""
         ends = [trial.value(self.fold) for _, trial in (left, right)]
         if max(map(abs, ends)) < _ROUND_OFF:
@@ -144,7 +163,7 @@ class Segment:
         """Rate of the primary parameter along the state's tangent."""
         return trial.value(self.fold) / inner(self.state.system, self.state.tangent, trial.tangent)
 
-    def _dip(self, left, right):
+    def _dip(self, left: Place, right: Place) -> Place | None:
         """A place (s, trial) between two of equal slopes where the slope has the other sign; None if there is none.
 
         The smallest slope is looked for, where there is reason to, by parabolas through three places so close together that the
@@ -176,7 +195,7 @@ class Segment:
             place = (s, self._at(s)) if left[0] < s < right[0] else None
         return None
 
-    def _suspect(self, left, right, sense):
+    def _suspect(self, left: Place, right: Place, sense: float) -> tuple[Place | None, float]:
         """A place (s, trial) between two where the slope could come near zero, or None, and half its second derivative.
 
         Slopes at both ends and the mean slope between them, from the parameter itself, make a parabola: its vertex. Where that
@@ -224,7 +243,7 @@ class Segment:
                 break
         return found
 
-    def _knots(self, monitor: Monitor) -> list:
+    def _knots(self, monitor: Monitor) -> list[Place]:
         """The places (s, trial) between which a monitor has one zero at most, as far as can be told."""
         state = self.state
         first = Trial(state.system, state.x, state.tangent, state.sign) if state.singular else self.before
@@ -243,17 +262,17 @@ class Segment:
             knots = sorted([*knots, *((s, self._near(s)) for s in middles)], key=lambda knot: knot[0])
         return knots
 
-    def _guess(self, at) -> Trial:
+    def _guess(self, at: float) -> Trial:
         return Trial(self.state.system, self._between(at), self.state.tangent, np.nan)
 
-    def _near(self, at) -> Trial:
+    def _near(self, at: float) -> Trial:
         """The point of the curve at a place or, where Newton fails (close to a singular one), the guess."""
         try:
             return self._at(at)
         except ConvergenceError:
             return self._guess(at)
 
-    def _locate(self, monitor: Monitor, left, right) -> Event:
+    def _locate(self, monitor: Monitor, left: Place, right: Place) -> Event:
         """The zero of a monitor between two places (s, trial); where location fails, the further one, named "possible"."""
         (a, first), (b, last) = left, right
         ends, name = (first.value(monitor), last.value(monitor)), monitor.name
@@ -275,7 +294,8 @@ class Segment:
         """The branch point inside the step, located once."""
         if self.trial.crossing is None:
             self.trial.crossing = self._branch_point()
-        return self.trial.crossing
+        crossing: Event = self.trial.crossing
+        return crossing
 
     def _branch_point(self) -> Event:
         """The branch point inside a step, its bracket halved until the locator's answer lies inside it."""
@@ -301,13 +321,13 @@ class Segment:
             low, high = (middle, high) if sign == self.before.sign else (low, middle)
         return Event(high, "BP", "possible", trial)
 
-    def _multiple_point(self):
+    def _multiple_point(self) -> Event:
         """Where two or more singular values pass zero together: the zero of their mean, with the kernel."""
         state, trial, step = self.state, self.trial, self.step
         system = state.system
         right, left, _ = smallest_directions(trial.factors, system.size)
 
-        def mean(factors):
+        def mean(factors: Factors) -> float:
             response = right @ factors.solve(left).T
             values = np.linalg.eigvals(np.linalg.inv(response))
             return float(np.sort_complex(values[np.argsort(np.abs(values))[:2]]).real.mean())
@@ -317,7 +337,7 @@ class Segment:
             ends = mean(self.before.factors), mean(trial.factors)
             if sign_changed(*ends):
 
-                def inside(s):
+                def inside(s: float) -> float:
                     return mean(self._at(s).factors)
 
                 at = find_zero(inside, self.low, ends[0], step, ends[1], 1e-9 * step)
@@ -328,7 +348,7 @@ class Segment:
         kernel = u[:, :dimension].T @ right
         return Event(at, "BP", f"kernel of dimension {dimension}", there, details=MultiplePoint(dimension, kernel))
 
-    def _returned(self):
+    def _returned(self) -> Event | None:
         """The end of a branch on the trivial one, where ``settings.trivial`` passes zero."""
         before, trial = self.before, self.trial
         name = self.settings.trivial
@@ -341,7 +361,7 @@ class Segment:
             event = self._locate(monitor, (0.0, before), (self.step, trial))
         return dataclasses.replace(event, label="EP", name="trivial branch", stop=stop)
 
-    def _closed(self):
+    def _closed(self) -> Event | None:
         """The end of a branch that comes back to its first point."""
         state, trial, step = self.state, self.trial, self.step
         home, x, tangent = self.start
@@ -380,7 +400,9 @@ def _same_place(event: Event, found: list[Event], step: float) -> bool:
 # --- how well the mesh resolves a point -----------------------------------------------------------------------------
 
 
-def refined(label: str, trial: Trial, details, monitor: Monitor | None, settings: Settings):
+def refined(
+    label: str, trial: Trial, details: Any, monitor: Monitor | None, settings: Settings
+) -> tuple[Trial, dict[str, float], Any]:
     """The same special point on a mesh halved until its free parameters agree to the mesh tolerance.
 
     Without a mesh the point is found once more from where it is: what then changes is the error of its location. A point that
@@ -422,7 +444,9 @@ def refined(label: str, trial: Trial, details, monitor: Monitor | None, settings
     return trial, errors, details
 
 
-def _branch_point_again(system, carry, trial: Trial, details: BranchPoint | None, settings: Settings):
+def _branch_point_again(
+    system: Discretization, carry: Carrier, trial: Trial, details: BranchPoint | None, settings: Settings
+) -> tuple[Trial, BranchPoint]:
     """The branch point with the same kernel on another mesh, and its details; the nearest one where none are known."""
     if details is None:
         found = locate_branch_point(system, carry(trial.x), settings.newton)
@@ -437,12 +461,12 @@ def _branch_point_again(system, carry, trial: Trial, details: BranchPoint | None
     return Trial(system, found.x, carry(trial.tangent), np.nan), found
 
 
-def _again(system, x, tangent, monitor: Monitor | None, settings: Settings) -> Trial:
+def _again(system: Discretization, x: Array, tangent: Array, monitor: Monitor | None, settings: Settings) -> Trial:
     """The zero of a monitor near x on another mesh, by the secant method along the tangent; without one, x corrected."""
     tangent = tangent / np.sqrt(inner(system, tangent, tangent))
     state = State(system, x, tangent, None, 1.0, 1.0, 1.0, 0.0, 0, False)
 
-    def at(s):
+    def at(s: float) -> Trial:
         return corrected(state, x + s * tangent, s, settings.newton, exact=True)
 
     trial = at(0.0)

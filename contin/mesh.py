@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin import _checks
 from contin.errors import ProblemError
+from contin.interface import Array
+
+if TYPE_CHECKING:
+    from contin.collocation import Collocation
 
 #: More intervals than any machine has room for.
 MOST_INTERVALS = 1_000_000
@@ -33,7 +38,7 @@ class MeshControl:
     max_intervals: int = 2000
     every: int = 3
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _checks.number("mesh tolerance", self.tolerance, 0, 1)
         _checks.whole("min_intervals", self.min_intervals, 1, MOST_INTERVALS)
         _checks.whole("max_intervals", self.max_intervals, 1, MOST_INTERVALS)
@@ -42,7 +47,7 @@ class MeshControl:
         _checks.whole("every", self.every, 0, 1_000_000)
 
 
-def density(system, x):
+def density(system: Collocation, x: Array) -> Array:
     """The (d+1)-th root of the size of the (d+1)-th derivative, by interval, shape (N,).
 
     The derivative comes from differences of the d-th ones of neighbouring intervals (de Boor 1973, as in AUTO and COLSYS),
@@ -58,10 +63,11 @@ def density(system, x):
     both = np.empty((2, h.size))
     both[0, 1:], both[1, :-1] = jumps, jumps
     both[0, 0], both[1, -1] = jumps[0], jumps[-1]
-    return both.max(axis=0) ** (1 / (d + 1))
+    result: Array = both.max(axis=0) ** (1 / (d + 1))
+    return result
 
 
-def adapted_mesh(system, x, control: MeshControl):
+def adapted_mesh(system: Collocation, x: Array, control: MeshControl) -> Array | None:
     """A better mesh for the solution x, or None where the present one is good enough.
 
     It equidistributes the monitor (smoothed, and raised to at least a tenth of its mean so that no interval grows without
@@ -82,6 +88,6 @@ def adapted_mesh(system, x, control: MeshControl):
     if not total > 0:
         return np.linspace(system.mesh[0], system.mesh[-1], intervals + 1)
     share = np.concatenate([[0.0], np.cumsum(phi * h)]) / total
-    mesh = np.interp(np.linspace(0, 1, intervals + 1), share, system.mesh)
+    mesh: Array = np.interp(np.linspace(0, 1, intervals + 1), share, system.mesh)
     mesh[0], mesh[-1] = system.mesh[0], system.mesh[-1]
     return mesh

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import cast
 
 from contin import _checks
 from contin.compilation import Batch, argument_count, check_statement, outputs
 from contin.errors import ProblemError
+from contin.interface import Function
 
+#: Names of the arguments of a function that are named tuples; None for one that is a number.
+_Arguments = Sequence[tuple[str, ...] | None]
 _MOST_CONDITIONS = 100_000
 
 
@@ -49,15 +53,17 @@ class BoundaryValueProblem:
     A curve needs n_bc + n_int - n + 1 free parameters, an isolated solution one fewer.
     """
 
-    rhs: Callable
-    boundary: Callable
+    rhs: Function
+    boundary: Function
     states: Sequence[str] | int
     parameters: Mapping[str, float]
-    integrals: Callable | None = None
+    integrals: Function | None = None
     domain: tuple[float, float] = (0.0, 1.0)
-    functionals: Mapping[str, Callable] = field(default_factory=dict)
+    functionals: Mapping[str, Function] = field(default_factory=dict)
     boundary_count: int | None = None
     integral_count: int | None = None
+    _counts: dict[str, int] = field(init=False, repr=False)
+    _batches: dict[str, Batch] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
@@ -65,7 +71,7 @@ class BoundaryValueProblem:
         numbers = len(ends) == 2 and all(_checks.is_number(end) and math.isfinite(end) for end in ends)
         if not (numbers and ends[0] < ends[1]):
             raise ProblemError(f"domain: {_checks.shown(self.domain)} must be two finite numbers, the first the smaller")
-        p, u = tuple(self.parameters), self.states
+        p, u = tuple(self.parameters), self.state_names
         counts = {
             "rhs": self._count("rhs", self.rhs, (None, u, p), len(u)),
             "boundary": self._count("boundary", self.boundary, (u, u, p), self.boundary_count),
@@ -77,10 +83,10 @@ class BoundaryValueProblem:
         object.__setattr__(self, "_batches", {})
 
     @staticmethod
-    def _count(name, function, arguments, given):
+    def _count(name: str, function: Function | None, arguments: _Arguments, given: int | None) -> int:
         if function is None and name == "integrals":
             return 0
-        _checks.function(name, function)
+        function = _checks.function(name, function)
         expected = len(arguments)
         if (found := argument_count(function)) not in (expected, expected + 1):
             raise ProblemError(f"{name} takes {found} arguments, must take {expected} (or {expected + 1}, to fill the last)")
@@ -90,6 +96,11 @@ class BoundaryValueProblem:
             _checks.whole(f"{name.rstrip('s')}_count", given, 1, _MOST_CONDITIONS)
             return given
         return max(outputs(function, arguments, name), 1)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states: ``states``, also where a number was given."""
+        return cast(tuple[str, ...], self.states)
 
     @property
     def boundary_size(self) -> int:
@@ -104,7 +115,7 @@ class BoundaryValueProblem:
     @property
     def free_size(self) -> int:
         """Number of free parameters on a curve of solutions: n_bc + n_int - n + 1."""
-        return self.boundary_size + self.integral_size - len(self.states) + 1
+        return self.boundary_size + self.integral_size - len(self.state_names) + 1
 
     def batch(self, name: str) -> Batch:
         """The compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked."""
@@ -113,7 +124,7 @@ class BoundaryValueProblem:
         return self._batches[name]
 
     def _compile(self, name: str) -> Batch:
-        p, u = tuple(self.parameters), self.states
+        p, u = tuple(self.parameters), self.state_names
         if name == "boundary":
             return Batch([self.boundary], [self._shape(self.boundary, (u, u, p), self.boundary_size)], u, p, ends=True)
         if name == "functionals":
@@ -126,7 +137,7 @@ class BoundaryValueProblem:
         return Batch(functions, [self._shape(f, (None, u, p), size) for f, size in zip(functions, sizes)], u, p)
 
     @staticmethod
-    def _shape(function, arguments, size):
+    def _shape(function: Function, arguments: _Arguments, size: int) -> int:
         """The size as a Batch wants it: 0 for a function that returns a bare number."""
         if size > 1 or argument_count(function) == len(arguments) + 1:
             return size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,11 +11,16 @@ from contin import _checks
 from contin.branch import Point
 from contin.errors import ProblemError
 from contin.events import Trial
+from contin.interface import Array
 from contin.switching import BranchPoint, _Bordered, _hessian
+from contin.system import system_of
+
+if TYPE_CHECKING:
+    from contin.system import System
 
 
 def sensitivities(
-    point: Point, by: Sequence[str] | None = None, held: str | Callable | None = None
+    point: Point, by: Sequence[str] | None = None, held: str | Callable[[Trial], float] | None = None
 ) -> dict[str, dict[str, float]]:
     """Derivatives of the free parameters at a special point with respect to every other parameter.
 
@@ -41,7 +47,7 @@ def sensitivities(
         A name that is not a parameter that is held fixed on the branch.
     """
     _checks.instance("point", point, Point, "a Point")
-    system = point.system
+    system = system_of(point, "point")
     others = [name for name in system.problem.parameters if name not in system.free]
     by = others if by is None else list(_checks.names("by", by))
     for name in by:
@@ -59,7 +65,7 @@ def sensitivities(
     return {name: _held(point, name, held) for name in by}
 
 
-def _of_fold(point, wide, x, by):
+def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[str, dict[str, float]]:
     """-(w.F_mu) / (w.F_lambda) for all mu at once."""
     system, primary = point.system, point.name
     unit = np.zeros(system.size)
@@ -72,30 +78,30 @@ def _of_fold(point, wide, x, by):
     return {name: {primary: float(-at[name] / at[primary])} for name in by}
 
 
-def _response(point, name):
+def _response(point: Point, name: str) -> Array:
     """How x changes with a parameter at a fixed place along the tangent, shape (size,)."""
-    system = point.system
+    system = system_of(point, "point")
     column = system.parameter_columns(point.x, (name,))[:, 0]
     _, factors = system.linearize(point.x, (system.weights * point.tangent,))
     return factors.solve(np.append(-column, 0.0))
 
 
-def _slope(function):
+def _slope(function: Callable[[float], Any]) -> Any:
     """The derivative at 0 of a function of one number, by central differences of fourth order."""
     h = 1e-3
     return (8 * (function(h) - function(-h)) - (function(2 * h) - function(-2 * h))) / (12 * h)
 
 
-def _held(point, name, held):
+def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) -> dict[str, float]:
     """The response, moved along the branch until the held quantity is what it was."""
-    system = point.system
+    system = system_of(point, "point")
     if held is None:
         held = point.name.partition(" = ")[0] or system.free[0]
     measure = held if callable(held) else (lambda trial: trial[held])
     value = system.parameter(point.x, name)
     response = _response(point, name)
 
-    def measured(x, change=0.0):
+    def measured(x: Array, change: float = 0.0) -> float:
         return measure(Trial(system.with_parameters({name: value + change}), x, point.tangent, np.nan))
 
     across = _slope(lambda s: measured(point.x + s * response, s))
@@ -104,15 +110,15 @@ def _held(point, name, held):
     return dict(zip(system.free, map(float, moved[system.state_size :])))
 
 
-def _of_branch_point(point, name):
+def _of_branch_point(point: Point, name: str) -> dict[str, float]:
     """Both g of the locating equations stay zero: the particular response, corrected along the kernel by the Hessian."""
-    system, found = point.system, point.details
+    system, found = system_of(point, "point"), point.details
     matrix = _Bordered(system, point.x, found.kernel, found.left)
     column = system.parameter_columns(point.x, (name,))[:, 0]
     response = matrix.factors.solve(np.concatenate([-column, [0.0, 0.0]]))[:-1]
     value = system.parameter(point.x, name)
 
-    def gradient(s):
+    def gradient(s: float) -> Array:
         changed = system.with_parameters({name: value + s})
         return _Bordered(changed, point.x + s * response, found.kernel, found.left).g
 

@@ -68,7 +68,7 @@ class Settings:
     newton: Newton = field(default_factory=Newton)
     mesh: MeshControl = field(default_factory=MeshControl)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("primary", "trivial"):
             if getattr(self, name) is not None:
                 _checks.instance(name, getattr(self, name), str, "a name")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -14,12 +15,18 @@ from contin.collocation import DEGREES, Collocation
 from contin.corrector import Newton, correct
 from contin.errors import ConvergenceError, ProblemError
 from contin.events import Trial
+from contin.interface import Array, Discretization
 from contin.mesh import MOST_INTERVALS, MeshControl
 from contin.problem import BoundaryValueProblem
 from contin.settings import Settings, settings_with
 from contin.switching import BranchPoint, inner
+from contin.system import system_of
 
-Guess = Callable | Point | Sequence[float] | tuple[np.ndarray, np.ndarray] | None
+if TYPE_CHECKING:
+    from contin.corrector import Corrected
+    from contin.system import System
+
+Guess = Callable[[float], Any] | Point | Sequence[float] | tuple[Sequence[float] | Array, Any] | None
 
 
 def solve(
@@ -82,7 +89,7 @@ def solve(
     return point_of(system, done.x, done.iterations, done.error)
 
 
-def _parameters(values) -> dict[str, float]:
+def _parameters(values: Mapping[str, float] | None) -> dict[str, float]:
     """Values of parameters as a user gives them."""
     if values is None:
         return {}
@@ -91,7 +98,7 @@ def _parameters(values) -> dict[str, float]:
     return dict(values)
 
 
-def _numbers(values, count: int | None = None):
+def _numbers(values: Any, count: int | None = None) -> Array:
     """A guess as an array of numbers, shape (count,) where that is given."""
     try:
         array = np.asarray(values, dtype=float)
@@ -102,35 +109,49 @@ def _numbers(values, count: int | None = None):
     return array if count is None else array.ravel()
 
 
-def _first(problem, guess, parameters, free, intervals, degree):
+def _first(
+    problem: BoundaryValueProblem | AlgebraicProblem,
+    guess: Guess,
+    parameters: Mapping[str, float],
+    free: Sequence[str],
+    intervals: int,
+    degree: int,
+) -> tuple[System, Array]:
     """System and first guess."""
     if isinstance(problem, AlgebraicProblem):
-        system = Algebraic(problem, free, parameters)
-        states = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
-        states = np.zeros(system.state_size) if states is None else _numbers(states, system.state_size)
-        return system, system.pack(states, {**problem.parameters, **parameters})
+        equilibrium = Algebraic(problem, free, parameters)
+        given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
+        start = np.zeros(equilibrium.state_size) if given is None else _numbers(given, equilibrium.state_size)
+        return equilibrium, equilibrium.pack(start, {**problem.parameters, **parameters})
     a, b = problem.domain
     points = np.linspace(a, b, intervals + 1)
     if isinstance(guess, Point):
-        points, degree = guess.system.mesh, guess.system.degree
+        points, degree = _meshed(guess).mesh, guess.system.degree
     elif _is_pair(guess):
         given = _numbers(guess[0])
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a or not given[-1] >= b:
             raise ProblemError(f"guess: its t must increase and cover the domain {a:g} ... {b:g}")
     system = Collocation(problem, points, degree, free, parameters)
-    states = _sampled(guess, system.nodes, len(problem.states))
+    states = _sampled(guess, system.nodes, len(problem.state_names))
     return system, system.pack(states, {**problem.parameters, **parameters})
 
 
-def _is_pair(guess) -> bool:
+def _meshed(guess: Point) -> Collocation:
+    """The system of a guess that is a solution of a boundary value problem."""
+    if not isinstance(guess.system, Collocation):
+        raise ProblemError("guess: a Point must be a solution of a boundary value problem")
+    return guess.system
+
+
+def _is_pair(guess: Guess) -> TypeGuard[tuple[Any, Any]]:
     """Whether a guess is (t, states)."""
     return isinstance(guess, tuple) and len(guess) == 2 and isinstance(guess[0], (list, tuple, np.ndarray))
 
 
-def _sampled(guess, nodes, count):
+def _sampled(guess: Guess, nodes: Array, count: int) -> Array:
     """The states (K, count) of a guess at the nodes."""
     if isinstance(guess, Point):
-        states = guess.system.evaluate(guess.x, nodes)
+        states = _meshed(guess).evaluate(guess.x, nodes)
         if states.shape[1] != count:
             raise ProblemError(f"guess: a Point of {states.shape[1]} states for a problem of {count}")
         return states
@@ -141,16 +162,16 @@ def _sampled(guess, nodes, count):
             raise ProblemError(f"guess cannot be called: {type(error).__name__}: {error}") from error
         return np.array([_numbers(value, count) for value in values])
     if _is_pair(guess):
-        t, values = _numbers(guess[0]), _numbers(guess[1])
-        if values.size != len(t) * count:
-            raise ProblemError(f"guess: {values.size} numbers for {len(t)} places t and {count} states")
-        return np.stack([np.interp(nodes, t, column) for column in values.reshape(len(t), count).T], axis=1)
+        t, columns = _numbers(guess[0]), _numbers(guess[1])
+        if columns.size != len(t) * count:
+            raise ProblemError(f"guess: {columns.size} numbers for {len(t)} places t and {count} states")
+        return np.stack([np.interp(nodes, t, column) for column in columns.reshape(len(t), count).T], axis=1)
     if guess is None:
         raise ProblemError("guess: a boundary value problem needs one (a function of t, arrays, or numbers)")
     return np.tile(_numbers(guess, count), (len(nodes), 1))
 
 
-def point_of(system, x, iterations: int = 0, error: float = 0.0) -> Point:
+def point_of(system: Discretization, x: Array, iterations: int = 0, error: float = 0.0) -> Point:
     """A Point of any solution x of a system."""
     trial = Trial(system, x, np.full_like(x, np.nan), np.nan)
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
@@ -164,7 +185,7 @@ _SAME = 1e-6
 _STARTS = [(m, longest) for longest in (3.0, 1.0, 0.3) for m in (1.0, -1.0, 5.0, -5.0, 20.0, -20.0, 50.0, -50.0)]
 
 
-def _correct_away(system, x, others, newton: Newton):
+def _correct_away(system: Discretization, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
     """Newton on the deflated residual: a Newton step stretched so that known solutions repel."""
     known = [point.system.carrier(system)(point.x)[: system.state_size] for point in others]
     known = [np.append(states, x[system.state_size :]) for states in known]
@@ -182,7 +203,7 @@ def _correct_away(system, x, others, newton: Newton):
     raise ConvergenceError("no further solution was found from this guess; another guess may lead to one")
 
 
-def _wander(system, x, known, longest, max_iterations: int = 100):
+def _wander(system: Discretization, x: Array, known: list[Array], longest: float, max_iterations: int = 100) -> Array | None:
     """Where the deflated iteration from x converges, or None."""
     for _ in range(max_iterations):
         residual, factors = system.linearize(x)
@@ -203,7 +224,7 @@ def _wander(system, x, known, longest, max_iterations: int = 100):
 
 
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
-          **options) -> Branch:  # fmt: skip
+          **options: Any) -> Branch:  # fmt: skip
     """Follow the branch through a point, or away from a branch point, to its end.
 
     Parameters
@@ -226,7 +247,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     settings = settings_with(settings, options)
     system, x = start.system, start.x
     if free is not None and _checks.names("free", free) != system.free:
-        system, x = system.with_free(free, x)
+        system, x = system_of(start, "start").with_free(free, x)
     if branch is None:
         return follow(system, x, settings)
     _checks.whole("branch", branch, 0, 10)

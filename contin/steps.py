@@ -8,6 +8,7 @@ import numpy as np
 
 from contin.corrector import Newton, correct
 from contin.events import Trial
+from contin.interface import Array, Discretization, Factors
 from contin.switching import inner
 
 #: Share of the states in a tangent below which their direction says nothing.
@@ -24,10 +25,10 @@ class State:
     ``accepted`` counts the regular points; ``singular`` says that x is a branch point.
     """
 
-    system: object
-    x: np.ndarray
-    tangent: np.ndarray
-    previous_tangent: np.ndarray | None
+    system: Discretization
+    x: Array
+    tangent: Array
+    previous_tangent: Array | None
     previous_step: float
     step: float
     sign: float
@@ -36,13 +37,14 @@ class State:
     singular: bool
 
 
-def unit_tangent(system, factors):
+def unit_tangent(system: Discretization, factors: Factors) -> Array:
     """The unit vector along the curve, from factors of [F_x; row], with row.tangent > 0."""
     tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
-    return tangent / np.sqrt(inner(system, tangent, tangent))
+    unit: Array = tangent / np.sqrt(inner(system, tangent, tangent))
+    return unit
 
 
-def predict(state: State, step: float):
+def predict(state: State, step: float) -> Array:
     """Along the tangent, with the curvature known from the last step."""
     guess = state.x + step * state.tangent
     if state.previous_tangent is not None:
@@ -50,7 +52,7 @@ def predict(state: State, step: float):
     return guess
 
 
-def corrected(state: State, guess, step: float, newton: Newton, exact: bool = False) -> Trial:
+def corrected(state: State, guess: Array, step: float, newton: Newton, exact: bool = False) -> Trial:
     """The point of the curve at ``step`` along the state's tangent; ``exact``: with its own tangent taken right there.
 
     Raises
@@ -73,14 +75,15 @@ def sharpened(state: State, trial: Trial) -> Trial:
     return Trial(system, trial.x, tangent, factors.sign, trial.iterations, trial.newton_error, factors, exact=True)
 
 
-def tangent_error(trial: Trial, residual):
+def tangent_error(trial: Trial, residual: Array) -> Array:
     """About by how much a trial's tangent misses the one right at its x, where the residual is this: shape (size,).
 
     One step of iterative refinement, with the product of Jacobian and tangent by a difference.
     """
     system = trial.system
     bent = (system.residual(trial.x + _NEAR * trial.tangent) - residual) / _NEAR
-    return trial.factors.solve(np.append(bent, 0.0))
+    error: Array = trial.factors.solve(np.append(bent, 0.0))
+    return error
 
 
 def hidden_turn(state: State, trial: Trial) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from contin.algebraic import Algebraic, AlgebraicProblem
 from contin.branch import Branch, Point, Stop
 from contin.collocation import Collocation
 from contin.errors import ProblemError
+from contin.interface import Array
+from contin.problem import BoundaryValueProblem
 from contin.switching import BranchPoint
 
 _FORMAT = "contin branch 1"
@@ -32,8 +35,9 @@ def save(branch: Branch, path: str | Path) -> None:
     ProblemError
         Points of an extended system (:func:`contin.curve`), which cannot start other runs.
     """
-    systems: list = []
-    rows, arrays = [], {}
+    systems: list[Collocation | Algebraic] = []
+    rows: list[dict[str, Any]] = []
+    arrays: dict[str, Any] = {}
     for number, point in enumerate(branch.points):
         if not isinstance(point.system, (Collocation, Algebraic)):
             raise ProblemError("points of a curve in two parameters are not stored; keep their columns")
@@ -64,7 +68,7 @@ def save(branch: Branch, path: str | Path) -> None:
     write_bytes(Path(path), image.getvalue())
 
 
-def load(problem, path: str | Path) -> Branch:
+def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> Branch:
     """Read a branch back, as points of ``problem``.
 
     Raises
@@ -82,7 +86,7 @@ def load(problem, path: str | Path) -> Branch:
             if head["format"] != _FORMAT:
                 raise KeyError("format")
             arrays = {name: file[name] for name in file.files}
-        if tuple(head["states"]) != tuple(problem.states) or head["names"] != list(problem.parameters):
+        if tuple(head["states"]) != problem.state_names or head["names"] != list(problem.parameters):
             raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
         systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
         points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
@@ -93,14 +97,16 @@ def load(problem, path: str | Path) -> Branch:
         raise ProblemError(f"{str(path)!r} is no branch stored by contin, or damaged") from error
 
 
-def _system(problem, head, arrays, i):
+def _system(
+    problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, Any], arrays: dict[str, Array], i: int
+) -> Collocation | Algebraic:
     values = dict(zip(head["names"], arrays[f"parameters{i}"]))
     if isinstance(problem, AlgebraicProblem):
         return Algebraic(problem, head["free"], values)
     return Collocation(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values)
 
 
-def _point(row, system, arrays, number) -> Point:
+def _point(row: dict[str, Any], system: Collocation | Algebraic, arrays: dict[str, Array], number: int) -> Point:
     x, details = arrays[f"x{number}"], None
     if row["imperfection"] is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}

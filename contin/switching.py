@@ -11,13 +11,19 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin._kernels import njit
 from contin.corrector import Newton
 from contin.errors import ConvergenceError
+from contin.interface import Array, ComplexArray, Discretization, Factors
+
+if TYPE_CHECKING:
+    from contin.events import Trial
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,21 +45,21 @@ class BranchPoint:
         The residual beta by which the discrete equations miss a perfect bifurcation.
     """
 
-    x: np.ndarray
-    tangents: tuple
-    kernel: np.ndarray
-    left: np.ndarray
-    hessian: np.ndarray
+    x: Array
+    tangents: tuple[Array, ...]
+    kernel: Array
+    left: Array
+    hessian: Array
     imperfection: float
 
 
-def inner(system, a, b) -> float:
+def inner(system: Discretization, a: Array, b: Array) -> float:
     """The weighted inner product of two vectors of unknowns."""
     return float((system.weights * a) @ b)
 
 
-def _orthonormal(system, vectors):
-    result = []
+def _orthonormal(system: Discretization, vectors: Iterable[Array]) -> Array:
+    result: list[Array] = []
     for vector in vectors:
         for _ in range(2):
             for other in result:
@@ -65,20 +71,20 @@ def _orthonormal(system, vectors):
 class _Bordered:
     """M at x for given borders: its kernel vectors, the numbers g, corrections."""
 
-    def __init__(self, system, x, phi, psi):
+    def __init__(self, system: Discretization, x: Array, phi: Array, psi: Array) -> None:
         self.rows = np.pad(phi * system.weights, ((0, 0), (0, 1)))
         self.residual, self.factors = system.linearize(x, self.rows, psi[None, :])
         solutions = self.factors.solve(np.hstack([np.zeros((2, system.equations)), np.eye(2)]))
         self.kernel, self.g = solutions[:, :-1], solutions[:, -1]
 
-    def left(self, system):
+    def left(self, system: Discretization) -> Array:
         unit = np.zeros(system.size + 1)
         unit[-1] = 1.0
         left = self.factors.solve_transposed(unit)[: system.equations]
         return left / np.linalg.norm(left)
 
 
-def along(system, found: BranchPoint, direction) -> BranchPoint:
+def along(system: Discretization, found: BranchPoint, direction: Array) -> BranchPoint:
     """The same branch point, its tangents in order: first the one nearest to ``direction``, with its sense."""
     cosines = [inner(system, tangent, direction) for tangent in found.tangents]
     order = sorted(range(len(cosines)), key=lambda i: -abs(cosines[i]))
@@ -99,7 +105,7 @@ class MultiplePoint:
     """
 
     dimension: int
-    kernel: np.ndarray
+    kernel: Array
 
 
 #: Singular directions watched between two points.
@@ -107,14 +113,14 @@ _WATCHED = 3
 
 
 @functools.lru_cache(maxsize=8)
-def _random_block(count, size):
+def _random_block(count: int, size: int) -> Array:
     block = np.random.default_rng(5).standard_normal((count, size))
     block.flags.writeable = False
     return block
 
 
 @njit("void(f8[:,::1])", cache=True, error_model="numpy", nogil=True)
-def _orthonormalize(rows):
+def _orthonormalize(rows: Array) -> None:
     """Make the rows orthonormal, in place: Gram-Schmidt, twice."""
     count, size = rows.shape
     for i in range(count):
@@ -132,7 +138,7 @@ def _orthonormalize(rows):
                 rows[i, k] = rows[i, k] - product * rows[j, k] if j < i else rows[i, k] / np.sqrt(product)
 
 
-def smallest_directions(factors, size):
+def smallest_directions(factors: Factors, size: int) -> tuple[Array, Array, Array]:
     """Right and left singular vectors, as rows, of the smallest singular values: inverse iteration on a block.
 
     It starts from random vectors, not from those of the point before: a run resumed must decide as one undisturbed.
@@ -161,7 +167,7 @@ _VANISHES = 1e4
 _CALM = 2.0
 
 
-def quotients(before, after):
+def quotients(before: Trial, after: Trial) -> ComplexArray:
     """How the smallest singular values change between two neighbouring trials, from their factors: shape (watched,), complex.
 
     In the directions in which ``after`` is nearest to singular, J^-1 of the two is compared: each passage of a singular value
@@ -172,19 +178,19 @@ def quotients(before, after):
         right, left, response = smallest_directions(after.factors, after.system.size)
         earlier = right @ before.factors.solve(left).T
         if not (np.all(np.isfinite(response)) and np.all(np.isfinite(earlier))):
-            return np.full(len(response), np.nan)
+            return np.full(len(response), np.nan, dtype=complex)
         try:
-            return np.linalg.eigvals(np.linalg.solve(earlier, response))
+            return np.linalg.eigvals(np.linalg.solve(earlier, response)).astype(complex, copy=False)
         except np.linalg.LinAlgError:
-            return np.full(len(response), np.nan)
+            return np.full(len(response), np.nan, dtype=complex)
 
 
-def calm(values) -> bool:
+def calm(values: ComplexArray) -> bool:
     """Whether no singular value comes anywhere near zero, so that quotients of approximate factors are good enough."""
     return bool(np.all((values.real > 0) & (np.abs(values) < _CALM)))
 
 
-def crossings(values) -> tuple[int, bool]:
+def crossings(values: ComplexArray) -> tuple[int, bool]:
     """How many singular values pass zero, from their :func:`quotients`, and whether that is clear.
 
     Where a watched value shrinks by a large factor, others may have passed behind it: that is not clear.
@@ -195,7 +201,7 @@ def crossings(values) -> tuple[int, bool]:
 
 
 def locate_branch_point(
-    system, x, newton: Newton = Newton(), kernel: np.ndarray | None = None, max_iterations: int = 12
+    system: Discretization, x: Array, newton: Newton = Newton(), kernel: Array | None = None, max_iterations: int = 12
 ) -> BranchPoint:
     """The branch point near x.
 
@@ -251,7 +257,7 @@ def locate_branch_point(
     raise ConvergenceError(f"no branch point near by (last update {last:.1e})")
 
 
-def _hessian(system, x, phi, psi, kernel, scale=1e-4):
+def _hessian(system: Discretization, x: Array, phi: Array, psi: Array, kernel: Array, scale: float = 1e-4) -> Array:
     """The Hessian of beta, shape (2, 2), by central differences of its exact gradient."""
     columns = []
     for vector in kernel:
@@ -261,7 +267,7 @@ def _hessian(system, x, phi, psi, kernel, scale=1e-4):
     return (hessian + hessian.T) / 2
 
 
-def _finish(system, x, matrix: _Bordered, hessian, beta) -> BranchPoint:
+def _finish(system: Discretization, x: Array, matrix: _Bordered, hessian: Array, beta: float) -> BranchPoint:
     """Tangents from the algebraic bifurcation equation; kernel made orthonormal, the Hessian along with it."""
     tangents = [a @ matrix.kernel for a in _null_directions(hessian)]
     tangents = [tangent / np.sqrt(inner(system, tangent, tangent)) for tangent in tangents]
@@ -272,7 +278,7 @@ def _finish(system, x, matrix: _Bordered, hessian, beta) -> BranchPoint:
     return BranchPoint(x, tuple(tangents), kernel, matrix.left(system), change @ hessian @ change.T, float(abs(beta)))
 
 
-def _null_directions(hessian):
+def _null_directions(hessian: Array) -> list[Array]:
     """Unit vectors a with a.H.a = 0: two where det H < 0, none otherwise."""
     values, vectors = np.linalg.eigh(hessian)
     if not values[0] < 0 < values[1]:

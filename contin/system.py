@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.errors import ProblemError
+from contin.interface import Array, Carrier, Discretization, Indices, Statement
+
+if TYPE_CHECKING:
+    from contin.branch import Point
+    from contin.mesh import MeshControl
 
 
-class System:
+class System(Discretization):
     """A problem with chosen free parameters; ``x`` holds the states, flattened, then the free parameters.
 
     Attributes
     ----------
-    problem : object
+    problem : Statement
     free : tuple of str
         The free parameters.
     parameters : ndarray
@@ -28,9 +35,9 @@ class System:
         An unknown parameter.
     """
 
-    state_size: int
+    parameters: Array
 
-    def __init__(self, problem, free: Sequence[str], parameters: Mapping[str, float]):
+    def __init__(self, problem: Statement, free: Sequence[str], parameters: Mapping[str, float]) -> None:
         self.problem, self.free = problem, tuple(free)
         names = tuple(problem.parameters)
         for name in (*self.free, *parameters):
@@ -39,24 +46,61 @@ class System:
         self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
         self._free = self._indices(self.free)
 
-    def _indices(self, names) -> np.ndarray:
+    def _indices(self, names: Sequence[str]) -> Indices:
         """Where parameters stand among all of them."""
         return np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
 
-    def pack(self, states, values: Mapping[str, float]):
+    def pack(self, states: Any, values: Mapping[str, float]) -> Array:
         """A vector of unknowns from states and the mapping of free parameters."""
         return np.concatenate([np.asarray(states, dtype=float).ravel(), [float(values[name]) for name in self.free]])
 
-    def all_parameters(self, x):
+    def all_parameters(self, x: Array) -> Array:
         """Values of all parameters, shape (number of names,), the free ones from x."""
         p = self.parameters.copy()
         p[self._free] = x[self.state_size :]
         return p
 
-    def parameter(self, x, name: str) -> float:
+    def parameter(self, x: Array, name: str) -> float:
         """The value of one parameter by name."""
         return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
 
     def parameter_index(self, name: str) -> int:
         """Where the free parameter ``name`` stands in x."""
         return self.state_size + self.free.index(name)
+
+    @abstractmethod
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+
+    @abstractmethod
+    def refined(self) -> tuple[System, Carrier] | None:
+        """The same problem with every interval halved, and the carrier; None without a mesh."""
+
+    @abstractmethod
+    def adapted(self, x: Array, control: MeshControl) -> tuple[System, Carrier] | None:
+        """The same problem on a better mesh for x, and the carrier; None where there is no need."""
+
+    @abstractmethod
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """F_x^T w, shape (size,)."""
+
+    @abstractmethod
+    def with_parameters(self, values: Mapping[str, float]) -> System:
+        """The same problem with other values of parameters that are not free."""
+
+    @abstractmethod
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[System, Array]:
+        """The same problem with other free parameters (values from x), and x for it."""
+
+
+def system_of(point: Point, what: str) -> System:
+    """The system of a point, where other parameters of its problem may become free.
+
+    Raises
+    ------
+    ProblemError
+        A point of a curve in two parameters; ``what`` names the argument.
+    """
+    if not isinstance(point.system, System):
+        raise ProblemError(f"{what}: must not be a point of a curve in two parameters")
+    return point.system
