@@ -1,0 +1,68 @@
+"""``python -m branches.explore RESULT... --out PAGE.html``: results as one page to look at in a browser."""
+
+from __future__ import annotations
+
+import sys
+
+EXIT_BAD_INPUT = 2
+
+
+def arguments(argv=None):
+    """The command line, parsed."""
+    import argparse
+
+    parser = argparse.ArgumentParser(
+        prog="python -m branches.explore",
+        allow_abbrev=False,
+        description="Write one self-contained HTML page that shows results: the diagram, and the ribbon at every point of it.",
+    )
+    parser.add_argument("results", metavar="RESULT", nargs="+", help="a branch file (.h5), or the folder of a diagram")
+    parser.add_argument("--out", metavar="PAGE", default="explore.html", help="the page (default: explore.html)")
+    return parser.parse_args(argv)
+
+
+def main(argv=None) -> int:
+    """Run the command; the exit code."""
+    from branches.display import complain, survive_any_encoding, write_output
+
+    survive_any_encoding()
+    options = arguments(argv)
+    from branches.explore.gather import gather
+    from branches.explore.page import MissingLibraryError, assemble
+    from branches.files import StoreError, write_bytes
+    from contin.errors import ContinError
+
+    try:
+        path = _page_path(options.out)
+        page = assemble(gather(options.results)).encode()
+        write_bytes(path, page)
+    except (StoreError, MissingLibraryError, ContinError) as error:
+        complain(f"error: {error}")
+        return EXIT_BAD_INPUT
+    write_output(f"written to {path} ({len(page) / 1e6:.1f} MB); open it in a browser\n")
+    return 0
+
+
+def _page_path(out: str):
+    """Where the page goes.
+
+    Raises
+    ------
+    StoreError
+        No page can be written there.
+    """
+    from pathlib import Path
+
+    from branches.files import StoreError, prepare
+
+    path = Path(out)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise StoreError(f"--out {out!r}: must end in .html")
+    if path.exists() and not path.is_file():
+        raise StoreError(f"--out {out!r}: must be a file")
+    prepare(path)
+    return path
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,46 @@
+"""One self-contained page: the template, the library that draws, and the data, in one text."""
+
+from __future__ import annotations
+
+import html
+import json
+from importlib import metadata, resources
+
+
+class MissingLibraryError(Exception):
+    """The library that draws is not installed; the message says what to install."""
+
+
+def library() -> tuple[str, str]:
+    """The code of plotly.js, from the package ``plotly``, and the text of its licence.
+
+    Raises
+    ------
+    MissingLibraryError
+    """
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as error:
+        raise MissingLibraryError("the page is drawn by plotly, which is not installed; pip install plotly") from error
+    licences = [file for file in metadata.files("plotly") or () if file.name.startswith("LICENSE")]
+    return get_plotlyjs(), "\n".join(file.read_text(encoding="utf-8") for file in licences)
+
+
+def assemble(data: dict) -> str:
+    """The page that shows ``data``, as of `gather.gather`."""
+    folder = resources.files(__package__)
+    template, style, *scripts = (
+        (folder / name).read_text(encoding="utf-8") for name in ("page.html", "page.css", "shapes.js", "page.js")
+    )
+    code, licence = library()
+    parts = {
+        "title": html.escape(data["title"] or "Equilibria of a closed ribbon"), "style": style, "library": code,
+        "licence": html.escape(licence).replace("--", "- -"), "program": "\n".join(scripts),
+        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+    }  # fmt: skip
+    pieces = template.split("{{")
+    filled = [pieces[0]]
+    for piece in pieces[1:]:
+        name, rest = piece.split("}}", 1)
+        filled += [parts[name], rest]
+    return "".join(filled)
