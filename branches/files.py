@@ -88,6 +88,14 @@ def _lock_file(path: Path) -> Path:
     return path.with_name(f".{path.name[:50]}.lock")
 
 
+def _is_open_as(name: Path, file) -> bool:
+    """Whether the open file is the one that has this name (now; another process may remove it at any time)."""
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), name.stat())
+    except FileNotFoundError:
+        return False
+
+
 def _lock(path: Path) -> bool:
     """Take the lock; False if another process has it."""
     name = _lock_file(path)
@@ -101,7 +109,7 @@ def _lock(path: Path) -> bool:
         except OSError as error:
             file.close()
             return error.errno not in (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
-        if name.exists() and os.path.samestat(os.fstat(file.fileno()), name.stat()):
+        if _is_open_as(name, file):
             break
         file.close()  # the run that had it removed it just now
     with contextlib.suppress(OSError):  # a full disk
