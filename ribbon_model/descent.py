@@ -1,6 +1,6 @@
 """Down from an unstable state: a closed strip follows its energy downhill until it rests, and what it rests at is identified.
 
-The strip is one of segments (`ribbon_model.segments`). A gradient flow in a metric G is G d(omega)/dt = -gradient, on the closed
+The strip is one of segments (`ribbon_model.segments`). A gradient flow in a metric G is G d(omega)/dt = -gradient, on closed
 strips; the implicit steps of `descend` follow it with the exact Hessian and end as Newton's method. Where it ends may depend
 on the metric, that is on how the strip is damped:
 

@@ -13,16 +13,20 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
+from ribbon_model.shape import Shape
 
 _CLOSED = 1e-12  # what is left of the conditions of closure
 
-# sin(p)/p, (1 - cos p)/p^2 and (p - sin p)/p^3 as series in p^2, exact to round-off for |p| < pi
-_SINE, _COSINE, _REST = (Polynomial([(-1) ** k / math.factorial(2 * k + i) for k in range(15)]) for i in (1, 2, 3))
+# in powers of z = p**2: sin(p)/p, f = (1 - cos p)/p**2, 2 f', 4 f'', g = (p - sin p)/p**3, 2 g', 4 g''; exact for |p| < pi
+_SERIES = np.array([[(-1) ** k / math.factorial(2 * k + i) for k in range(15)] for i in (1, 2, 3)])
+_BY_Z = np.diag(np.arange(1.0, 15), -1)  # a row of coefficients times this: those of the derivative
+_SERIES = np.array(
+    [row @ np.linalg.matrix_power(2 * _BY_Z, order) for row, orders in zip(_SERIES, (1, 3, 3)) for order in range(orders)]
+).T
 #: Cross matrices of the axes.
 _GENERATORS = np.array([cross_matrix(axis) for axis in np.eye(3)])
 
@@ -80,6 +84,15 @@ def _ribbon_energy(strain, kappa_n, nu):
     return np.where(w1.real > 0, U, np.inf), moment, stiffness
 
 
+def _turn(a):
+    """Of rotation vectors (K, 3): the series (7, K), cross matrix, its square, the rotation, its mean on the way; (K, 3, 3)."""
+    series = (np.vander(np.sum(a * a, axis=1), 15, increasing=True) @ _SERIES).T
+    sine, f, _, _, g = series[:5, :, None, None]
+    cross = np.einsum("kb,bij->kij", a, _GENERATORS)
+    square = cross @ cross
+    return series, cross, square, np.eye(3) + sine * cross + f * square, np.eye(3) + f * cross + g * square
+
+
 # --- the discrete strip -------------------------------------------------------------------------------------------------
 
 
@@ -134,28 +147,24 @@ class Strip:
 
     @cached_property
     def _local(self):
-        """a = h omega, its cross matrix, and the matrix V of a segment: means of the rotation along it."""
+        """a = h omega, and what `_turn` gives for it."""
         a = self.segment * self.strains
-        z = np.sum(a * a, axis=1)[:, None, None]
-        cross = np.einsum("kb,bij->kij", a, _GENERATORS)
-        square = cross @ cross
-        return a, z, cross, square, np.eye(3) + _COSINE(z) * cross + _REST(z) * square
+        return a, *_turn(a)
 
     @cached_property
     def axes(self) -> np.ndarray:
         """Directors at the ends of the segments, shape (N + 1, 3, 3); columns are d1, d2, d3."""
-        _, z, cross, square, _ = self._local
-        product = np.eye(3) + _SINE(z) * cross + _COSINE(z) * square
+        product = self._local[4]
         reach = 1
         while reach < len(product):  # products of 2, 4, 8 ... neighbours
-            product[reach:] = product[:-reach] @ product[reach:]
+            product = np.concatenate([product[:reach], product[:-reach] @ product[reach:]])
             reach *= 2
         return np.concatenate([np.eye(3)[None], product])
 
     @cached_property
     def centreline(self) -> np.ndarray:
         """x at the ends of the segments, shape (N + 1, 3)."""
-        steps = self.segment * np.einsum("kij,kj->ki", self.axes[:-1], self._local[4][:, :, 2])
+        steps = self.segment * np.einsum("kij,kj->ki", self.axes[:-1], self._local[5][:, :, 2])
         return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
     @cached_property
@@ -170,14 +179,13 @@ class Strip:
     @cached_property
     def turning(self) -> np.ndarray:
         """Rotation vectors (N, 3, 3), component by column, that a unit of each strain gives to all that follows."""
-        return self.segment * self.axes[:-1] @ self._local[4]
+        return self.segment * self.axes[:-1] @ self._local[5]
 
     @cached_property
     def _slopes(self):
         """dV/da_b, shape (N, b, 3, 3), and d2(V e3)/da_a da_b, shape (N, a, b, 3)."""
-        a, z, cross, square, _ = self._local
-        f, f1, f2 = _COSINE(z), 2 * _COSINE.deriv()(z), 4 * _COSINE.deriv(2)(z)
-        g, g1, g2 = _REST(z), 2 * _REST.deriv()(z), 4 * _REST.deriv(2)(z)
+        a, series, cross, square, _, _ = self._local
+        f, f1, f2, g, g1, g2 = series[1:, :, None, None]
         both = _GENERATORS @ cross[:, None] + cross[:, None] @ _GENERATORS
         along = a[:, :, None, None]
         first = along * (f1 * cross + g1 * square)[:, None] + f[..., None] * _GENERATORS + g[..., None] * both
@@ -260,12 +268,22 @@ class Strip:
         """Directors (K, 3, 3), as columns, and centreline (K, 3) at places S in [0, L]."""
         number = np.minimum((np.asarray(stations) / self.segment).astype(int), len(self.strains) - 1)
         part = np.asarray(stations) - number * self.segment
-        a = part[:, None] * self.strains[number]
-        cross, z = np.einsum("kb,bij->kij", a, _GENERATORS), np.sum(a * a, axis=1)[:, None, None]
-        square, first = cross @ cross, self.axes[number]
-        mean = np.eye(3) + _COSINE(z) * cross + _REST(z) * square
+        first, (*_, turn, mean) = self.axes[number], _turn(part[:, None] * self.strains[number])
         x = self.centreline[number] + part[:, None] * np.einsum("kij,kj->ki", first, mean[:, :, 2])
-        return first @ (np.eye(3) + _SINE(z) * cross + _COSINE(z) * square), x
+        return first @ turn, x
+
+    def shape(self, places: int = 401) -> Shape:
+        """The strip in space at ``places`` equally spaced S from 0 to L; eta interpolated between the middles of the segments.
+
+        Rods have no rulings: eta is 0.
+        """
+        stations = np.linspace(0, LENGTH, places)
+        axes, x = self.along(stations)
+        eta = np.zeros(places)
+        if self.law is RIBBON:
+            middle = (np.arange(len(self.strains)) + 0.5) * self.segment
+            eta = np.interp(stations, middle, self.strains[:, 2] / self.strains[:, 0], period=LENGTH)
+        return Shape(stations, x, axes.transpose(0, 2, 1), eta)
 
     def _changed(self, change) -> Strip:
         strains = self.strains.copy()

@@ -18,6 +18,7 @@ NUMBERS = {
     "fig12": 9,
     "fig12b": 0,
     "curves": 0,
+    "snaps": 0,
 }
 
 

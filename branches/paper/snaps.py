@@ -1,0 +1,182 @@
+"""What a stable state snaps to past its limit, beside what the experiments of Audoly & Seffen (2015), section 2, saw."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from branches.paper.page import Row, Section
+from ribbon_model.descent import METRICS, Descent, Rest, descend, identify, perturbed
+from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
+from ribbon_model.linear import energy_interval
+from ribbon_model.second_variation import circle, from_solution
+from ribbon_model.segments import Strip, discretized
+
+NU, SEGMENTS = 0.3, 96
+#: How far past its limit a state is let go, relative to 1 + |limit|; root mean square of the kick in the strains.
+PAST, KICK = 0.01, 0.02
+#: (law, covering index, +1 for the upper end of its stable interval) -> what the experiments saw: Table 1 and section 2.
+SEEN = {
+    ("ribbon", 3, -1): "single loop (below κₙr₀ = 0.28)",
+    ("ribbon", 5, -1): "three loops (below κₙr₀ = 0.42)",
+    ("ribbon", 7, -1): "five loops (no number)",
+    ("ribbon", 3, 1): "not reached; 'into five loops' surmised",
+}
+SEEN_FOLD = "three loops (above κₙr₀ = 3.50)"
+
+
+@dataclass(frozen=True)
+class Start:
+    """A state at the end of its stability, let go at ``kappa_n`` past the limit.
+
+    ``covering`` is that of a circle, None for a buckled state; ``kicks`` are the signs in which its lowest mode is excited.
+    """
+
+    what: str
+    limit: float
+    kappa_n: float
+    strip: Strip
+    covering: int | None
+    published: str = ""
+    kicks: tuple[int, ...] = (1, -1)
+
+
+def snaps(folder: Path) -> Section:
+    """The table 'from, at kappa_n, snaps to', and the shapes on the way of three of them."""
+    rows, films = [], []
+    with threadpool_limits(1, "blas"):  # the matrices are small
+        for start in _starts():
+            runs = [(metric, sign, *_let_go(start, metric, sign)) for metric in METRICS for sign in start.kicks]
+            rows.append(_row(start, runs))
+            if start.published and _sees(start.published):
+                films.append((start, runs[0][2]))
+    notes = [
+        f"Each state is taken {PAST:.0%} of (1 + |limit|) past its limit. Its lowest mode is excited by {KICK} (root mean "
+        "square of the strains; with both signs for a buckled state, on a circle the other sign is the same up to a shift), "
+        "and waves without any symmetry by a tenth of that. Then it follows its energy downhill, closed all the way.",
+        f"In two metrics, {' and '.join(METRICS)} (friction in the strains; drag on the moving strip). Where all ends are one, "
+        "the table has one. There is no inertia here: a strip that overshoots may come to rest elsewhere.",
+        f"{SEGMENTS} segments on the way down; the end is solved anew by collocation on the whole loop, its index computed, "
+        "and compared with the exact quadrature of the primary branches.",
+        "No contact, no friction: strips pass through themselves, as everywhere here. The experiments had them, and gravity.",
+    ]
+    return Section("What it snaps to past the limits of stability, ν = .3", rows, [_draw(films, folder)], notes)
+
+
+# --- where they start -------------------------------------------------------------------------------------------------
+
+
+def _starts() -> Iterator[Start]:
+    for law in (RIBBON, FLAT_ROD, ISOTROPIC_ROD):
+        for m in (1, 3, 5, 7):
+            for side, limit in zip((-1, 1), energy_interval(law, m, NU)):
+                if math.isfinite(limit) and (m, side) != (7, 1):  # that leads beyond what the paper draws
+                    at = _past(m * limit, side)
+                    strip = discretized(circle(law, NU, m, at), SEGMENTS)
+                    seen = SEEN.get((law.name, m, side), "")
+                    yield Start(f"{law.name}: {m}-covered circle", m * limit, at, strip, m, seen, (1,))
+        if law is RIBBON:
+            yield from (_buckled(law, m, n, "LP", 0, 1, seen) for m, n, seen in ((1, 2, SEEN_FOLD), (3, 4, "")))
+        if law is ISOTROPIC_ROD:  # the last two secondary bifurcations: a stable piece lies between them
+            yield from (_buckled(law, 3, 1, "SB", at, side) for at, side in ((-2, 1), (-1, -1)))
+
+
+def _past(limit: float, side: int) -> float:
+    return limit + side * PAST * (1 + abs(limit))
+
+
+def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str = "") -> Start:
+    """The state at a labelled point of a primary branch, with kappa_n moved on."""
+    from branches.stability import Watch
+    from contin import Settings, follow
+    from ribbon_model.seeds import primary_branch
+
+    system, x, tangent = primary_branch(law, m, n, NU, 8, 7)
+    monitors = Watch(law, system, x).monitors if label == "SB" else ()
+    branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, monitors=monitors), tangent)
+    point = branch.labelled(label)[at]
+    solution = point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
+    strip = discretized(from_solution(law, *solution), SEGMENTS)
+    kappa_n = _past(point["kappa_n"], side)
+    return Start(f"{law.name}: buckled ({m}, {n})", point["kappa_n"], kappa_n, replace(strip, kappa_n=kappa_n), None, seen)
+
+
+# --- where they end ---------------------------------------------------------------------------------------------------
+
+
+def _let_go(start: Start, metric: str, sign: int) -> tuple[Descent, Rest]:
+    descent = descend(perturbed(start.strip, sign * KICK), metric)
+    if not descent.rests:
+        raise ArithmeticError(f"{start.what} at {start.kappa_n:g}: not at rest, gradient {descent.gradient:.1e}")
+    return descent, identify(descent.end)
+
+
+def _row(start: Start, runs) -> Row:
+    """The end if it is one; every end with its metric and sign otherwise."""
+    ends = {f"{metric}, {'+' if sign > 0 else '-'}": (descent, rest) for metric, sign, descent, rest in runs}
+    names = {way: _named(start, rest) for way, (_, rest) in ends.items()}
+    one = len(set(names.values())) == 1
+    descent, rest = next(iter(ends.values()))
+    ours = next(iter(names.values())) if one else "; ".join(f"{name} ({way})" for way, name in names.items())
+    fall = descent.energies[0] - rest.energy
+    remark = (
+        f"κ̄* {descent.strips[0].kappa_star:.3f} → {rest.kappa_star:.6f}, energy falls by {fall:.4f}; "
+        f"index {', '.join(sorted({str(found.stability.index) for _, found in ends.values()}))}"
+    )
+    if rest.n:
+        remark += f"; from the quadrature by {max(found.difference for _, found in ends.values()):.0e}"
+    slack = max(found.slack for found, _ in ends.values())
+    if slack:
+        remark += f"; on up to {slack} segments the energy was not strictly convex on the way"
+    what = f"{start.what}, limit κₙL/2π = {start.limit:.4f}, let go at {start.kappa_n:.4f}"
+    return Row(what, start.published, ours, remark)
+
+
+def _named(start: Start, rest: Rest) -> str:
+    """A branch that begins at the very circle that was let go is entered continuously; everything else is a snap."""
+    continuous = rest.n and start.covering in (rest.m, 2 * rest.n - rest.m)
+    return f"{'goes over into' if continuous else 'snaps to'} {'the ' if not rest.n else ''}{rest}"
+
+
+# --- the picture ------------------------------------------------------------------------------------------------------
+
+
+def _sees(published: str) -> bool:
+    """Whether an experiment gave a number."""
+    return "κₙr₀" in published
+
+
+def _draw(films, folder: Path, frames: int = 6) -> str:
+    """The strips on their way, at equal distances in the strains; the experiments' single loop first."""
+    from matplotlib.figure import Figure
+
+    from branches.draw_branch import draw_strip
+    from branches.files import write_picture
+
+    films = sorted(films, key=lambda film: film[0].covering or 0)
+    figure = Figure(figsize=(2 * frames, 2.3 * len(films)), layout="constrained")
+    for line, (start, descent) in zip(figure.subfigures(len(films), 1, squeeze=False)[:, 0], films):
+        line.suptitle(f"{start.what}, let go at $\\kappa_n L/2\\pi$ = {start.kappa_n:.3f}", fontsize=11)
+        shown = _frames(descent, frames)
+        shapes = [strip.shape(241) for strip in shown]
+        reach = 0.85 * max(np.abs(shape.centreline - shape.centreline.mean(axis=0)).max() for shape in shapes)
+        for axes, strip, shape in zip(line.subplots(1, frames, subplot_kw={"projection": "3d"}), shown, shapes):
+            draw_strip(axes, shape, 0.25 * reach)
+            axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
+            axes.set_title(f"energy {strip.energy:.3f}", fontsize=9, y=0.95)
+    for suffix in (".png", ".svg"):
+        write_picture(figure, folder / f"snaps{suffix}")
+    return "snaps"
+
+
+def _frames(descent: Descent, count: int) -> list[Strip]:
+    """States at equal distances along the way, the first and the last among them."""
+    strains = np.array([strip.strains for strip in descent.strips])
+    steps = np.sqrt(np.mean(np.sum(np.diff(strains, axis=0) ** 2, axis=2), axis=1))
+    way = np.concatenate([[0], np.cumsum(steps)])
+    return [descent.strips[int(np.argmin(np.abs(way - place)))] for place in np.linspace(0, way[-1], count)]
