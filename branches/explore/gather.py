@@ -31,8 +31,8 @@ CIRCLE_COLUMNS = ("kappa_n", "kappa_star", "energy", "index")
 INFINITE, UNKNOWN = -2, -1
 #: About so many nodes make a closed strip; a quarter wave has no fewer than the second number.
 _LOOP_NODES, _FEWEST = 384, 16
-#: Circles are drawn as far as there are branches, with points no further apart than this.
-_CIRCLE_STEP = 0.25
+#: Circles reach as far in kappa_n as the branches do, in about twice so many steps. (On a circle all columns are parabolas.)
+_CIRCLE_STEPS = 50
 _KINDS = {"LP": "fold", "SB": "secondary", "UZ": "user", "MX": "lost"}
 
 
@@ -171,8 +171,7 @@ def _circle(law: str, nu: float, m: int, ends: tuple[float, float], bifurcations
     neutral = [mark["kappa_n"] for mark in bifurcations if mark["covering"] == m]
     if m >= 1:
         neutral += [m * end for end in energy_interval(material, m, nu, Gamma) if ends[0] < m * end < ends[1]]
-    kappa_n = np.linspace(*ends, max(2, math.ceil((ends[1] - ends[0]) / _CIRCLE_STEP) + 1))
-    kappa_n = np.unique(np.append(kappa_n, neutral))
+    kappa_n = np.unique(np.append(np.linspace(*ends, _CIRCLE_STEPS + 1), neutral))
     kappa_n = np.sort(np.append(kappa_n, (kappa_n[1:] + kappa_n[:-1]) / 2))  # one between any two neutral ones
     values = [circle(material, m, k, nu, Gamma) for k in kappa_n]
     columns = {"kappa_n": kappa_n, "index": [_circle_index(material, m, k, nu, Gamma, neutral) for k in kappa_n]}

@@ -5,10 +5,10 @@ const $ = (id) => document.getElementById(id);
 const DATA = JSON.parse($("data").textContent);
 const FAMILIES = DATA.families.map((family) => ({
   ...family,
-  branches: [...family.branches.map((about) => new Branch(about)), ...family.circles.map((about) => new Branch(about))],
+  branches: [...family.branches.map((about) => new Branch(about, family.law)), ...family.circles.map((about) => new Branch(about, family.law))],
 }));
-const MARGIN = { l: 46, r: 12, t: 8, b: 42 };
-const EYE = { x: 0.95, y: -1.25, z: 0.95 };
+const MARGIN = { l: 54, r: 12, t: 8, b: 54 };
+const EYE = { x: 0.78, y: -1.02, z: 0.8 };
 const FOLDING_TIME = 9000; // milliseconds from one end of a branch to the other
 const WAVES = [["#cc79a7", "dot"], ["#0072b2", "solid"], ["#009e73", "dash"], ["#d55e00", "dashdot"], ["#56b4e9", "longdash"], ["#e69f00", "longdashdot"], ["#882255", "4px 2px"]];
 const TRIADS = ["#d55e00", "#009e73", "#0072b2"]; // d1, d2, d3
@@ -25,6 +25,7 @@ const minus = (text) => text.replace("-", "−");
 const short = (value) => minus(value.toPrecision(5).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, ""));
 const digits = (value) => minus(value.toFixed(8));
 const loopName = (m) => (m < 0 ? `${LOOPS[-m] || -m + "-fold"} loop, curled the wrong way` : `${LOOPS[m] || m + "-fold"} loop`);
+const percent = (width) => (width < 2 * Math.PI ? `${((100 * width) / (2 * Math.PI)).toPrecision(2)} % width` : "never");
 const nameOf = (branch) => {
   if (branch.circle) return loopName(branch.m);
   return "origin" in branch ? `from (${branch.m}, ${branch.n}) at ${short(branch.origin)}` : `(${branch.m}, ${branch.n})`;
@@ -50,8 +51,8 @@ function story() {
   const steady = { stable: "It is stable: push it a little and it comes back.", unstable: "It is unstable: it can rest here, but the least push makes it leave.", unknown: "" }[kind];
   if (branch.circle) return `A flat ring: the strip goes round ${Math.abs(branch.m) === 1 ? "once" : `${Math.abs(branch.m)} times`} (${loopName(branch.m)}). ${steady}`;
   if (mark && mark.kind === "circle") return `Here the branch meets the ${loopName(mark.covering)}, flat again. Beyond it, waves grow.`;
-  const to = branch.to === null ? "and does not come back" : `and ends on the ${loopName(branch.to)}`;
-  const way = "origin" in branch ? `A shape with less symmetry, from the branch (${branch.m}, ${branch.n}).` : `On the way from the ${loopName(branch.m)}, in ${branch.n} wave${branch.n > 1 ? "s" : ""} round the strip, ${to}.`;
+  const to = branch.to === null ? "does not come back" : `ends on the ${loopName(branch.to)}`;
+  const way = "origin" in branch ? `This shape has less symmetry than the branch (${branch.m}, ${branch.n}) that it comes from.` : `This branch leaves the ${loopName(branch.m)} with ${branch.n} wave${branch.n > 1 ? "s" : ""} round the strip, and ${to}.`;
   return `${way} ${(mark && MARK_WORDS[mark.kind]) || steady}`;
 }
 
@@ -126,8 +127,8 @@ function diagramLayout() {
   const axis = { gridcolor: colour("grid"), zeroline: false, linecolor: colour("line"), tickcolor: colour("line"), automargin: false };
   return {
     margin: MARGIN, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", size: 13, color: colour("soft") },
-    xaxis: { ...axis, title: { text: "natural curvature κ<sub>n</sub>L/2π", standoff: 6 }, range: range.x },
-    yaxis: { ...axis, title: { text: "conjugate curvature κ*", standoff: 4 }, range: range.y },
+    xaxis: { ...axis, title: { text: "natural curvature κ<sub>n</sub>L/2π", standoff: 8 }, range: range.x },
+    yaxis: { ...axis, title: { text: "conjugate curvature κ*", standoff: 8 }, range: range.y },
     hovermode: "closest", hoverdistance: 30, dragmode: "pan", hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
   };
 }
@@ -151,7 +152,7 @@ async function drawDiagram() {
 function drawLegend() {
   const groups = [...lines().keys()].sort(), svg = ({ color, dash, width }) =>
     `<svg width="34" height="10" aria-hidden="true"><path d="M1 5H33" stroke="${color}" stroke-width="${width}" stroke-dasharray="${{ solid: "none", dot: "2 3", dash: "7 4", longdash: "11 4", dashdot: "7 3 2 3", longdashdot: "11 3 2 3" }[dash] || dash.replaceAll("px", "")}"/></svg>`;
-  const words = { stable: "stable", unstable: "unstable", unknown: "stability not computed" };
+  const words = { stable: "stable", unstable: "unstable", unknown: "index not known" };
   const marks = new Set(now.family.branches.flatMap((branch) => (branch.marks || []).map((mark) => mark.kind)));
   $("legend").innerHTML = groups.map((group) => `<span>${svg(styleOf(group))}${words[group] || group}</span>`).join("") +
     [["circle", "● meets a flat ring"], ["fold", "★ fold"], ["secondary", "◆ secondary bifurcation"]].filter(([kind]) => marks.has(kind)).map(([, text]) => `<span>${text}</span>`).join("");
@@ -196,16 +197,15 @@ function ribbonTraces(strip) {
     type: "mesh3d", ...mesh, ...triangles(n), vertexcolor: sides, hoverinfo: "skip", showscale: false,
     lighting: { ambient: 0.52, diffuse: 0.75, specular: 0.28, roughness: 0.45, fresnel: 0.12 }, lightposition: { x: 3000, y: -4000, z: 9000 },
   }];
-  triadLines(strip, scale).forEach((line, i) => traces.push({ type: "scatter3d", mode: "lines", ...line, line: { color: TRIADS[i], width: 6 }, hoverinfo: "skip", showlegend: false }));
+  if ($("triads").checked)
+    triadLines(strip, scale).forEach((line, i) => traces.push({ type: "scatter3d", mode: "lines", ...line, line: { color: TRIADS[i], width: 6 }, hoverinfo: "skip", showlegend: false }));
   return traces;
 }
 
-/** Directors d1, d2, d3 at a few stations: three dashed lines, or none. */
+/** Directors d1, d2, d3 at a few stations: a broken line for each of the three. */
 function triadLines(strip, scale) {
   return [0, 1, 2].map((i) => {
-    const line = { x: [], y: [], z: [] };
-    if (!$("triads").checked) return line;
-    const n = count(strip);
+    const line = { x: [], y: [], z: [] }, n = count(strip);
     for (let a = 0; a < 16; a++) {
       const k = Math.round((a * n) / 16) * STATION, x = [...strip.subarray(k, k + 3)], d = [...strip.subarray(k + 3 + 3 * i, k + 6 + 3 * i)];
       const from = along([0, 0, 0], scale, x), to = along(from, 0.2, d);
@@ -222,24 +222,15 @@ async function createRibbon() {
   if (flat) return drawFlat(strip);
   const scene = { xaxis: sceneAxis, yaxis: sceneAxis, zaxis: sceneAxis, aspectmode: "cube", camera: { eye: EYE, projection: { type: "perspective" } }, dragmode: "orbit" };
   await Plotly.newPlot("ribbon", ribbonTraces(strip), { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", scene, showlegend: false }, { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: true });
-  $("ribbon").dataset.stations = count(strip);
 }
 
 async function updateRibbon() {
   const strip = now.branch.strip(now.s);
   if (flat) return drawFlat(strip);
   const scale = scaleOf(strip), mesh = sheets(strip, width(), scale), n = count(strip);
-  if (String(n) !== $("ribbon").dataset.stations) {
-    $("ribbon").dataset.stations = n;
-    return Plotly.react("ribbon", ribbonTraces(strip), $("ribbon").layout);
-  }
-  await Plotly.restyle("ribbon", { x: [mesh.x], y: [mesh.y], z: [mesh.z] }, [0]);
-  if ($("triads").checked) await drawTriads(strip, scale);
-}
-
-function drawTriads(strip, scale) {
-  const found = triadLines(strip, scale);
-  return Plotly.restyle("ribbon", { x: found.map((line) => line.x), y: found.map((line) => line.y), z: found.map((line) => line.z) }, [1, 2, 3]);
+  if (4 * n !== $("ribbon").data[0].x.length) return Plotly.react("ribbon", ribbonTraces(strip), $("ribbon").layout);
+  const drawn = $("triads").checked ? [mesh, ...triadLines(strip, scale)] : [mesh];
+  return Plotly.restyle("ribbon", { x: drawn.map((one) => one.x), y: drawn.map((one) => one.y), z: drawn.map((one) => one.z) }, drawn.map((_, i) => i));
 }
 
 const eyeNow = () => {
@@ -247,10 +238,10 @@ const eyeNow = () => {
   return [eye.x, eye.y, eye.z];
 };
 
-/** Fill of a polygon: its side's colour, darker where it faces away from the light. */
-function fill({ front, shade }) {
-  const hue = colour(front ? "front" : "rear").match(/\w\w/g).map((part) => Math.round(parseInt(part, 16) * shade));
-  return `rgb(${hue.join(",")})`;
+/** The fill of a polygon as a function: its side's colour, darker where it faces away from the light. */
+function fills() {
+  const [front, rear] = ["front", "rear"].map((side) => colour(side).match(/\w\w/g).map((part) => parseInt(part, 16)));
+  return (polygon) => `rgb(${(polygon.front ? front : rear).map((part) => Math.round(part * polygon.shade)).join(",")})`;
 }
 
 /** A picture of the strip without WebGL. */
@@ -258,7 +249,7 @@ function paint(canvas, strip, eye, scale, every) {
   const ratio = window.devicePixelRatio || 1, context = canvas.getContext("2d");
   canvas.width = (canvas.clientWidth || 120) * ratio;
   canvas.height = (canvas.clientHeight || 92) * ratio;
-  const size = Math.min(canvas.width, canvas.height) * 0.46;
+  const size = Math.min(canvas.width, canvas.height) * 0.46, fill = fills();
   context.translate(canvas.width / 2, canvas.height / 2);
   for (const polygon of polygons(strip, width(), scale, eye, every)) {
     context.fillStyle = context.strokeStyle = fill(polygon);
@@ -276,7 +267,7 @@ function drawFlat(strip) {
 }
 
 function ribbonSvg() {
-  const strip = now.branch.strip(now.s), round = (x) => (400 + 340 * x).toFixed(2);
+  const strip = now.branch.strip(now.s), round = (x) => (400 + 340 * x).toFixed(2), fill = fills();
   const shapes = polygons(strip, width(), scaleOf(strip), eyeNow(), 1).map((polygon) => {
     const tint = fill(polygon);
     return `<path fill="${tint}" stroke="${tint}" d="M${polygon.points.map(([x, y]) => `${round(x)} ${round(y)}`).join("L")}Z"/>`;
@@ -294,6 +285,7 @@ function readOut() {
     ["κ*", digits(branch.value("kappa_star", s)), "kappa_star"],
     ["energy", digits(branch.value("energy", s)), "energy"],
     ["stability", `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`, "stability"],
+    ...(branch.ruled ? [["rulings cross beyond", percent(widest(branch.strip(s))), "widest"]] : []),
     ["point", branch.circle ? "exact" : whole ? `${Math.round(s)} of ${branch.size - 1}${branch.labels[Math.round(s)] ? ` (${branch.labels[Math.round(s)]})` : ""}` : `between ${Math.floor(s)} and ${Math.ceil(s)}`, "point"],
   ];
   $("readout").innerHTML = rows.map(([name, value, id]) => `<div><dt>${name}</dt><dd${id ? ` data-value="${id}"` : ""}>${value}</dd></div>`).join("");
@@ -312,16 +304,18 @@ function coexisting() {
 }
 
 function drawStates() {
-  const found = coexisting(), least = found[0].energy, span = found[found.length - 1].energy - least || 1;
+  const found = coexisting();
   $("states-note").textContent = `${found.length} at κₙL/2π = ${short(now.branch.value("kappa_n", now.s))}, least energy first`;
-  $("states").replaceChildren(...found.map((one, i) => {
+  $("states").replaceChildren(...found.map((one) => {
     const item = document.createElement("li"), button = item.appendChild(document.createElement("button")), [kind, word] = stability(one.branch, one.s);
     button.type = "button";
-    button.innerHTML = `<canvas aria-hidden="true"></canvas><b>${nameOf(one.branch)}</b><small>energy ${minus(one.energy.toFixed(5))}</small><span class="meter" aria-hidden="true"><i style="width:${(3 + (97 * (one.energy - least)) / span).toFixed(1)}%"></i></span><span class="tag ${kind}">${word}</span>`;
+    button.innerHTML = `<canvas aria-hidden="true"></canvas><b>${nameOf(one.branch)}</b><small>energy ${minus(one.energy.toFixed(5))}</small><span class="tag ${kind}">${word}</span>`;
     if (one.branch === now.branch && one.s === now.s) button.setAttribute("aria-current", "true");
     button.onclick = () => go(one.branch, one.s);
     return item;
   }));
+  const current = $("states").querySelector("[aria-current]").parentElement;
+  $("states").scrollLeft = current.offsetLeft - $("states").offsetLeft - 150;
   $("states").querySelectorAll("canvas").forEach((canvas, i) => {
     const strip = found[i].branch.strip(found[i].s);
     paint(canvas, strip, eyeNow(), scaleOf(strip) * 1.05, Math.max(1, Math.round(count(strip) / 190)));
@@ -453,7 +447,8 @@ function connect() {
     $("width-value").textContent = `${$("width").value} % of length`;
     update();
   };
-  $("triads").onchange = () => (flat ? update() : drawTriads(now.branch.strip(now.s), scaleOf(now.branch.strip(now.s))));
+  if (flat) $("triads").parentElement.hidden = true;
+  $("triads").onchange = () => !flat && Plotly.react("ribbon", ribbonTraces(now.branch.strip(now.s)), $("ribbon").layout);
   $("view").onclick = () => !flat && Plotly.relayout("ribbon", { "scene.camera.eye": EYE, "scene.camera.up": { x: 0, y: 0, z: 1 }, "scene.camera.center": { x: 0, y: 0, z: 0 } }).then(update);
   $("slider").oninput = (event) => go(now.branch, now.branch.fromWay(Number(event.target.value) / 1000));
   $("previous").onclick = () => step(-1, false);
@@ -484,13 +479,14 @@ function keyPressed(event) {
 async function redraw() {
   await drawDiagram();
   if (!flat) await Plotly.react("ribbon", ribbonTraces(now.branch.strip(now.s)), $("ribbon").layout);
-  update();
+  await update();
 }
 
 async function start() {
   connect();
   $("width-value").textContent = `${$("width").value} % of length`;
   await chooseFamily(0);
+  now.diagramTime = performance.now();
   $("diagram").on("plotly_click", ({ points: [point] }) => {
     const [branch, place] = point.customdata || [];
     if (place !== undefined) go(now.family.branches[branch], place);

@@ -14,8 +14,9 @@ const apply = (m, a) => [dot(m[0], a), dot(m[1], a), dot(m[2], a)];
 
 /** A branch or a circle: columns, and a shape anywhere along it. `s` is the number of a point, with fractions between points. */
 class Branch {
-  constructor(about) {
+  constructor(about, law) {
     Object.assign(this, about);
+    this.ruled = !law.endsWith("rod"); // the section of a rod stays straight and at right angles to it
     this.columns = {};
     for (const [name, text] of Object.entries(about.columns)) this.columns[name] = new Float64Array(bytes(text));
     this.circle = !("shapes" in about);
@@ -79,6 +80,7 @@ class Branch {
   strip(s) {
     if (this.circle) return placed(planar(this.m), [1, 0, 0]);
     const part = stations(this.states(s), this.nodes);
+    if (!this.ruled) part.forEach((station) => (station.eta = 0));
     if (this.domain === "half loop") return placed(mirrored(part).slice(0, -1));
     if (this.domain !== "cell") return placed(turned(part).slice(0, -1));
     const axis = unit([this.value("M1", s) * this.columns.sense[0], this.value("M2", s) * this.columns.sense[0], 0]);
@@ -212,12 +214,23 @@ function reach(strip) {
   return most;
 }
 
-/** Edge points x +- (width / 2) (d1 + eta d3), equation (6a), and d2 at each: (stations, [left, right, normal]). */
+/** The widest strip whose rulings (6a) do not cross: 2 / max |eta'|. */
+function widest(strip) {
+  const n = count(strip), eta = (k) => strip[(k % n) * STATION + 12];
+  let most = 0;
+  for (let k = 0; k < n; k++) most = Math.max(most, Math.abs(eta(k + 1) - eta(k)));
+  return (2 * 2 * Math.PI) / (n * most);
+}
+
+/**
+ * Edge points x +- (width / 2) (d1 + eta d3), equation (6a), and d2 at each: (stations, [left, right, normal]). Where rulings
+ * of that width would cross, all are drawn less oblique, so that the picture stays a band.
+ */
 function edges(strip, width, scale, every = 1) {
-  const result = [];
+  const result = [], oblique = Math.min(1, (0.9 * widest(strip)) / width);
   for (let k = 0; k < strip.length; k += STATION * every) {
     const at = (i) => [strip[k + i], strip[k + i + 1], strip[k + i + 2]];
-    const x = at(0), ruling = along(at(3), strip[k + 12], at(9));
+    const x = at(0), ruling = along(at(3), oblique * strip[k + 12], at(9));
     const edge = (side) => along([0, 0, 0], scale, along(x, (side * width) / 2, ruling));
     result.push([edge(-1), edge(1), at(6)]);
   }
