@@ -24,7 +24,7 @@ PAST, KICK = 0.01, 0.02
 SEEN = {
     ("ribbon", 3, -1): "single loop (below κₙr₀ = 0.28)",
     ("ribbon", 5, -1): "three loops (below κₙr₀ = 0.42)",
-    ("ribbon", 7, -1): "five loops (no number)",
+    ("ribbon", 7, -1): "five loops (not measured)",
     ("ribbon", 3, 1): "not reached; 'into five loops' surmised",
 }
 SEEN_FOLD = "three loops (above κₙr₀ = 3.50)"
@@ -34,16 +34,21 @@ SEEN_FOLD = "three loops (above κₙr₀ = 3.50)"
 class Start:
     """A state at the end of its stability, let go at ``kappa_n`` past the limit.
 
-    ``covering`` is that of a circle, None for a buckled state; ``kicks`` are the signs in which its lowest mode is excited.
+    ``m`` is the covering index of the circle, or of the one that the ``buckled`` state comes from.
     """
 
     what: str
+    m: int
     limit: float
     kappa_n: float
     strip: Strip
-    covering: int | None
-    published: str = ""
-    kicks: tuple[int, ...] = (1, -1)
+    published: str
+    buckled: bool
+
+    @property
+    def kicks(self) -> tuple[int, ...]:
+        """The signs in which the lowest mode is excited: on a circle one is a shift of the other."""
+        return (1, -1) if self.buckled else (1,)
 
 
 def snaps(folder: Path) -> Section:
@@ -61,8 +66,8 @@ def snaps(folder: Path) -> Section:
         "and waves without any symmetry by a tenth of that. Then it follows its energy downhill, closed all the way.",
         f"In two metrics, {' and '.join(METRICS)} (friction in the strains; drag on the moving strip). Where all ends are one, "
         "the table has one. There is no inertia here: a strip that overshoots may come to rest elsewhere.",
-        f"{SEGMENTS} segments on the way down; the end is solved anew by collocation on the whole loop, its index computed, "
-        "and compared with the exact quadrature of the primary branches.",
+        f"{SEGMENTS} segments on the way down; the end is solved anew by collocation on the whole loop and compared with the "
+        "exact quadrature of the primary branches. Its index is 0 in every line.",
         "No contact, no friction: strips pass through themselves, as everywhere here. The experiments had them, and gravity.",
     ]
     return Section("What it snaps to past the limits of stability, ν = .3", rows, [_draw(films, folder)], notes)
@@ -79,7 +84,7 @@ def _starts() -> Iterator[Start]:
                     at = _past(m * limit, side)
                     strip = discretized(circle(law, NU, m, at), SEGMENTS)
                     seen = SEEN.get((law.name, m, side), "")
-                    yield Start(f"{law.name}: {m}-covered circle", m * limit, at, strip, m, seen, (1,))
+                    yield Start(f"{law.name}: {m}-covered circle", m, m * limit, at, strip, seen, False)
         if law is RIBBON:
             yield from (_buckled(law, m, n, "LP", 0, 1, seen) for m, n, seen in ((1, 2, SEEN_FOLD), (3, 4, "")))
         if law is ISOTROPIC_ROD:  # the last two secondary bifurcations: a stable piece lies between them
@@ -103,17 +108,22 @@ def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str
     solution = point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
     strip = discretized(from_solution(law, *solution), SEGMENTS)
     kappa_n = _past(point["kappa_n"], side)
-    return Start(f"{law.name}: buckled ({m}, {n})", point["kappa_n"], kappa_n, replace(strip, kappa_n=kappa_n), None, seen)
+    strip = replace(strip, kappa_n=kappa_n)
+    return Start(f"{law.name}: buckled ({m}, {n})", m, point["kappa_n"], kappa_n, strip, seen, True)
 
 
 # --- where they end ---------------------------------------------------------------------------------------------------
 
 
 def _let_go(start: Start, metric: str, sign: int) -> tuple[Descent, Rest]:
+    """The way down and its end: a minimum of the energy of the continuous strip, or the segments are too few."""
     descent = descend(perturbed(start.strip, sign * KICK), metric)
-    if not descent.rests:
-        raise ArithmeticError(f"{start.what} at {start.kappa_n:g}: not at rest, gradient {descent.gradient:.1e}")
-    return descent, identify(descent.end)
+    rest = identify(descent.end)
+    if not (descent.rests and rest.stability.decided and rest.stability.index == 0):
+        raise ArithmeticError(
+            f"{start.what} at {start.kappa_n:g}: no minimum, gradient {descent.gradient:.1e}, index {rest.stability.index}"
+        )
+    return descent, rest
 
 
 def _row(start: Start, runs) -> Row:
@@ -124,22 +134,20 @@ def _row(start: Start, runs) -> Row:
     descent, rest = next(iter(ends.values()))
     ours = next(iter(names.values())) if one else "; ".join(f"{name} ({way})" for way, name in names.items())
     fall = descent.energies[0] - rest.energy
-    remark = (
-        f"κ̄* {descent.strips[0].kappa_star:.3f} → {rest.kappa_star:.6f}, energy falls by {fall:.4f}; "
-        f"index {', '.join(sorted({str(found.stability.index) for _, found in ends.values()}))}"
-    )
+    remark = f"κ̄* {descent.strips[0].kappa_star:.3f} → {rest.kappa_star:.6f}, energy falls by {fall:.4f}"
     if rest.n:
         remark += f"; from the quadrature by {max(found.difference for _, found in ends.values()):.0e}"
     slack = max(found.slack for found, _ in ends.values())
     if slack:
         remark += f"; on up to {slack} segments the energy was not strictly convex on the way"
-    what = f"{start.what}, limit κₙL/2π = {start.limit:.4f}, let go at {start.kappa_n:.4f}"
+    ratio = f"κₙr₀ = {start.limit / start.m:.3f}"
+    what = f"{start.what}, limit κₙL/2π = {start.limit:.4f} ({ratio}), let go at {start.kappa_n:.4f}"
     return Row(what, start.published, ours, remark)
 
 
 def _named(start: Start, rest: Rest) -> str:
     """A branch that begins at the very circle that was let go is entered continuously; everything else is a snap."""
-    continuous = rest.n and start.covering in (rest.m, 2 * rest.n - rest.m)
+    continuous = rest.n and not start.buckled and start.m in (rest.m, 2 * rest.n - rest.m)
     return f"{'goes over into' if continuous else 'snaps to'} {'the ' if not rest.n else ''}{rest}"
 
 
@@ -158,7 +166,7 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
     from branches.draw_branch import draw_strip
     from branches.files import write_picture
 
-    films = sorted(films, key=lambda film: film[0].covering or 0)
+    films = sorted(films, key=lambda film: film[0].m)
     figure = Figure(figsize=(2 * frames, 2.3 * len(films)), layout="constrained")
     for line, (start, descent) in zip(figure.subfigures(len(films), 1, squeeze=False)[:, 0], films):
         line.suptitle(f"{start.what}, let go at $\\kappa_n L/2\\pi$ = {start.kappa_n:.3f}", fontsize=11)

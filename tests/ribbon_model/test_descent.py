@@ -182,6 +182,29 @@ def test_beyond_the_fold_a_buckled_loop_snaps_to_three(sign, longest):
     assert (str(rest), rest.stability.index) == ("3-covered circle", 0)
 
 
+@pytest.mark.parametrize(
+    ("law", "m", "kappa_n", "expected"),
+    [
+        (RIBBON, 3, -0.55, "1-covered circle"),  # experiments: three loops open into one, five into three, seven into five
+        (RIBBON, 5, 1.72, "3-covered circle"),
+        (RIBBON, 7, 3.8, "5-covered circle"),
+        (RIBBON, 3, 5.29, "(3, 4)"),
+        (RIBBON, 3, 8.0, "7-covered circle"),  # far beyond its limit
+        (FLAT_ROD, 1, 5.682, "3-covered circle"),
+        (FLAT_ROD, 3, 0.4, "1-covered circle"),
+        (ISOTROPIC_ROD, 1, -0.01, "1-covered circle, turned inside out"),
+        (ISOTROPIC_ROD, 3, 2.103, "(1, 2)"),
+    ],
+)
+def test_what_circles_become_past_their_limits(law, m, kappa_n, expected):
+    """In both metrics the same. Where a branch begins at the circle the quadrature has it; the circles are stable by theory."""
+    start = perturbed(circle(law, m, kappa_n, 96), 0.02)
+    for metric in METRICS:
+        descent = descend(start, metric)
+        rest = identify(descent.end)
+        assert descent.rests and (str(rest), rest.stability.index) == (expected, 0)
+
+
 @LAWS
 def test_the_same_end_wherever_the_kick_begins(law):
     """Equal up to a shift along the strip: the start of the segments has no say."""
