@@ -64,10 +64,11 @@ def gather(results: list[str]) -> dict:
     for path, branch in stored:
         if len(branch.points) < 2:
             raise StoreError(f"{str(path)!r} holds {len(branch.points)} points; a branch has two at least")
-        material = label(branch.config["law"], branch.config["Gamma"]), branch.config["nu"]
+        material = branch.config["law"], branch.config["Gamma"], branch.config["nu"]
         families.setdefault(material, []).append((path, branch))
+    ordered = sorted(families.items(), key=lambda family: (list(LAWS).index(family[0][0]), *family[0][1:]))
     title = next((title or branch.config["title"] for title, (_, branch) in zip(titles, stored)), "")
-    return {"title": title, "families": [_family(*material, found) for material, found in sorted(families.items())]}
+    return {"title": title, "families": [_family(label(law, Gamma), nu, found) for (law, Gamma, nu), found in ordered]}
 
 
 def _files_of(path: Path) -> tuple[list[Path], str]:
@@ -171,6 +172,7 @@ def _circle(law: str, nu: float, m: int, ends: tuple[float, float], bifurcations
     neutral = [mark["kappa_n"] for mark in bifurcations if mark["covering"] == m]
     if m >= 1:
         neutral += [m * end for end in energy_interval(material, m, nu, Gamma) if ends[0] < m * end < ends[1]]
+    neutral = np.unique(np.round(neutral, 9))
     kappa_n = np.unique(np.append(np.linspace(*ends, _CIRCLE_STEPS + 1), neutral))
     kappa_n = np.sort(np.append(kappa_n, (kappa_n[1:] + kappa_n[:-1]) / 2))  # one between any two neutral ones
     values = [circle(material, m, k, nu, Gamma) for k in kappa_n]
@@ -181,7 +183,7 @@ def _circle(law: str, nu: float, m: int, ends: tuple[float, float], bifurcations
 
 def _circle_index(law, m, kappa_n, nu, Gamma, neutral) -> int:
     # curled against its natural curvature (m < 1) the linear theory at hand does not count
-    if m < 1 or np.isclose(kappa_n, neutral, rtol=0, atol=1e-9).any():
+    if m < 1 or np.isclose(kappa_n, neutral, rtol=0, atol=1e-8).any():
         return UNKNOWN
     count = index(law, m, kappa_n, nu, Gamma)
     return INFINITE if math.isinf(count) else int(count)

@@ -7,7 +7,7 @@ const FAMILIES = DATA.families.map((family) => ({
   ...family,
   branches: [...family.branches.map((about) => new Branch(about, family.law)), ...family.circles.map((about) => new Branch(about, family.law))],
 }));
-const MARGIN = { l: 54, r: 12, t: 8, b: 54 };
+const MARGIN = { l: 62, r: 12, t: 8, b: 54 };
 const EYE = { x: 0.78, y: -1.02, z: 0.8 };
 const FOLDING_TIME = 9000; // milliseconds from one end of a branch to the other
 const WAVES = [["#cc79a7", "dot"], ["#0072b2", "solid"], ["#009e73", "dash"], ["#d55e00", "dashdot"], ["#56b4e9", "longdash"], ["#e69f00", "longdashdot"], ["#882255", "4px 2px"]];
@@ -98,7 +98,7 @@ function points() {
   const symbols = { circle: ["circle", 7], fold: ["star", 12], secondary: ["diamond", 9], user: ["square", 7] };
   now.family.branches.forEach((branch, b) => {
     for (let i = 0; i < branch.size; i++) {
-      const mark = markAt(branch, i), [symbol, size] = symbols[mark && mark.kind] || ["circle", 9], [kind, word, index] = stability(branch, i);
+      const mark = markAt(branch, i), [symbol, size] = symbols[mark && mark.kind] || ["circle", 6], [kind, word, index] = stability(branch, i);
       trace.x.push(branch.columns.kappa_n[i]);
       trace.y.push(branch.columns.kappa_star[i]);
       trace.customdata.push([b, i]);
@@ -128,19 +128,21 @@ function diagramLayout() {
   return {
     margin: MARGIN, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", size: 13, color: colour("soft") },
     xaxis: { ...axis, title: { text: "natural curvature κ<sub>n</sub>L/2π", standoff: 8 }, range: range.x },
-    yaxis: { ...axis, title: { text: "conjugate curvature κ*", standoff: 8 }, range: range.y },
+    yaxis: { ...axis, title: { text: "conjugate curvature κ*", standoff: 10 }, range: range.y },
     hovermode: "closest", hoverdistance: 30, dragmode: "pan", hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
   };
 }
 
-/** The part of the diagram that is shown: all of a single branch, the neighbourhood of the rings of many. */
-function window_(whole) {
-  const k = now.family.branches.flatMap((branch) => [...branch.columns.kappa_n]);
-  const heights = now.family.branches.flatMap((branch) => (branch.circle || whole ? [...branch.columns.kappa_star] : []));
-  let [low, high] = [k.reduce((a, b) => Math.min(a, b)), k.reduce((a, b) => Math.max(a, b))];
+const ends = (values) => [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
+
+/** The part of the diagram that is shown: all of it, or of many branches the neighbourhood of the rings. */
+function extent(whole) {
+  const places = now.family.branches.flatMap(({ columns }) => [...columns.kappa_n].map((k, i) => [k, columns.kappa_star[i]]));
+  let [low, high] = ends(places.map(([k]) => k));
   if (!whole && now.family.branches.length > 4) [low, high] = [Math.max(low, -8), Math.min(high, 14)];
-  const pad = 0.06 * (high - low), bottom = heights.reduce((a, b) => Math.min(a, b)), top = heights.reduce((a, b) => Math.max(a, b));
-  return { x: [low - pad, high + pad], y: [bottom - 0.08 * (top - bottom) - 0.2, top + 0.08 * (top - bottom) + 0.2] };
+  const [bottom, top] = ends(places.filter(([k]) => k >= low && k <= high).map(([, star]) => star));
+  const across = 0.06 * (high - low || 1), up = 0.08 * (top - bottom || 1);
+  return { x: [low - across, high + across], y: [bottom - up, top + up] };
 }
 
 async function drawDiagram() {
@@ -168,14 +170,31 @@ function highlight() {
   return Plotly.restyle("diagram", { x: [x], y: [y] }, [0]).then(placeMarker);
 }
 
+/** Where the place s of a branch is in the diagram's frame: pixels, and whether it is inside the axes. */
+function pixel(branch, s) {
+  const { clientWidth: w, clientHeight: h } = $("diagram"), { xaxis, yaxis } = $("diagram").layout;
+  const part = (name, { range: [low, high] }) => (branch.value(name, s) - low) / (high - low);
+  const across = part("kappa_n", xaxis), up = part("kappa_star", yaxis);
+  return {
+    x: MARGIN.l + across * (w - MARGIN.l - MARGIN.r), y: h - MARGIN.b - up * (h - MARGIN.t - MARGIN.b),
+    inside: Math.abs(across - 0.5) < 0.505 && Math.abs(up - 0.5) < 0.505,
+  };
+}
+
 function placeMarker() {
-  const { clientWidth: w, clientHeight: h } = $("diagram"), { xaxis, yaxis } = $("diagram").layout || {};
-  if (!xaxis) return;
-  const fx = (now.branch.value("kappa_n", now.s) - xaxis.range[0]) / (xaxis.range[1] - xaxis.range[0]);
-  const fy = (now.branch.value("kappa_star", now.s) - yaxis.range[0]) / (yaxis.range[1] - yaxis.range[0]);
-  const inside = fx > -0.005 && fx < 1.005 && fy > -0.005 && fy < 1.005;
+  if (!$("diagram").layout) return;
+  const { x, y, inside } = pixel(now.branch, now.s);
   $("here").style.visibility = inside ? "visible" : "hidden";
-  $("here").style.transform = `translate(${MARGIN.l + fx * (w - MARGIN.l - MARGIN.r)}px, ${h - MARGIN.b - fy * (h - MARGIN.t - MARGIN.b)}px)`;
+  $("here").style.transform = `translate(${x}px, ${y}px)`;
+}
+
+/** A click on a point; a labelled point so near that it covers this one is meant instead. */
+function clicked({ points: [point] }) {
+  if (!point.customdata) return;
+  const [b, i] = point.customdata, branch = now.family.branches[b], here = pixel(branch, i);
+  const distance = (place) => Math.hypot(pixel(branch, place).x - here.x, pixel(branch, place).y - here.y);
+  const near = (branch.marks || []).map((mark) => mark.point).filter((place) => distance(place) < 6);
+  go(branch, near.length ? near.reduce((p, q) => (distance(p) < distance(q) ? p : q)) : i);
 }
 
 // --- the strip -----------------------------------------------------------------------------------------------------
@@ -424,7 +443,7 @@ async function chooseFamily(i) {
   now.branch = now.family.branches[0];
   now.s = now.branch.fromWay(0.45);
   $("colour").value = now.family.branches.some((branch) => !branch.circle && branch.columns.index) ? "stability" : "wave";
-  range = window_(false);
+  range = extent(false);
   listBranches();
   await drawDiagram();
 }
@@ -439,8 +458,8 @@ function connect() {
     go(branch, branch.fromWay(0.45));
   };
   $("whole").onclick = () => {
-    const all = window_(true), shown = $("diagram").layout.xaxis.range;
-    range = shown[0] <= all.x[0] && shown[1] >= all.x[1] ? window_(false) : all;
+    const all = extent(true), shown = $("diagram").layout.xaxis.range;
+    range = shown[0] <= all.x[0] && shown[1] >= all.x[1] ? extent(false) : all;
     Plotly.relayout("diagram", { "xaxis.range": range.x, "yaxis.range": range.y });
   };
   $("width").oninput = () => {
@@ -487,10 +506,7 @@ async function start() {
   $("width-value").textContent = `${$("width").value} % of length`;
   await chooseFamily(0);
   now.diagramTime = performance.now();
-  $("diagram").on("plotly_click", ({ points: [point] }) => {
-    const [branch, place] = point.customdata || [];
-    if (place !== undefined) go(now.family.branches[branch], place);
-  });
+  $("diagram").on("plotly_click", clicked);
   $("diagram").on("plotly_relayout", placeMarker);
   $("diagram").on("plotly_relayouting", placeMarker);
   await createRibbon();
