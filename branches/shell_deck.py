@@ -1,0 +1,269 @@
+"""The unfolding strip as a three-dimensional body: input decks for CalculiX, and what is read from its answers.
+
+The strip is naturally an arc of radius R in the plane (x, y), wide along z; its ends are turned by pi xi / 2 each, its plane of
+symmetry is x = 0. Two ways to the same planar state:
+
+- 'direct', as in section 5.4 of Audoly & Seffen (2015): the stress-free arc is meshed, its rigid end faces are turned step by
+  step, and may approach each other along x.
+- 'thermal', for thin strips, where the direct way is slow or fails: the arc of radius R/(1 - xi) is meshed, both end faces are
+  held, and expansion along the strip, linear through the thickness, gives it the natural curvature 1/R. Its ends cannot
+  approach each other, so its in-plane modes mean nothing; it is for 0 <= xi < 1.
+
+Each state is followed by the lowest vibrations about it. omega**2 comes with its sign: it is negative where the state is
+unstable. Lengths in mm, steel; results do not depend on either.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+RADIUS, YOUNG, DENSITY = 100.0, 210e3, 7.8e-9  # mm, MPa, t/mm^3
+#: Spacing of the states that the direct way passes through.
+STEP = 0.1
+#: Vibrations looked for at a state, so many that out-of-plane ones are among them where they are stiff, near the flat state.
+_MODES = 12
+#: Above this part of the motion in the plane a vibration is an in-plane one.
+_IN_PLANE = 0.02
+#: Beyond this part of the width the centre line of a state has left the plane.
+_OUT = 0.01
+#: Twenty-node bricks: corners, then the middles of these edges.
+_CORNERS = np.array([(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)])
+_EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+_BRICK = np.vstack([_CORNERS, [(_CORNERS[a] + _CORNERS[b]) // 2 for a, b in _EDGES]])
+#: Newton's method on thin strips converges slowly and not steadily: patience, and a force residual of half a per cent.
+_PATIENCE = "*CONTROLS,PARAMETERS=TIME INCREMENTATION\n40,60,9,200,10,4,,5\n*CONTROLS,PARAMETERS=FIELD\n5e-3"
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A semicircular strip and its mesh.
+
+    Attributes
+    ----------
+    nu : float
+    slenderness : float
+        R/w.
+    thinness : float
+        w/h.
+    along, across : int
+        Elements; one through the thickness. ``across`` is even: the centre of an end has a node then.
+    """
+
+    nu: float
+    slenderness: float
+    thinness: float
+    along: int = 60
+    across: int = 6
+
+    def __post_init__(self):
+        if not (-1 < self.nu < 0.5 and self.slenderness > 0 and self.thinness > 0):
+            raise ValueError(f"nu = {self.nu:g}, R/w = {self.slenderness:g}, w/h = {self.thinness:g}: no strip")
+        if self.along < 2 or self.across < 2 or self.across % 2:
+            raise ValueError(f"along = {self.along}, across = {self.across}: two elements at least, an even number across")
+
+    @property
+    def width(self) -> float:
+        """w in mm."""
+        return RADIUS / self.slenderness
+
+    @property
+    def thickness(self) -> float:
+        """h in mm."""
+        return self.width / self.thinness
+
+    @property
+    def number(self) -> float:
+        """w**2/(R h), the one number of the law 'finite width'."""
+        return self.thinness / self.slenderness
+
+    @property
+    def unit(self) -> float:
+        """D/(rho h R**4), the unit of omega**2, D the bending modulus of the plate."""
+        return YOUNG * self.thickness**2 / (12 * (1 - self.nu**2) * DENSITY * RADIUS**4)
+
+
+@dataclass(frozen=True)
+class State:
+    """What CalculiX found at one xi: the lowest out-of-plane omega**2, in units of D/(rho h R**4); is the state planar?"""
+
+    omega_squared: float
+    planar: bool
+
+
+# --- decks ------------------------------------------------------------------------------------------------------------
+
+
+class _Mesh:
+    """Nodes on a grid of half elements, i along (counterclockwise about z), j across, k through the thickness."""
+
+    def __init__(self, strip: Strip, radius: float, angle: float):
+        self.strip, self.nodes = strip, {}
+        points = []
+        for i in range(2 * strip.along + 1):
+            phi = math.pi / 2 + angle * (i / (2 * strip.along) - 0.5)
+            for j in range(2 * strip.across + 1):
+                for k in range(3):
+                    if i % 2 + j % 2 + k % 2 <= 1:  # corners and middles of edges
+                        self.nodes[i, j, k] = len(points) + 1
+                        r = radius + (k - 1) * strip.thickness / 2
+                        points.append((r * math.cos(phi), r * math.sin(phi), strip.width * (j / (2 * strip.across) - 0.5)))
+        self.points = np.array(points)
+
+    def text(self) -> Iterator[str]:
+        """Nodes, elements and the sets that results are wanted for."""
+        yield "*NODE,NSET=ALL"
+        yield from (f"{number},{_real(x)},{_real(y)},{_real(z)}" for number, (x, y, z) in enumerate(self.points, 1))
+        yield "*ELEMENT,TYPE=C3D20R,ELSET=STRIP"
+        number = 0
+        for i in range(0, 2 * self.strip.along, 2):
+            for j in range(0, 2 * self.strip.across, 2):
+                number += 1
+                brick = [self.nodes[i + a, j + b, c] for a, b, c in _BRICK]
+                yield f"{_list([number, *brick[:15]])},\n{_list(brick[15:])}"
+        middle, last = self.strip.across, 2 * self.strip.across
+        yield from _set("CENTRE", [node for (i, j, k), node in self.nodes.items() if (j, k) == (middle, 1)])
+        yield from _set("EDGE", [node for (i, j, k), node in self.nodes.items() if (j, k) == (last, 1)])
+
+    def end(self, i: int, k: int | None = None) -> list[int]:
+        """Nodes of an end face, of one layer of it if k is given."""
+        return [node for (a, _, c), node in self.nodes.items() if a == i and k in (None, c)]
+
+
+def _real(value: float) -> str:
+    """CalculiX reads no more than 20 characters of a field."""
+    return f"{value:.12e}"
+
+
+def _list(numbers: Iterable[int]) -> str:
+    return ",".join(map(str, numbers))
+
+
+def _set(name: str, nodes: Sequence[int]) -> Iterator[str]:
+    yield f"*NSET,NSET={name}"
+    yield from (_list(nodes[a : a + 10]) for a in range(0, len(nodes), 10))
+
+
+def _material(strip: Strip) -> list[str]:
+    return ["*MATERIAL,NAME=M", f"*ELASTIC\n{_real(YOUNG)},{_real(strip.nu)}", f"*DENSITY\n{_real(DENSITY)}"]
+
+
+def _static() -> list[str]:
+    return ["*STEP,NLGEOM,INC=1000", "*STATIC\n1,1", _PATIENCE]
+
+
+_SHAPE = ["*NODE PRINT,NSET=CENTRE\nU", "*END STEP"]
+_VIBRATIONS = ["*STEP,PERTURBATION", f"*FREQUENCY\n{_MODES}", "*NODE PRINT,NSET=EDGE\nU", *_SHAPE]
+
+
+def thermal_deck(strip: Strip, xi: float) -> str:
+    """The deck of one state, 0 < xi < 1, the thermal way."""
+    if not 0 < xi < 1:
+        raise ValueError(f"xi = {xi:g}: the thermal way is for 0 < xi < 1")
+    mesh = _Mesh(strip, RADIUS / (1 - xi), math.pi * (1 - xi))
+    lines = [*mesh.text(), *_set("ENDS", mesh.end(0) + mesh.end(2 * strip.along)), *_material(strip)]
+    lines += ["*EXPANSION,TYPE=ORTHO\n0,1,0", "*ORIENTATION,NAME=O,SYSTEM=CYLINDRICAL\n0,0,0,0,0,1"]
+    lines += ["*SOLID SECTION,ELSET=STRIP,MATERIAL=M,ORIENTATION=O", "*INITIAL CONDITIONS,TYPE=TEMPERATURE\nALL,0"]
+    lines += ["*BOUNDARY\nENDS,1,3", *_static(), "*TEMPERATURE"]
+    outer = xi / RADIUS * strip.thickness / 2  # y (kappa_n - kappa) on the outer face
+    lines += [f"{node},{_real((k - 1) * outer)}" for (_, _, k), node in mesh.nodes.items()]
+    return "\n".join([*lines, *_SHAPE, *_VIBRATIONS, ""])
+
+
+def direct_deck(strip: Strip, xis: Sequence[float]) -> str:
+    """The deck of several states, xi ascending, the direct way; on the way there it passes through multiples of `STEP`."""
+    if not (xis and xis[0] > 0 and all(a < b for a, b in zip(xis, xis[1:]))):
+        raise ValueError(f"xi = {', '.join(f'{xi:g}' for xi in xis)}: must be positive and ascending")
+    mesh, nodes = _Mesh(strip, RADIUS, math.pi), 0
+    lines = [*mesh.text(), *_material(strip), "*SOLID SECTION,ELSET=STRIP,MATERIAL=M"]
+    nodes = len(mesh.points)
+    inner, outer = nodes + 1, nodes + 2  # carry u_x of two layers of the end that moves, less that of its centre
+    lines.append(f"*NODE\n{inner},0,-10,0\n{outer},0,-20,0")
+    right, left = 0, 2 * strip.along
+    centre = mesh.nodes[right, strip.across, 1]
+    lines.append("*EQUATION")
+    for (i, _, k), node in mesh.nodes.items():
+        if i == right and node != centre:
+            carrier = {0: f",{inner},1,-1.", 1: "", 2: f",{outer},1,-1."}[k]
+            lines.append(f"{2 if k == 1 else 3}\n{node},1,1.,{centre},1,-1.{carrier}")
+    path = sorted({round(STEP * n, 9) for n in range(1, int(xis[-1] / STEP) + 1)} | set(xis))
+    for xi in path:
+        lines += [*_static(), "*BOUNDARY", *_turned(mesh, left, right, inner, outer, math.pi * xi / 2)]
+        lines += [*_SHAPE, *_VIBRATIONS] if xi in xis else ["*END STEP"]
+    return "\n".join([*lines, ""])
+
+
+def _turned(mesh: _Mesh, left: int, right: int, inner: int, outer: int, angle: float) -> Iterator[str]:
+    """Displacements of the two end faces, rigid, turned by ``angle`` each towards the flat strip."""
+    fall, rise = math.cos(angle) - 1, math.sin(angle)
+    for k in range(3):
+        y = (k - 1) * mesh.strip.thickness / 2  # outwards, that is along -x on the left and along x on the right
+        for node in mesh.end(left, k):
+            yield f"{node},1,1,{_real(-y * fall)}\n{node},2,2,{_real(y * rise)}\n{node},3,3,0."
+        for node in mesh.end(right, k):
+            yield f"{node},2,2,{_real(y * rise)}\n{node},3,3,0."
+    half = mesh.strip.thickness / 2
+    yield f"{inner},1,1,{_real(-half * fall)}\n{inner},2,3,0.\n{outer},1,1,{_real(half * fall)}\n{outer},2,3,0."
+
+
+# --- answers ----------------------------------------------------------------------------------------------------------
+
+_NUMBER = r"\s+([-+]?\d\.\d+E[-+]\d+)"
+_DISPLACEMENT = re.compile(rf"\s*\d+{_NUMBER * 3}\s*$")
+_EIGENVALUE = re.compile(rf"\s*\d+{_NUMBER * 4}\s*$")
+_TABLE, _BLOCK = "E I G E N V A L U E   O U T P U T", re.compile(r"\s*displacements .* for set (\w+) and time")
+
+
+def states(text: str, strip: Strip) -> list[State]:
+    """The states of a ``.dat`` file, in the order of the deck; complete ones only, as a run that failed leaves them.
+
+    Raises
+    ------
+    ValueError
+        A state without an out-of-plane vibration among those printed.
+    """
+    found, shape, values, modes = [], None, [], []
+    for kind, content in _tables(text):
+        if kind == "eigenvalues":
+            values, modes = content, []
+        elif len(modes) < 2 * len(values):
+            modes.append(content)
+            if len(modes) == 2 * len(values):
+                found.append(_state(shape, values, modes, strip))
+                values = []
+        else:
+            shape = content
+    return found
+
+
+def _tables(text: str) -> Iterator[tuple[str, np.ndarray]]:
+    """('eigenvalues', (modes,)) and ('CENTRE' or 'EDGE', (nodes, 3)), as they stand in the file."""
+    kind, rows = "", []
+    for line in text.splitlines():
+        block = _BLOCK.match(line)
+        if block or _TABLE in line or "P A R T I C I P A T I O N" in line:
+            if rows:
+                yield kind, np.array(rows)
+            kind, rows = block[1] if block else "eigenvalues" if _TABLE in line else "", []
+        elif kind:
+            row = (_EIGENVALUE if kind == "eigenvalues" else _DISPLACEMENT).match(line)
+            if row:
+                rows.append(float(row[1]) if kind == "eigenvalues" else [float(value) for value in row.groups()])
+    if rows:
+        yield kind, np.array(rows)
+
+
+def _state(shape, values, modes, strip: Strip) -> State:
+    """Out of the plane the centre line moves along z only, and the edge also where the strip merely twists."""
+    out = [
+        value
+        for value, edge, centre in zip(values, modes[::2], modes[1::2])
+        if np.sum(centre[:, :2] ** 2) < _IN_PLANE * np.sum(edge**2)
+    ]
+    if not out:
+        raise ValueError(f"none of the {len(values)} lowest vibrations is out of the plane")
+    return State(float(min(out) / strip.unit), bool(np.abs(shape[:, 2]).max() < _OUT * strip.width))
