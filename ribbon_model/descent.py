@@ -112,10 +112,10 @@ class _Tangent:
     """Gradient and Hessian (n, n) of the energy on the closed strips at one of them, times N."""
 
     def __init__(self, strip: Strip):
-        gradient, slopes, self._hessian, _ = strip.linearized()
+        gradient, slopes, hessian, _ = strip.linearized()
         self._across = np.linalg.qr(slopes.T)[0]
         self.gradient = gradient - self._across @ (self._across.T @ gradient)
-        self.hessian = self.projected(self._hessian)
+        self.hessian = self.projected(hessian)
         self.size = float(np.linalg.norm(self.gradient) / math.sqrt(len(strip.strains)))
 
     def projected(self, matrix) -> np.ndarray:
@@ -202,7 +202,7 @@ def _positive(matrix) -> bool:
 def modes(strip: Strip, number: int = 8) -> tuple[np.ndarray, np.ndarray]:
     """The lowest eigenvalues of the Hessian of the energy on the closed strips, per unit of mean squared change of strain.
 
-    A negative one is a direction in which an equilibrium is unstable; a shift of phase has one near zero, O(h**2).
+    A negative one is a direction in which an equilibrium is unstable; a shift of phase has one near zero.
 
     Returns
     -------
@@ -272,6 +272,8 @@ def identify(strip: Strip) -> Rest:
     ------
     ConvergenceError
         No equilibrium of the continuous strip close to it.
+    ValueError
+        At that equilibrium the energy is not convex in the strains: it has no index.
     """
     law, nu, kappa_n, strains = strip.law, strip.nu, strip.kappa_n, strip.strains
     if np.abs(strains - [strains[:, 0].mean(), 0, 0]).max() < _PLANAR:
@@ -322,7 +324,7 @@ def polished(strip: Strip, intervals: int = 24, degree: int = 7):
 
 def _on_primary_branches(law: Law, nu: float, kappa_n: float, n: int):
     """(m, point) wherever a primary branch of wavenumber n passes kappa_n, by quadrature."""
-    for m in (m for m in _COVERINGS if m != n and m % (2 * n)):
+    for m in (m for m in _COVERINGS if n and m != n and m % (2 * n)):
         try:
             first = thresholds(law, m, n, nu)[0]
             limits = min(first, kappa_n) - 1, max(first, kappa_n) + 1
