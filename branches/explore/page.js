@@ -129,8 +129,16 @@ function diagramLayout() {
     margin: MARGIN, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", size: 13, color: colour("soft") },
     xaxis: { ...axis, title: { text: "natural curvature κ<sub>n</sub>L/2π", standoff: 8 }, range: range.x },
     yaxis: { ...axis, title: { text: "conjugate curvature κ*", standoff: 10 }, range: range.y },
-    hovermode: "closest", hoverdistance: 30, dragmode: "pan", hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
+    annotations: ringNames(), hovermode: "closest", hoverdistance: 30, dragmode: "pan", hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
   };
+}
+
+/** Names of the rings, at the right end of what is shown first of their lines. */
+function ringNames() {
+  return now.family.branches.filter((branch) => branch.circle).map((ring) => {
+    const x = Math.min(range.x[1], ring.columns.kappa_n[ring.size - 1]), [s] = [...ring.places(x), ring.size - 1];
+    return { x, y: ring.value("kappa_star", s), text: loopName(ring.m), showarrow: false, xanchor: "right", yanchor: "bottom", font: { size: 11.5, color: colour("ink") }, bgcolor: colour("card"), opacity: 0.85, borderpad: 0, yshift: 4 };
+  });
 }
 
 const ends = (values) => [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
@@ -305,7 +313,7 @@ function readOut() {
     ["energy", digits(branch.value("energy", s)), "energy"],
     ["stability", `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`, "stability"],
     ...(branch.ruled ? [["rulings cross beyond", percent(widest(branch.strip(s))), "widest"]] : []),
-    ["point", branch.circle ? "exact" : whole ? `${Math.round(s)} of ${branch.size - 1}${branch.labels[Math.round(s)] ? ` (${branch.labels[Math.round(s)]})` : ""}` : `between ${Math.floor(s)} and ${Math.ceil(s)}`, "point"],
+    ["point", branch.circle ? "exact" : whole ? `${Math.round(s)} of ${branch.size - 1}${branch.labels[Math.round(s)] ? ` (${branch.labels[Math.round(s)]})` : ""}` : `${Math.floor(s)} – ${Math.ceil(s)}`, "point"],
   ];
   $("readout").innerHTML = rows.map(([name, value, id]) => `<div><dt>${name}</dt><dd${id ? ` data-value="${id}"` : ""}>${value}</dd></div>`).join("");
   const text = story();
@@ -334,7 +342,8 @@ function drawStates() {
     return item;
   }));
   const current = $("states").querySelector("[aria-current]").parentElement;
-  $("states").scrollLeft = current.offsetLeft - $("states").offsetLeft - 150;
+  const left = current.offsetLeft - $("states").offsetLeft, room = $("states").clientWidth - current.clientWidth - 20;
+  $("states").scrollLeft = Math.max(0, left - room);
   $("states").querySelectorAll("canvas").forEach((canvas, i) => {
     const strip = found[i].branch.strip(found[i].s);
     paint(canvas, strip, eyeNow(), scaleOf(strip) * 1.05, Math.max(1, Math.round(count(strip) / 190)));
