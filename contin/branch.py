@@ -88,3 +88,20 @@ class Branch:
     def labelled(self, label: str) -> list[Point]:
         """The points that carry a label, in order."""
         return [point for point in self.points if point.label == label]
+
+    def to_pandas(self) -> Any:
+        """All points as a ``pandas.DataFrame``; see :func:`contin.notebook.to_pandas`."""
+        from contin import notebook
+
+        return notebook.to_pandas(self)
+
+    def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+        """One column against another, by matplotlib; see :func:`contin.notebook.plot`."""
+        from contin import notebook
+
+        return notebook.plot(self, x, y, axes)
+
+    def _repr_html_(self) -> str:
+        from contin import notebook
+
+        return notebook.to_html(self)
