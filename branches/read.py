@@ -56,6 +56,23 @@ class StoredBranch:
         t, states, degree, parameters = self.solution(point)
         return closed_strip(LAWS[self.config["law"]], t, states, degree, parameters)
 
+    def to_pandas(self):
+        """The table of points as a ``pandas.DataFrame`` (ImportError where pandas is not installed)."""
+        import pandas
+
+        return pandas.DataFrame(self.points).assign(label=[label.decode() for label in self.points["label"]])
+
+    def plot(self, shapes: int = 6, width: float = 0.3):
+        """The branch as a matplotlib figure; see :func:`branches.draw_branch.figure`."""
+        from branches.draw_branch import figure
+
+        return figure(self, shapes, width)
+
+    def _repr_html_(self) -> str:
+        from branches.notebook import to_html
+
+        return to_html(self)
+
 
 def read_branch(path: str | Path) -> StoredBranch:
     """The branch in a file.

@@ -370,3 +370,18 @@ def test_export(pages, browser):
         text = browser.downloaded(name).decode()
         assert text.startswith("<svg") and text.count("<path") > least
     assert browser.errors == []
+
+
+# --- a stored branch in a notebook --------------------------------------------------------------------------------
+
+
+def test_stored_branch_in_a_notebook(results):
+    from xml.etree import ElementTree
+
+    branch = read_branch(results / "m1_n2.h5")
+    table = branch.to_pandas()
+    assert np.array_equal(table["kappa_n"], branch.points["kappa_n"]) and "LP" in set(table["label"])
+    assert len(branch.plot(shapes=2).axes) == 3
+    root = ElementTree.fromstring(branch._repr_html_())
+    assert root.find("{http://www.w3.org/2000/svg}svg") is not None
+    assert [row[1].text for row in root.iterfind("table/tbody/tr")] == ["BP", "LP", "EP"]

@@ -1,0 +1,32 @@
+"""What a notebook shows of a stored branch: its curve, and its labelled points."""
+
+from __future__ import annotations
+
+import html
+import io
+
+from ribbon_model.laws import label
+
+_COLUMNS = ("point", "label", "name", "kappa_n", "kappa_star", "energy")
+
+
+def to_html(branch) -> str:
+    """A `branches.read.StoredBranch` as a piece of HTML: what it is and why it ended, the picture, the labelled points."""
+    config, picture = branch.config, io.StringIO()
+    branch.plot(shapes=0).savefig(picture, format="svg")
+    svg = picture.getvalue()[picture.getvalue().index("<svg") :]
+    about = f"{label(config['law'], config['Gamma'])}, (m, n) = ({config['m']}, {config['n']}), nu = {config['nu']:g}"
+    stop = html.escape(branch.stop or branch.status)
+    head = "".join(f"<th>{name}</th>" for name in _COLUMNS)
+    rows = "".join(f"<tr>{''.join(map(_cell, event))}</tr>" for event in branch.events[list(_COLUMNS)].tolist())
+    return (
+        f"<div><p><b>{about}</b>: {len(branch.points)} points; {stop}</p>{svg}"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _cell(value) -> str:
+    text = (
+        html.escape(value.decode()) if isinstance(value, bytes) else f"{value:.10f}" if isinstance(value, float) else str(value)
+    )
+    return f"<td>{text}</td>"
