@@ -26,7 +26,6 @@ def to_html(branch) -> str:
 
 
 def _cell(value) -> str:
-    text = (
-        html.escape(value.decode()) if isinstance(value, bytes) else f"{value:.10f}" if isinstance(value, float) else str(value)
-    )
-    return f"<td>{text}</td>"
+    if isinstance(value, bytes):
+        return f"<td>{html.escape(value.decode())}</td>"
+    return f"<td>{value:.10f}</td>" if isinstance(value, float) else f"<td>{value}</td>"
