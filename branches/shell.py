@@ -1,4 +1,4 @@
-"""``python -m branches.shell --out FILE``: the unfolding strip as a solid, computed with CalculiX; results kept, never computed twice.
+"""``python -m branches.shell --out FILE``: the unfolding strip as a solid, by CalculiX; what is there is not computed twice.
 
 A check of one-dimensional theory by finite elements: for each `Case` the first xi at which the planar strip has an unstable
 out-of-plane vibration. `branches.shell_deck` writes the decks and reads the answers.
@@ -27,7 +27,7 @@ from branches.executor import cores, run_jobs
 from branches.files import StoreError, only_run, prepare, write_bytes
 
 PROGRAM = "ccx"
-INSTALL = "CalculiX (the program ccx) is not installed: apt-get install calculix-ccx, or see calculix.de"
+INSTALL = "CalculiX (the program ccx) is not installed; on Debian and Ubuntu: apt-get install calculix-ccx"
 #: Seconds for one run of CalculiX: one state, or all states of a path.
 TIME_LIMITS = {"thermal": 120.0, "direct": 600.0}
 #: Width in xi of the bracket in which a root is interpolated.
@@ -89,7 +89,8 @@ class Outcome:
     Attributes
     ----------
     root : float or None
-        The first xi with a marginal vibration, to about `BRACKET`; None if there is none, or ``problem`` says why it is not known.
+        The first xi with a marginal vibration, to about `BRACKET`; None if there is none, or where ``problem`` says
+        why it is not known.
     samples : tuple of (xi, omega**2)
         Ascending; omega**2 of the lowest out-of-plane vibration in units of D/(rho h R**4).
     problem : str
@@ -219,7 +220,8 @@ def grid(first: float, last: float, step: float) -> list[float]:
 def first_root(function: Callable[[float], float], first: float, last: float, step: float) -> float | None:
     """The first zero of a function that begins positive and cannot be had everywhere: it may raise `Unusable`.
 
-    Going up by steps until the sign changes; then false position, until the bracket is no wider than `BRACKET`. Where the
+    Going up by steps until the sign changes, hardly farther than to where a straight line through the last two points vanishes:
+    beyond the zero CalculiX is slow or fails. Then false position, until the bracket is no wider than `BRACKET`. Where the
     function cannot be had, points ever nearer to the last one where it could are tried.
 
     Raises
@@ -227,19 +229,25 @@ def first_root(function: Callable[[float], float], first: float, last: float, st
     Unusable
         At the first point, which may also be negative, or where no zero was found before the function could not be had.
     """
-    low, at_low = first, function(first)
+    low, at_low, falls_to_zero = first, function(first), math.inf
     if at_low <= 0:
         raise Unusable(f"unstable already at xi = {first:g}, where the search begins")
     high, at_high, barrier, reason = None, 0.0, None, ""
     for target in grid(first, last, step)[1:]:
         while low < target:
-            x = _next(low, at_low, high, at_high, barrier, target)
+            if barrier is not None:
+                x = (low + barrier) / 2
+            elif high is None:
+                x = min(target, falls_to_zero + BRACKET / 2)
+            else:
+                x = low + (high - low) * min(max(at_low / (at_low - at_high), 0.1), 0.9)
             try:
                 value = function(x)
             except Unusable as error:
                 barrier, reason = x, str(error)
             else:
                 if value > 0:
+                    falls_to_zero = x + (x - low) * value / (at_low - value) if value < at_low else math.inf
                     low, at_low = x, value
                 else:
                     high, at_high, barrier = x, value, None
@@ -248,16 +256,6 @@ def first_root(function: Callable[[float], float], first: float, last: float, st
             if barrier is not None and barrier - low <= BRACKET:
                 raise Unusable(f"stable up to xi = {low:.4f}, unknown beyond: {reason}")
     return None
-
-
-def _next(low, at_low, high, at_high, barrier, target) -> float:
-    """Where to evaluate next."""
-    if barrier is not None:
-        return (low + barrier) / 2
-    if high is None:
-        return target
-    part = at_low / (at_low - at_high)
-    return low + (high - low) * min(max(part, 0.1), 0.9)
 
 
 def solve(case: Case, stopped: Callable[[], bool] = lambda: False) -> Outcome:
@@ -275,7 +273,7 @@ def solve(case: Case, stopped: Callable[[], bool] = lambda: False) -> Outcome:
 
 
 def compute(cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], None] = lambda outcome, left: None) -> None:
-    """Compute what the file at ``path`` does not hold yet, as many cases at a time as there are cores; keep each when it is done.
+    """Compute what the file at ``path`` does not hold yet, a case on each core, and keep each when it is done.
 
     A case that failed before is tried again. ``report(outcome, left)`` is called after each.
 
@@ -326,8 +324,7 @@ def read(path: Path) -> list[Outcome]:
             rows, samples = file["cases"][:], file["samples"][:]
             outcomes = []
             for number, row in enumerate(rows):
-                values = {name: row[name].item() for name in _FIELDS}
-                case = Case(**{**values, "way": row["way"].decode()})
+                case = Case(row["way"].decode(), *(row[name].item() for name in _FIELDS[1:]))
                 own = samples[samples["case"] == number]
                 pairs = tuple(zip(own["xi"].tolist(), own["omega_squared"].tolist()))
                 root = None if math.isnan(row["root"]) else float(row["root"])
