@@ -16,7 +16,7 @@ const LOOPS = { 1: "single", 2: "double", 3: "triple", 4: "fourfold", 5: "fivefo
 
 const now = { family: FAMILIES[0], branch: null, s: 0, playing: false };
 const flat = !hasWebGL();
-let range = { x: [0, 1], y: [0, 1] }, busy = false, wanted = false, idle = 0;
+let range = { x: [0, 1], y: [0, 1] }, flatEye = EYE, busy = false, wanted = false, idle = 0;
 
 // --- words ---------------------------------------------------------------------------------------------------------
 
@@ -33,7 +33,8 @@ const nameOf = (branch) => {
 
 function stability(branch, s) {
   const index = branch.index(s);
-  if (index === null) return ["unknown", branch.columns.index ? "on the verge" : "not computed", ""];
+  const there = Math.abs(s - Math.round(s)) < 1e-6 && branch.m > 0; // a point where some direction is neutral
+  if (index === null) return ["unknown", !branch.columns.index ? "not computed" : there ? "on the verge" : "not known", ""];
   return index === 0 ? ["stable", "stable", "0"] : ["unstable", "unstable", index === -2 ? "∞" : String(index)];
 }
 
@@ -117,7 +118,7 @@ function diagramTraces() {
   const order = ["unknown", "unstable", "stable"];
   drawn.sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name));
   const { x, y, customdata, text, symbol, size, shown } = points();
-  const halo = { type: "scatter", mode: "lines", x: [], y: [], line: { color: colour("front"), width: 9 }, opacity: 0.38, hoverinfo: "skip", showlegend: false };
+  const halo = { type: "scatter", mode: "lines", ...selected(), line: { color: colour("front"), width: 9 }, opacity: 0.38, hoverinfo: "skip", showlegend: false };
   const marks = { type: "scatter", mode: "markers", x, y, customdata, hovertext: text, hoverinfo: "text", showlegend: false, marker: { symbol, size, opacity: shown, color: colour("mark"), line: { width: 1, color: colour("card") } } };
   const here = { type: "scatter", mode: "markers", x: [], y: [], hoverinfo: "skip", showlegend: false, marker: { size: 13, color: colour("front"), line: { width: 2, color: colour("mark") } } };
   return [halo, ...drawn, marks, here];
@@ -156,7 +157,7 @@ function extent(whole) {
 async function drawDiagram() {
   await Plotly.react("diagram", diagramTraces(), diagramLayout(), { responsive: true, displaylogo: false, scrollZoom: true, displayModeBar: false });
   drawLegend();
-  highlight();
+  placeMarker();
 }
 
 function drawLegend() {
@@ -168,14 +169,20 @@ function drawLegend() {
     [["circle", "● meets a flat ring"], ["fold", "★ fold"], ["secondary", "◆ secondary bifurcation"]].filter(([kind]) => marks.has(kind)).map(([, text]) => `<span>${text}</span>`).join("");
 }
 
-/** Lay a halo under the branch that is selected. */
-function highlight() {
+/** The line of the branch that is selected. */
+function selected() {
   const { branch } = now, x = [], y = [], steps = branch.circle ? 1 : FINE;
   for (let i = 0; i <= (branch.size - 1) * steps; i++) {
     x.push(branch.value("kappa_n", i / steps));
     y.push(branch.value("kappa_star", i / steps));
   }
-  return Plotly.restyle("diagram", { x: [x], y: [y] }, [0]).then(placeMarker);
+  return { x, y };
+}
+
+/** Lay the halo under the branch that is selected now. */
+function highlight() {
+  const { x, y } = selected();
+  return Plotly.restyle("diagram", { x: [x], y: [y] }, [0]);
 }
 
 /** Where the place s of a branch is in the diagram's frame: pixels, and whether it is inside the axes. */
@@ -261,9 +268,27 @@ async function updateRibbon() {
 }
 
 const eyeNow = () => {
-  const { eye } = flat ? { eye: EYE } : $("ribbon").layout.scene.camera;
-  return [eye.x, eye.y, eye.z];
+  const { x, y, z } = flat ? flatEye : $("ribbon").layout.scene.camera.eye;
+  return [x, y, z];
 };
+
+/** Look from elsewhere. */
+function look(eye) {
+  flatEye = eye;
+  if (flat) return update();
+  return Plotly.relayout("ribbon", { "scene.camera.eye": eye, "scene.camera.up": { x: 0, y: 0, z: 1 }, "scene.camera.center": { x: 0, y: 0, z: 0 } });
+}
+
+/** Arrow keys turn the strip when it has the focus, + and - change the distance. */
+function turnByKey(event) {
+  const turns = { ArrowLeft: [-0.15, 0, 1], ArrowRight: [0.15, 0, 1], ArrowUp: [0, 0.15, 1], ArrowDown: [0, -0.15, 1], "+": [0, 0, 0.9], "-": [0, 0, 1 / 0.9] };
+  if (!(event.key in turns) || event.ctrlKey || event.metaKey || event.altKey) return;
+  event.preventDefault();
+  event.stopPropagation();
+  const [about, over, farther] = turns[event.key], [x, y, z] = eyeNow(), r = Math.hypot(x, y, z) * farther;
+  const azimuth = Math.atan2(y, x) + about, height = Math.min(1.5, Math.max(-1.5, Math.asin(z / Math.hypot(x, y, z)) + over));
+  look({ x: r * Math.cos(height) * Math.cos(azimuth), y: r * Math.cos(height) * Math.sin(azimuth), z: r * Math.sin(height) });
+}
 
 /** The fill of a polygon as a function: its side's colour, darker where it faces away from the light. */
 function fills() {
@@ -331,6 +356,7 @@ function coexisting() {
 }
 
 function drawStates() {
+  clearTimeout(idle);
   const found = coexisting();
   $("states-note").textContent = `${found.length} at κₙL/2π = ${short(now.branch.value("kappa_n", now.s))}, least energy first`;
   $("states").replaceChildren(...found.map((one) => {
@@ -477,7 +503,8 @@ function connect() {
   };
   if (flat) $("triads").parentElement.hidden = true;
   $("triads").onchange = () => !flat && Plotly.react("ribbon", ribbonTraces(now.branch.strip(now.s)), $("ribbon").layout);
-  $("view").onclick = () => !flat && Plotly.relayout("ribbon", { "scene.camera.eye": EYE, "scene.camera.up": { x: 0, y: 0, z: 1 }, "scene.camera.center": { x: 0, y: 0, z: 0 } }).then(update);
+  $("view").onclick = () => look(EYE);
+  $("ribbon").addEventListener("keydown", turnByKey);
   $("slider").oninput = (event) => go(now.branch, now.branch.fromWay(Number(event.target.value) / 1000));
   $("previous").onclick = () => step(-1, false);
   $("next").onclick = () => step(1, false);

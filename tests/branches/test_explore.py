@@ -328,6 +328,11 @@ def test_play_keys_and_coexisting_states(pages, browser):
     for name, place in (("Home", 0), ("ArrowRight", 1), ("End", len(branch.points) - 1), ("ArrowLeft", len(branch.points) - 2)):
         browser.key(name)
         assert browser.js("explore.now.s") == place
+    browser.js("document.getElementById('ribbon').focus()")
+    eye = browser.js("document.getElementById('ribbon').layout.scene.camera.eye.x")
+    browser.key("ArrowRight")  # turns the strip, which has the focus now
+    browser.until(f"document.getElementById('ribbon').layout.scene.camera.eye.x !== {eye}")
+    assert browser.js("explore.now.s") == place
     # at kappa_n = 3: the single and the triple loop, and (1, 2) before and after its fold, energies from the file
     browser.js("explore.go(explore.now.branch, explore.now.branch.places(3)[0])")
     found = browser.js("explore.coexisting().map(({branch, s, energy}) => [branch.circle ? branch.m : 0, energy])")
