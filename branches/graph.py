@@ -313,11 +313,27 @@ def read(folder: str | Path):
         data = json.loads(path.read_text(encoding="utf-8"))
         if data["graph"]["format"] != "ribbon bifurcation diagram":
             raise KeyError("format")
-        return networkx.node_link_graph(data, edges="edges")
+        graph = networkx.node_link_graph(data, edges="edges")
+        _check(graph)
+        return graph
     except OSError as error:
         raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, networkx.NetworkXException) as error:
         raise StoreError(f"cannot read {str(path)!r}: it is no diagram written by this program") from error
+
+
+def _check(graph) -> None:
+    """ValueError, KeyError or TypeError unless nodes and edges have what the questions ask for."""
+    for _, data in graph.nodes(data=True):
+        if not (isinstance(data["kind"], str) and isinstance(data["law"], str)):
+            raise TypeError("kind and law are texts")
+        np.array([data[name] for name in ("nu", *COLUMNS[:3])], dtype=float)
+    for *_, data in graph.edges(data=True):
+        if not all(isinstance(data[name], kind) for name, kind in (("law", str), ("m", int), ("n", int))):
+            raise TypeError("a branch is known by its law, m and n")
+        if np.array([data[name] for name in COLUMNS], dtype=float).ndim != 2 or not len(data[COLUMNS[0]]):
+            raise ValueError("columns are as long as each other")
+        float(data["nu"])
 
 
 # --- command line -------------------------------------------------------------------------------------------------

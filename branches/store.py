@@ -17,10 +17,11 @@ import h5py
 import numpy as np
 
 from branches.files import StoreError, write_bytes
+from branches.layout import FORMAT, FORMAT_VERSION, check, damage_told, vector
 from contin import Collocation, Point, State, Stop
 
-FORMAT = "ribbon continuation branch"
-FORMAT_VERSION = 1
+#: HDF5's format from its version 1.10 on: what is damaged in it is found by checksums.
+_LIBRARY = "v110"
 
 #: Columns of /points and /events that are not parameters or functionals: name, type, meaning.
 _BOOKKEEPING = (
@@ -58,7 +59,7 @@ MEANINGS = {
 def versions() -> dict[str, str]:
     """Versions of everything a result depends on."""
     result = {"python": platform.python_version()}
-    for package in ("ribbon-continuation", "numpy", "numba", "h5py"):
+    for package in ("ribbon-continuation", "numpy", "scipy", "numba", "llvmlite", "h5py"):
         with contextlib.suppress(PackageNotFoundError):
             result[package] = version(package)
     return result
@@ -105,8 +106,8 @@ class BranchWriter:
         self.path, self._stride, self._free, self._index = path and Path(path), stride, tuple(free), index
         self._buffer: list[tuple[Point, int]] = []
         self._mark: tuple[State, int] | None = None
-        with _damage_told(path):
-            self._file = h5py.File.in_memory(image)
+        with damage_told(path):
+            self._file = h5py.File.in_memory(image, libver=_LIBRARY)
             self.count = self._create(problem) if image is None else self._rewind(problem)
         self._file.attrs["config"] = config_text
         # asking HDF5 for the columns again for each row would take longer than computing the row
@@ -122,17 +123,17 @@ class BranchWriter:
             "versions": json.dumps(versions()), "states": list(problem.states), "free_parameters": list(free),
         })  # fmt: skip
         for table, columns in _columns(problem, free, self._index is not None).items():
-            data = file.create_dataset(table, (0,), _kind(columns), maxshape=(None,), chunks=(256,))
+            data = file.create_dataset(table, (0,), _kind(columns), maxshape=(None,), chunks=(256,), fletcher32=True)
             for name, _, meaning in columns:
                 data.attrs[name] = meaning
         group = file.create_group("solutions")
         kind = np.dtype([("point", "i4"), ("start", "i8"), ("count", "i4"), ("degree", "i4")])
-        index = group.create_dataset("index", (0,), kind, maxshape=(None,), chunks=(256,))
+        index = group.create_dataset("index", (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)
         index.attrs["meaning"] = "rows start:start+count of t and states are the nodes of this point's solution"
-        t = group.create_dataset("t", (0,), "f8", maxshape=(None,), chunks=(1024,))
+        t = group.create_dataset("t", (0,), "f8", maxshape=(None,), chunks=(1024,), fletcher32=True)
         t.attrs["meaning"] = "nodes on the unit interval, arc length S = length * t; every degree-th is a mesh point"
         n = len(problem.states)
-        states = group.create_dataset("states", (0, n), "f8", maxshape=(None, n), chunks=(1024, n))
+        states = group.create_dataset("states", (0, n), "f8", maxshape=(None, n), chunks=(1024, n), fletcher32=True)
         states.attrs["meaning"] = "unit quaternion of the directors (q0 scalar), then the centreline where it is a state"
         states.attrs["columns"] = list(problem.states)
         return 0
@@ -258,18 +259,19 @@ class BranchWriter:
 
 
 def _write_vectors(group, system, **vectors):
-    group.create_dataset("mesh", data=system.mesh)
-    group.create_dataset("parameters", data=system.parameters)
     group.attrs["degree"] = system.degree
-    for name, vector in vectors.items():
-        if vector is not None:
-            group.create_dataset(name, data=vector)
+    for name, values in {"mesh": system.mesh, "parameters": system.parameters, **vectors}.items():
+        if values is not None:
+            group.create_dataset(name, data=values, chunks=values.shape, fletcher32=True)
 
 
 def _read_vectors(group, problem, free):
-    parameters = dict(zip(problem.parameters, group["parameters"][:]))
-    system = Collocation(problem, group["mesh"][:], int(group.attrs["degree"]), free, parameters)
-    return system, {name: group[name][:] for name in ("x", "tangent", "previous") if name in group}
+    parameters = dict(zip(problem.parameters, vector(group, "parameters"), strict=True))
+    system = Collocation(problem, vector(group, "mesh"), int(group.attrs["degree"]), free, parameters)
+    vectors = {name: vector(group, name) for name in ("x", "tangent", "previous") if name in group or name != "previous"}
+    if any(values.size != system.size for values in vectors.values()):
+        raise ValueError("vectors that do not fit their mesh")
+    return system, vectors
 
 
 def _extend(dataset, rows):
@@ -293,22 +295,9 @@ def open_branch(path: Path):
     except OSError as error:
         reason = "there is no such file" if not Path(path).exists() else "it is not a readable HDF5 file"
         raise StoreError(f"cannot read {str(path)!r}: {reason}") from error
-    with file, _damage_told(path):
-        if file.attrs.get("format") != FORMAT:
-            raise StoreError(f"cannot read {str(path)!r}: it is not a branch written by this program")
-        found = file.attrs["format_version"]
-        if found != FORMAT_VERSION:
-            raise StoreError(f"cannot read {str(path)!r}: its format version is {found}, not {FORMAT_VERSION}")
+    with file, damage_told(path):
+        check(file, path)
         yield file
-
-
-@contextlib.contextmanager
-def _damage_told(path: Path):
-    """What h5py raises for parts of a file that are missing or garbled, as a sentence."""
-    try:
-        yield
-    except (KeyError, OSError, RuntimeError) as error:
-        raise StoreError(f"cannot read {str(path)!r}: the file is damaged") from error
 
 
 def read_state(path: Path, problem, free):
@@ -322,12 +311,23 @@ def read_state(path: Path, problem, free):
     with open_branch(path) as file:
         if "resume" not in file:
             raise StoreError(f"{str(path)!r} holds nothing to resume; run it again without --resume")
-        group = file["resume"]
-        system, here = _read_vectors(group["here"], problem, free)
-        first, start = _read_vectors(group["start"], problem, free)
-        a, last = group.attrs, file["points"][int(group.attrs["points"]) - 1]
-        state = State(
-            system, here["x"], here["tangent"], here.get("previous"), float(a["previous_step"]), float(a["step"]),
-            float(a["sign"]), float(a["arclength"]), int(a["accepted"]), bool(a["singular"]),
-        )  # fmt: skip
-    return state, (first, start["x"], start["tangent"]), last, Path(path).read_bytes()
+        try:
+            return *_read_state(file, problem, free), Path(path).read_bytes()
+        except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
+            raise StoreError(f"cannot go on with {str(path)!r}: the file is damaged") from error
+
+
+def _read_state(file, problem, free):
+    """State, first point, last row."""
+    group = file["resume"]
+    system, here = _read_vectors(group["here"], problem, free)
+    first, start = _read_vectors(group["start"], problem, free)
+    a, last = group.attrs, file["points"][int(group.attrs["points"]) - 1]
+    numbers = {name: float(a[name]) for name in ("previous_step", "step", "arclength")}
+    if not all(map(np.isfinite, numbers.values())) or not 0 <= int(a["accepted"]) < int(a["points"]) <= len(file["points"]):
+        raise ValueError("a state that no run was in")
+    state = State(
+        system, here["x"], here["tangent"], here.get("previous"), numbers["previous_step"], numbers["step"], float(a["sign"]),
+        numbers["arclength"], int(a["accepted"]), bool(a["singular"]),
+    )  # fmt: skip
+    return state, (first, start["x"], start["tangent"]), last
