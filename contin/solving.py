@@ -71,6 +71,8 @@ def solve(
     _checks.instance("newton", newton, Newton, "a Newton")
     for other in _checks.sequence("others", others, "Point"):
         _checks.instance("others", other, Point, "a Point")
+        if system_of(other, "others").problem.states != problem.states:
+            raise ProblemError("others: must be solutions of this problem")
     if isinstance(guess, Point):
         parameters = {**guess.parameters, **parameters}
     needed = problem.free_size - 1

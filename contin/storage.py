@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from contin import _checks
 from contin._cache import write_bytes
 from contin.algebraic import Algebraic, AlgebraicProblem
 from contin.branch import Branch, Point, Stop
@@ -35,6 +36,9 @@ def save(branch: Branch, path: str | Path) -> None:
     ProblemError
         Points of an extended system (:func:`contin.curve`), which cannot start other runs.
     """
+    _checks.instance("branch", branch, Branch, "a Branch")
+    if not branch.points:
+        raise ProblemError("branch: has no points")
     systems: list[Collocation | Algebraic] = []
     rows: list[dict[str, Any]] = []
     arrays: dict[str, Any] = {}
@@ -78,6 +82,7 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
     ProblemError
         It is no branch, or one of a problem with other states or parameters.
     """
+    _checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
     with open(path, "rb"):
         pass  # a file that cannot be read is an OSError; whatever goes wrong below is in what it holds
     try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contin import _checks
 from contin.errors import ProblemError
 from contin.interface import Array, Carrier, Discretization, Indices, Statement
 
@@ -38,7 +39,7 @@ class System(Discretization):
     parameters: Array
 
     def __init__(self, problem: Statement, free: Sequence[str], parameters: Mapping[str, float]) -> None:
-        self.problem, self.free = problem, tuple(free)
+        self.problem, self.free = problem, _checks.names("free", free)
         names = tuple(problem.parameters)
         for name in (*self.free, *parameters):
             if name not in names:
