@@ -263,6 +263,22 @@ def test_page_draws_without_errors(name, pages, browser):
 
 
 @needs_chromium
+def test_page_draws_without_webgl(pages, browser):
+    source = """const ask = HTMLCanvasElement.prototype.getContext;
+        HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+            return kind.startsWith("webgl") ? null : ask.call(this, kind, ...more);
+        };"""
+    blind = browser.call("Page.addScriptToEvaluateOnNewDocument", source=source)["identifier"]
+    try:
+        browser.open(pages / "m1_n2.html")
+    finally:
+        browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=blind)
+    assert browser.js("document.querySelector('#ribbon > canvas.flat') !== null")
+    assert browser.colours("#ribbon") > 200
+    assert browser.errors == []
+
+
+@needs_chromium
 def test_click_shows_what_the_file_holds(pages, browser):
     """A click on the fold in the diagram: read-out and shape are those of the file."""
     branch = read_branch(pages / "m1_n2.h5")
