@@ -23,7 +23,7 @@ from contin.events import Monitor, Trial, fold, limit, sign_changed, user_zero
 from contin.interface import Array, Discretization
 from contin.location import Segment, Start, refined
 from contin.settings import Settings
-from contin.steps import State, corrected, hidden_turn, predict, sharpened, tangent_error, turn, unit_tangent
+from contin.steps import State, corrected, hidden_turn, located, predict, sharpened, tangent_error, turn, unit_tangent
 from contin.switching import calm, crossings, inner, quotients
 
 #: A step is cut down to this fraction of itself to take several branch points one by one, before they count as one.
@@ -248,7 +248,7 @@ class Continuation:
                 self._end = Trial(state.system, state.x, state.tangent, state.sign)
             return 0.0, self._end
         low = _ASIDE * step
-        aside = corrected(state, state.x + low * state.tangent, low, self.settings.newton, exact=True)
+        aside = located(state, state.x + low * state.tangent, low, self.settings.newton)
         if turn(state, aside) > self.settings.angle:
             raise ConvergenceError("another branch was met right beside the branch point")
         return low, aside

@@ -201,162 +201,233 @@ def factorize(n, local, border, border_corner, chain, chain_border, first, last,
     return sign * _eliminate(dense, dense.shape[0], piv_dense, np.empty((0, dense.shape[0])), smallest)
 
 
-@njit(inline="never", **_OPTIONS)
-def _forward(block, columns, pivots, border, x, y):
-    """Apply the elimination of ``block`` to the right-hand sides ``x`` (rows) of its rows and ``y`` of the border."""
-    for c in range(columns):
-        x[c], x[pivots[c]] = x[pivots[c]], x[c]
-    for i in range(1, block.shape[0]):
-        count = min(i, columns)
-        x[i] -= _dot(block[i, :count], x[:count])
-    for i in range(border.shape[0]):
-        y[i] -= _dot(border[i, :columns], x[:columns])
+#: Right-hand sides that are taken through the factors together: each number loaded from memory then serves so many.
+_TOGETHER = 3
+
+
+@njit(inline="always", **_OPTIONS)
+def _dots(row, a, b, c):
+    """Products of one row with three vectors."""
+    p, q, r = 0.0, 0.0, 0.0
+    for j in range(row.size):
+        value = row[j]
+        p += value * a[j]
+        q += value * b[j]
+        r += value * c[j]
+    return p, q, r
+
+
+@njit(inline="always", **_OPTIONS)
+def _add_multiples(a, b, c, p, q, r, row):
+    """Multiples of one row added to three vectors."""
+    for j in range(row.size):
+        value = row[j]
+        a[j] += p * value
+        b[j] += q * value
+        c[j] += r * value
 
 
 @njit(inline="never", **_OPTIONS)
-def _backward(block, columns, x, known):
-    """Solve the upper triangle of the eliminated ``columns`` for x[:columns]; ``known`` are the unknowns after them."""
-    for c in range(columns - 1, -1, -1):
-        total = _dot(block[c, c + 1 : columns], x[c + 1 : columns]) + _dot(block[c, columns:], known)
-        x[c] = (x[c] - total) / block[c, c]
+def _forward(block, columns, pivots, border, X, Y):
+    """Apply the elimination of ``block`` to right-hand sides: rows of X those of its rows, of Y those of the border."""
+    count = X.shape[0]
+    together = count - count % _TOGETHER
+    for k in range(count):
+        x = X[k]
+        for c in range(columns):
+            x[c], x[pivots[c]] = x[pivots[c]], x[c]
+    for k in range(0, together, _TOGETHER):
+        a, b, c = X[k], X[k + 1], X[k + 2]
+        for i in range(1, block.shape[0]):
+            upto = min(i, columns)
+            p, q, r = _dots(block[i, :upto], a[:upto], b[:upto], c[:upto])
+            a[i], b[i], c[i] = a[i] - p, b[i] - q, c[i] - r
+        for i in range(border.shape[0]):
+            p, q, r = _dots(border[i, :columns], a[:columns], b[:columns], c[:columns])
+            Y[k, i], Y[k + 1, i], Y[k + 2, i] = Y[k, i] - p, Y[k + 1, i] - q, Y[k + 2, i] - r
+    for k in range(together, count):
+        x = X[k]
+        for i in range(1, block.shape[0]):
+            upto = min(i, columns)
+            x[i] -= _dot(block[i, :upto], x[:upto])
+        for i in range(border.shape[0]):
+            Y[k, i] -= _dot(border[i, :columns], x[:columns])
+
+
+@njit(inline="never", **_OPTIONS)
+def _backward(block, columns, X, known):
+    """Solve the upper triangle of the eliminated ``columns`` for X[:, :columns]; ``known`` are the unknowns after them."""
+    count = X.shape[0]
+    together = count - count % _TOGETHER
+    for k in range(0, together, _TOGETHER):
+        a, b, c = X[k], X[k + 1], X[k + 2]
+        u, v, w = known[k], known[k + 1], known[k + 2]
+        for i in range(columns - 1, -1, -1):
+            p, q, r = _dots(block[i, i + 1 : columns], a[i + 1 : columns], b[i + 1 : columns], c[i + 1 : columns])
+            s, t, o = _dots(block[i, columns:], u, v, w)
+            inverse = 1 / block[i, i]
+            a[i], b[i], c[i] = (a[i] - p - s) * inverse, (b[i] - q - t) * inverse, (c[i] - r - o) * inverse
+    for k in range(together, count):
+        x = X[k]
+        for i in range(columns - 1, -1, -1):
+            total = _dot(block[i, i + 1 : columns], x[i + 1 : columns]) + _dot(block[i, columns:], known[k])
+            x[i] = (x[i] - total) / block[i, i]
 
 
 @njit(
-    "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],i8[:,::1], i8[:,::1], i8[::1], f8[::1], f8[::1])",
+    "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],i8[:,::1], i8[:,::1], i8[::1], f8[:,::1],"
+    "f8[:,::1])",
     **_OPTIONS,
 )
 def solve(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, b, x):
-    """Solve J x = b with the factors; ``b`` (equations) is overwritten."""
+    """Solve J x = b with the factors for rows of b (m, equations), which are overwritten, and of x (m, unknowns)."""
     intervals, rows, width = local.shape
     inner = rows - n
     r, k = border.shape[1], width - inner - 2 * n
-    size = dense.shape[0]
-    edge = b[b.size - r :]
+    size, count = dense.shape[0], b.shape[0]
+    here, edge = np.empty((count, rows)), np.empty((count, r))
+    _copy(edge, b[:, b.shape[1] - r :])
     for j in range(intervals):
-        _forward(local[j], inner, piv_local[j], border[j], b[j * rows : (j + 1) * rows], edge)
-    pair = np.empty((max(intervals - 1, 1), 2 * n))
-    current = np.empty(n)
-    _copy_vector(current, b[inner:rows])
+        _copy(here, b[:, j * rows : (j + 1) * rows])
+        _forward(local[j], inner, piv_local[j], border[j], here, edge)
+        _copy(b[:, j * rows : (j + 1) * rows], here)
+    pair = np.empty((max(intervals - 1, 1), count, 2 * n))
+    current = np.empty((count, n))
+    _copy(current, b[:, inner:rows])
     for j in range(1, intervals):
-        _copy_vector(pair[j - 1, :n], current)
-        _copy_vector(pair[j - 1, n:], b[j * rows + inner : (j + 1) * rows])
+        _copy(pair[j - 1, :, :n], current)
+        _copy(pair[j - 1, :, n:], b[:, j * rows + inner : (j + 1) * rows])
         _forward(chain[j - 1], n, piv_chain[j - 1], chain_border[j - 1], pair[j - 1], edge)
-        _copy_vector(current[:], pair[j - 1, n:])
-    z = np.empty(size)
-    _copy_vector(z[:n], current)
-    _copy_vector(z[n:], b[intervals * rows :])
-    none = np.empty((0, size))
-    _forward(dense, size, piv_dense, none, z, edge)
-    _backward(dense, size, z, edge)
-    _copy_vector(x[:n], z[:n])
-    _copy_vector(x[x.size - k - n :], z[n:])
-    known = np.empty(2 * n + k)
-    _copy_vector(known[:n], z[:n])
-    _copy_vector(known[2 * n :], z[2 * n :])
+        _copy(current, pair[j - 1, :, n:])
+    z = np.empty((count, size))
+    _copy(z[:, :n], current)
+    _copy(z[:, n : size - r], b[:, intervals * rows : b.shape[1] - r])
+    _copy(z[:, size - r :], edge)
+    _forward(dense, size, piv_dense, np.empty((0, size)), z, edge)
+    _backward(dense, size, z, np.empty((count, 0)))
+    _copy(x[:, :n], z[:, :n])
+    _copy(x[:, x.shape[1] - k - n :], z[:, n:])
+    known = np.empty((count, 2 * n + k))
+    _copy(known[:, :n], z[:, :n])
+    _copy(known[:, 2 * n :], z[:, 2 * n :])
     for j in range(intervals - 1, 0, -1):
-        _copy_vector(known[n : 2 * n], x[(j + 1) * rows : (j + 1) * rows + n])
+        _copy(known[:, n : 2 * n], x[:, (j + 1) * rows : (j + 1) * rows + n])
         _backward(chain[j - 1], n, pair[j - 1], known)
-        _copy_vector(x[j * rows : j * rows + n], pair[j - 1, :n])
+        _copy(x[:, j * rows : j * rows + n], pair[j - 1, :, :n])
     for j in range(intervals):
-        _copy_vector(known[:n], x[j * rows : j * rows + n])
-        _copy_vector(known[n : 2 * n], x[(j + 1) * rows : (j + 1) * rows + n])
-        _backward(local[j], inner, b[j * rows : (j + 1) * rows], known)
-        _copy_vector(x[j * rows + n : (j + 1) * rows], b[j * rows : j * rows + inner])
+        _copy(known[:, :n], x[:, j * rows : j * rows + n])
+        _copy(known[:, n : 2 * n], x[:, (j + 1) * rows : (j + 1) * rows + n])
+        _copy(here[:, :inner], b[:, j * rows : j * rows + inner])
+        _backward(local[j], inner, here, known)
+        _copy(x[:, j * rows + n : (j + 1) * rows], here[:, :inner])
+
+
+@njit(inline="never", **_OPTIONS)
+def _forward_transposed(block, columns, X, rest):
+    """Solve U^T z = x for the eliminated columns, in place; subtract what z contributes to the columns after them."""
+    count, after = X.shape[0], block.shape[1] - columns
+    together = count - count % _TOGETHER
+    for k in range(0, together, _TOGETHER):
+        a, b, c = X[k], X[k + 1], X[k + 2]
+        u, v, w = rest[k, :after], rest[k + 1, :after], rest[k + 2, :after]
+        for i in range(columns):
+            inverse = 1 / block[i, i]
+            p, q, r = a[i] * inverse, b[i] * inverse, c[i] * inverse
+            a[i], b[i], c[i] = p, q, r
+            _add_multiples(a[i + 1 : columns], b[i + 1 : columns], c[i + 1 : columns], -p, -q, -r, block[i, i + 1 : columns])
+            _add_multiples(u, v, w, -p, -q, -r, block[i, columns:])
+    for k in range(together, count):
+        x, others = X[k], rest[k, :after]
+        for i in range(columns):
+            value = x[i] / block[i, i]
+            x[i] = value
+            if value != 0.0:
+                _add_multiple(x[i + 1 : columns], -value, block[i, i + 1 : columns])
+                _add_multiple(others, -value, block[i, columns:])
+
+
+@njit(inline="never", **_OPTIONS)
+def _backward_transposed(block, columns, pivots, border, X, Y):
+    """Apply the transpose of the elimination of ``block`` to the multipliers X of its rows and Y of the border."""
+    count = X.shape[0]
+    together = count - count % _TOGETHER
+    for k in range(0, together, _TOGETHER):
+        a, b, c = X[k], X[k + 1], X[k + 2]
+        for i in range(border.shape[0]):
+            row = border[i, :columns]
+            _add_multiples(a[:columns], b[:columns], c[:columns], -Y[k, i], -Y[k + 1, i], -Y[k + 2, i], row)
+        for i in range(block.shape[0] - 1, 0, -1):
+            upto = min(i, columns)
+            _add_multiples(a[:upto], b[:upto], c[:upto], -a[i], -b[i], -c[i], block[i, :upto])
+    for k in range(together, count):
+        x = X[k]
+        for i in range(border.shape[0]):
+            _add_multiple(x[:columns], -Y[k, i], border[i, :columns])
+        for i in range(block.shape[0] - 1, 0, -1):
+            upto = min(i, columns)
+            _add_multiple(x[:upto], -x[i], block[i, :upto])
+    for k in range(count):
+        x = X[k]
+        for c in range(columns - 1, -1, -1):
+            x[c], x[pivots[c]] = x[pivots[c]], x[c]
 
 
 @njit(
     "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],i8[:,::1], i8[:,::1], i8[::1], f8[:,::1],"
     "f8[:,::1])",
-    **_OPTIONS,
-)
-def solve_rows(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, b, x):
-    """The same for each row of b (m, equations) and x (m, unknowns)."""
-    for i in range(b.shape[0]):
-        solve(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, b[i], x[i])
-
-
-@njit(inline="never", **_OPTIONS)
-def _forward_transposed(block, columns, x, rest):
-    """Solve U^T z = x for the eliminated columns, in place; subtract what z contributes to the columns after them."""
-    for c in range(columns):
-        value = x[c] / block[c, c]
-        x[c] = value
-        if value != 0.0:
-            _add_multiple(x[c + 1 : columns], -value, block[c, c + 1 : columns])
-            _add_multiple(rest[: block.shape[1] - columns], -value, block[c, columns:])
-
-
-@njit(inline="never", **_OPTIONS)
-def _backward_transposed(block, columns, pivots, border, x, y):
-    """Apply the transpose of the elimination of ``block`` to the multipliers x of its rows and y of the border."""
-    for i in range(border.shape[0]):
-        _add_multiple(x[:columns], -y[i], border[i, :columns])
-    for i in range(block.shape[0] - 1, 0, -1):
-        count = min(i, columns)
-        _add_multiple(x[:count], -x[i], block[i, :count])
-    for c in range(columns - 1, -1, -1):
-        x[c], x[pivots[c]] = x[pivots[c]], x[c]
-
-
-@njit(
-    "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],i8[:,::1], i8[:,::1], i8[::1], f8[::1], f8[::1])",
     **_OPTIONS,
 )
 def solve_transposed(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, c, y):
-    """Solve J^T y = c with the factors; ``c`` (unknowns) is overwritten."""
+    """Solve J^T y = c with the factors for rows of c (m, unknowns), which are overwritten, and of y (m, equations)."""
     intervals, rows, width = local.shape
     inner = rows - n
     r, k = border.shape[1], width - inner - 2 * n
-    size = dense.shape[0]
-    rest = np.empty(2 * n + k)
+    size, count = dense.shape[0], c.shape[0]
+    parameters = c.shape[1] - k
+    rest, here = np.empty((count, 2 * n + k)), np.empty((count, rows))
     for j in range(intervals):
-        _copy_vector(rest[:n], c[j * rows : j * rows + n])
-        _copy_vector(rest[n : 2 * n], c[(j + 1) * rows : (j + 1) * rows + n])
-        _copy_vector(rest[2 * n :], c[c.size - k :])
-        _forward_transposed(local[j], inner, c[j * rows + n : (j + 1) * rows], rest)
-        _copy_vector(c[j * rows : j * rows + n], rest[:n])
-        _copy_vector(c[(j + 1) * rows : (j + 1) * rows + n], rest[n : 2 * n])
-        _copy_vector(c[c.size - k :], rest[2 * n :])
+        _copy(rest[:, :n], c[:, j * rows : j * rows + n])
+        _copy(rest[:, n : 2 * n], c[:, (j + 1) * rows : (j + 1) * rows + n])
+        _copy(rest[:, 2 * n :], c[:, parameters:])
+        _copy(here[:, :inner], c[:, j * rows + n : (j + 1) * rows])
+        _forward_transposed(local[j], inner, here, rest)
+        _copy(c[:, j * rows + n : (j + 1) * rows], here[:, :inner])
+        _copy(c[:, j * rows : j * rows + n], rest[:, :n])
+        _copy(c[:, (j + 1) * rows : (j + 1) * rows + n], rest[:, n : 2 * n])
+        _copy(c[:, parameters:], rest[:, 2 * n :])
     for j in range(1, intervals):
-        _copy_vector(rest[:n], c[:n])
-        _copy_vector(rest[n : 2 * n], c[(j + 1) * rows : (j + 1) * rows + n])
-        _copy_vector(rest[2 * n :], c[c.size - k :])
-        _forward_transposed(chain[j - 1], n, c[j * rows : j * rows + n], rest)
-        _copy_vector(c[:n], rest[:n])
-        _copy_vector(c[(j + 1) * rows : (j + 1) * rows + n], rest[n : 2 * n])
-        _copy_vector(c[c.size - k :], rest[2 * n :])
-    z = np.empty(size)
-    _copy_vector(z[:n], c[:n])
-    _copy_vector(z[n:], c[c.size - k - n :])
-    none = np.empty((0, size))
+        _copy(rest[:, :n], c[:, :n])
+        _copy(rest[:, n : 2 * n], c[:, (j + 1) * rows : (j + 1) * rows + n])
+        _copy(rest[:, 2 * n :], c[:, parameters:])
+        _copy(here[:, :n], c[:, j * rows : j * rows + n])
+        _forward_transposed(chain[j - 1], n, here, rest)
+        _copy(c[:, j * rows : j * rows + n], here[:, :n])
+        _copy(c[:, :n], rest[:, :n])
+        _copy(c[:, (j + 1) * rows : (j + 1) * rows + n], rest[:, n : 2 * n])
+        _copy(c[:, parameters:], rest[:, 2 * n :])
+    z = np.empty((count, size))
+    _copy(z[:, :n], c[:, :n])
+    _copy(z[:, n:], c[:, parameters - n :])
+    edge = np.empty((count, r))
     _forward_transposed(dense, size, z, rest)
-    _backward_transposed(dense, size, piv_dense, none, z, rest)
-    _copy_vector(y[intervals * rows :], z[n:])
-    edge = y[y.size - r :]
-    current = np.empty(n)
-    _copy_vector(current, z[:n])
-    pair = np.empty(2 * n)
+    _backward_transposed(dense, size, piv_dense, np.empty((0, size)), z, edge)
+    _copy(y[:, intervals * rows :], z[:, n:])
+    _copy(edge, z[:, size - r :])
+    current = np.empty((count, n))
+    _copy(current, z[:, :n])
+    pair = np.empty((count, 2 * n))
     for j in range(intervals - 1, 0, -1):
-        _copy_vector(pair[:n], c[j * rows : j * rows + n])
-        _copy_vector(pair[n:], current)
+        _copy(pair[:, :n], c[:, j * rows : j * rows + n])
+        _copy(pair[:, n:], current)
         _backward_transposed(chain[j - 1], n, piv_chain[j - 1], chain_border[j - 1], pair, edge)
-        _copy_vector(current[:], pair[:n])
-        _copy_vector(y[j * rows + inner : (j + 1) * rows], pair[n:])
-    _copy_vector(y[inner:rows], current)
+        _copy(current, pair[:, :n])
+        _copy(y[:, j * rows + inner : (j + 1) * rows], pair[:, n:])
+    _copy(y[:, inner:rows], current)
     for j in range(intervals):
-        _copy_vector(y[j * rows : j * rows + inner], c[j * rows + n : (j + 1) * rows])
-        _backward_transposed(local[j], inner, piv_local[j], border[j], y[j * rows : (j + 1) * rows], edge)
-
-
-@njit(
-    "void(i8, f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],i8[:,::1], i8[:,::1], i8[::1], f8[:,::1],"
-    "f8[:,::1])",
-    **_OPTIONS,
-)
-def solve_transposed_rows(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, c, y):
-    """The same for each row of c (m, unknowns) and y (m, equations)."""
-    for i in range(c.shape[0]):
-        solve_transposed(n, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, c[i], y[i])
+        _copy(here[:, :inner], c[:, j * rows + n : (j + 1) * rows])
+        _copy(here[:, inner:], y[:, j * rows + inner : (j + 1) * rows])
+        _backward_transposed(local[j], inner, piv_local[j], border[j], here, edge)
+        _copy(y[:, j * rows : (j + 1) * rows], here)
 
 
 class Factorization:
@@ -404,14 +475,14 @@ class Factorization:
 
     def solve(self, b: Array) -> Array:
         """The x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""
-        b = np.array(b, dtype=float)
-        x = np.empty((*b.shape[:-1], self._unknowns))
-        (solve if b.ndim == 1 else solve_rows)(*self._factors, b, x)
-        return x
+        return self._solved(solve, b)
 
     def solve_transposed(self, c: Array) -> Array:
         """The y (equations,) with J^T y = c (unknowns,); for several, rows of y and c (m, ...)."""
-        c = np.array(c, dtype=float)
-        y = np.empty((*c.shape[:-1], self._unknowns))
-        (solve_transposed if c.ndim == 1 else solve_transposed_rows)(*self._factors, c, y)
-        return y
+        return self._solved(solve_transposed, c)
+
+    def _solved(self, how: Any, given: Array) -> Array:
+        given = np.array(given, dtype=float)
+        result = np.empty((*given.shape[:-1], self._unknowns))
+        how(*self._factors, given.reshape(-1, given.shape[-1]), result.reshape(-1, self._unknowns))
+        return result

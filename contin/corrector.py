@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -44,6 +45,10 @@ _FAR = 0.1
 _CHORDS = 4
 #: Updates that small and no longer shrinking are round-off.
 _ROUND_OFF = 1e-9
+#: With factors from elsewhere the first update is below this, and each of the next below this part of the one before.
+_CLOSE = 0.03
+#: An update that is nothing.
+_EXACT = 1e-15
 
 
 def correct(
@@ -64,15 +69,19 @@ def correct(
     row : ndarray, shape (size,), optional
         The linear condition; without it F = 0 must be square.
     factors : optional
-        A factorization from near by to start with.
+        A factorization from near by: tried first, for as long as it converges fast.
 
     Raises
     ------
     ConvergenceError
         Not converged, or not finite; the message holds the last updates.
     """
+    if factors is not None:
+        with contextlib.suppress(ConvergenceError):
+            return _chords(system, guess, row, target, newton, factors)
     rows = () if row is None else (row,)
     x, history, moved = np.array(guess, dtype=float), [], 1.0
+    factors = None
     with np.errstate(all="ignore"):
         for _ in range(newton.max_iterations):
             if factors is None:
@@ -96,8 +105,35 @@ def correct(
                 break
             if size > _FAR or not rate < 0.5 or np.log(newton.tolerance / size) < _CHORDS * np.log(rate):
                 factors = None
+    raise _failure(history)
+
+
+def _chords(
+    system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, factors: Factors
+) -> Corrected:
+    """The same with factors from elsewhere only, for a guess that is close; fails where they converge slowly."""
+    x = np.array(guess, dtype=float)
+    history: list[float] = []
+    with np.errstate(all="ignore"):
+        while len(history) < _CHORDS:
+            residual = system.residual(x)
+            update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
+            history.append(float(np.max(np.abs(update) / (1 + np.abs(x)))))
+            x = x - update
+            if history[-1] <= _EXACT:
+                return Corrected(x, factors, len(history), history[-1])
+            if not history[-1] < _CLOSE * (history[-2] if len(history) > 1 else 1.0):
+                break
+            if len(history) > 1:
+                ratio = history[-1] / history[-2]
+                if history[-1] * ratio / (1 - ratio) <= newton.tolerance:
+                    return Corrected(x, factors, len(history), history[-1] * ratio / (1 - ratio))
+    raise _failure(history)
+
+
+def _failure(history: list[float]) -> ConvergenceError:
     updates = ", ".join(f"{size:.1e}" for size in history) or "not finite"
-    raise ConvergenceError(f"Newton did not converge (updates {updates})")
+    return ConvergenceError(f"Newton did not converge (updates {updates})")
 
 
 def _rate(history: list[float], fresh: bool, moved: float) -> float:

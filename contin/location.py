@@ -17,7 +17,7 @@ from contin.errors import ConvergenceError
 from contin.events import Monitor, Trial, find_zero, sign_changed
 from contin.interface import Array, Carrier, Discretization, Factors
 from contin.settings import Settings
-from contin.steps import State, corrected
+from contin.steps import Located, State, located
 from contin.switching import BranchPoint, MultiplePoint, along, inner, locate_branch_point, smallest_directions
 
 #: A component of the unit tangent below this at both ends of a step is zero: its sign says nothing.
@@ -97,6 +97,7 @@ class Segment:
         self.state, self.before, self.low, self.trial, self.step = state, before, low, trial, step
         self.settings, self.start = settings, start
         self.fold: Any = fold
+        self._last: tuple[float, Located] | None = None
 
     def events(self, monitors: Iterable[Monitor]) -> list[Event]:
         """What happens in the step, in order."""
@@ -123,7 +124,14 @@ class Segment:
 
     def _at(self, at: float) -> Trial:
         """The point of the curve at this place along the state's tangent, with its exact tangent and factors."""
-        return corrected(self.state, self._between(at), at, self.settings.newton, exact=True)
+        guess, factors = self._between(at), self.trial.factors
+        if self._last is not None:  # off the cubic by about as much as the last one was
+            place, last = self._last
+            guess = guess + last.x - self._between(place)
+            factors = last.factors if last.sharp else factors
+        there = located(self.state, guess, at, self.settings.newton, factors)
+        self._last = at, there
+        return there
 
     def _between(self, at: float) -> Array:
         """A guess on the curve by the cubic through both ends and their tangents."""
@@ -467,7 +475,7 @@ def _again(system: Discretization, x: Array, tangent: Array, monitor: Monitor | 
     state = State(system, x, tangent, None, 1.0, 1.0, 1.0, 0.0, 0, False)
 
     def at(s: float) -> Trial:
-        return corrected(state, x + s * tangent, s, settings.newton, exact=True)
+        return located(state, x + s * tangent, s, settings.newton)
 
     trial = at(0.0)
     if monitor is None:

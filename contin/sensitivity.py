@@ -122,6 +122,6 @@ def _of_branch_point(point: Point, name: str) -> dict[str, float]:
         changed = system.with_parameters({name: value + s})
         return _Bordered(changed, point.x + s * response, found.kernel, found.left).g
 
-    hessian = _hessian(system, point.x, found.kernel, found.left, matrix.kernel)
+    hessian = _hessian(system, point.x, matrix)
     moved = response - np.linalg.solve(hessian, _slope(gradient)) @ matrix.kernel
     return dict(zip(system.free, map(float, moved[system.state_size :])))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from contin.corrector import Newton, correct
+from contin.corrector import Corrected, Newton, correct
 from contin.events import Trial
 from contin.interface import Array, Discretization, Factors
 from contin.switching import inner
@@ -52,19 +53,52 @@ def predict(state: State, step: float) -> Array:
     return guess
 
 
-def corrected(state: State, guess: Array, step: float, newton: Newton, exact: bool = False) -> Trial:
-    """The point of the curve at ``step`` along the state's tangent; ``exact``: with its own tangent taken right there.
+class Located(Trial):
+    """A point of the curve inside a step: tangent, sign and factors are taken right there, when first asked for."""
+
+    def __init__(self, state: State, done: Corrected) -> None:
+        super().__init__(state.system, done.x, done.x, np.nan, done.iterations, done.error, exact=True)
+        self._row = state.system.weights * state.tangent
+        del self.tangent, self.sign, self.factors
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in ("tangent", "sign", "factors"):
+            raise AttributeError(name)
+        self.factors = self.system.linearize(self.x, (self._row,))[1]
+        self.sign, self.tangent = self.factors.sign, unit_tangent(self.system, self.factors)
+        return self.__dict__[name]
+
+    @property
+    def sharp(self) -> bool:
+        """Whether they were asked for."""
+        return "factors" in self.__dict__
+
+
+def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
+    """The point of the curve at ``step`` along the state's tangent, its tangent from Newton's last factors.
 
     Raises
     ------
     ConvergenceError
     """
-    system = state.system
-    row = system.weights * state.tangent
-    done = correct(system, guess, row, row @ state.x + step, newton)
-    tangent = unit_tangent(system, done.factors)
-    trial = Trial(system, done.x, tangent, done.factors.sign, done.iterations, done.error, done.factors)
-    return sharpened(state, trial) if exact else trial
+    done = _corrected(state, guess, step, newton)
+    tangent = unit_tangent(state.system, done.factors)
+    return Trial(state.system, done.x, tangent, done.factors.sign, done.iterations, done.error, done.factors)
+
+
+def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Located:
+    """The same point with its own tangent; ``factors`` from near by save Newton's method its own.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    return Located(state, _corrected(state, guess, step, newton, factors))
+
+
+def _corrected(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Corrected:
+    row = state.system.weights * state.tangent
+    return correct(state.system, guess, row, row @ state.x + step, newton, factors)
 
 
 def sharpened(state: State, trial: Trial) -> Trial:

@@ -13,7 +13,7 @@ import dataclasses
 import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -77,10 +77,15 @@ class _Bordered:
         solutions = self.factors.solve(np.hstack([np.zeros((2, system.equations)), np.eye(2)]))
         self.kernel, self.g = solutions[:, :-1], solutions[:, -1]
 
-    def left(self, system: Discretization) -> Array:
+    def multipliers(self, system: Discretization) -> Array:
+        """The row of the inverse that belongs to psi: w with w.psi = 1, about the left null vector of F_x."""
         unit = np.zeros(system.size + 1)
         unit[-1] = 1.0
-        left = self.factors.solve_transposed(unit)[: system.equations]
+        return self.factors.solve_transposed(unit)[: system.equations]
+
+    def left(self, system: Discretization) -> Array:
+        """The same with unit length."""
+        left = self.multipliers(system)
         return left / np.linalg.norm(left)
 
 
@@ -232,7 +237,7 @@ def locate_branch_point(
                 phi, psi = _orthonormal(system, matrix.kernel), matrix.left(system)
                 continue
             if hessian is None:
-                hessian, origin = _hessian(system, x, phi, psi, matrix.kernel), x
+                hessian, origin = _hessian(system, x, matrix), x
             if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(matrix.g))):
                 break
             # one Newton step for F + beta psi = 0 and, through its gradient g, for grad beta = 0
@@ -249,7 +254,7 @@ def locate_branch_point(
             if size <= newton.tolerance or (size < 1e-9 and size > 0.3 * last):
                 if np.max(np.abs(x - origin)) > 1e-3:  # the tangents are wanted as they are right there
                     matrix = _Bordered(system, x, phi, psi)
-                    hessian = _hessian(system, x, phi, psi, matrix.kernel)
+                    hessian = _hessian(system, x, matrix)
                 return _finish(system, x, matrix, hessian, beta)
             if size > 0.05 * last:
                 hessian = None
@@ -257,14 +262,23 @@ def locate_branch_point(
     raise ConvergenceError(f"no branch point near by (last update {last:.1e})")
 
 
-def _hessian(system: Discretization, x: Array, phi: Array, psi: Array, kernel: Array, scale: float = 1e-4) -> Array:
-    """The Hessian of beta, shape (2, 2), by central differences of its exact gradient."""
-    columns = []
-    for vector in kernel:
-        g = [_Bordered(system, x + sign * scale * vector, phi, psi).g for sign in (1, -1)]
-        columns.append((g[0] - g[1]) / (2 * scale))
-    hessian = np.array(columns)
-    return (hessian + hessian.T) / 2
+def _hessian(system: Discretization, x: Array, matrix: _Bordered, scale: float = 5e-3) -> Array:
+    """The Hessian of beta, shape (2, 2): -w.F_xx v_i v_j, by second differences of fourth order along v_1, v_2 and v_1 + v_2.
+
+    F(x(s)) + beta(s) psi = 0 with Phi.x = s, differentiated twice, times the row w of the inverse of M that belongs to psi.
+    """
+    w = matrix.multipliers(system)
+    here = w @ system.residual(x)
+
+    def bend(v: Array) -> Any:
+        h = scale / np.abs(v).max()
+        near, far = (sum(w @ system.residual(x + sign * length * h * v) for sign in (1, -1)) for length in (1, 2))
+        return (far - 16 * near + 30 * here) / (12 * h**2)
+
+    a, b = matrix.kernel
+    aa, bb = bend(a), bend(b)
+    ab = (bend(a + b) - aa - bb) / 2
+    return np.array([[aa, ab], [ab, bb]])
 
 
 def _finish(system: Discretization, x: Array, matrix: _Bordered, hessian: Array, beta: float) -> BranchPoint:
