@@ -264,7 +264,7 @@ def load(path: str | Path, settings: list[str] = ()) -> Config | DiagramConfig:
         raise ConfigError(f"cannot read the config {str(path)!r}: it is not UTF-8 text") from error
     if len(data) > _MOST_BYTES:
         raise ConfigError(f"cannot read the config {str(path)!r}: it is larger than a megabyte, which no scene is")
-    return parse(text, str(path), settings)
+    return parse(text, _plain(str(path)), settings)
 
 
 def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramConfig:
@@ -278,7 +278,7 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
         parts = key.strip().split(".")
         if not equals or "" in parts:
             raise ConfigError(f"--set {setting!r}: must be key=value, as in nu=0.2 or mesh.degree=5")
-        _put(values, parts, _yaml(value, f"--set {key}"))
+        _put(values, parts, _yaml(value, f"--set {_plain(key)}"))
     if _is_diagram(values):
         return _diagram(values, name, settings)
     try:
@@ -290,6 +290,10 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
 # --- YAML ---------------------------------------------------------------------------------------------------------
 
 
+#: A scene has no more levels than this.
+_DEEPEST = 20
+
+
 class _Loader(yaml.SafeLoader):
     """The YAML that a scene needs: no aliases (which can expand without bound), no tags, no key twice.
 
@@ -299,10 +303,15 @@ class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict = {}
 
     def compose_node(self, parent, index):
+        self._depth = getattr(self, "_depth", 0) + 1
+        if self._depth > _DEEPEST:
+            raise RecursionError
         event = self.peek_event()
         if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None):
             raise yaml.MarkedYAMLError(problem="a scene has no aliases and no tags", problem_mark=event.start_mark)
-        return super().compose_node(parent, index)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
 
     def construct_mapping(self, node, deep=False):
         seen = set()
@@ -350,7 +359,7 @@ def _put(values: dict, path: list[str], value: Any) -> None:
     for part in path[:-1]:
         values = values.setdefault(part, {})
         if not isinstance(values, dict):
-            raise ConfigError(f"--set {'.'.join(path)}: {part!r} has no fields")
+            raise ConfigError(f"--set {_plain('.'.join(path))}: {part!r} has no fields")
     values[path[-1]] = value
 
 
@@ -358,7 +367,7 @@ def _put(values: dict, path: list[str], value: Any) -> None:
 
 
 def _where(complaint) -> str:
-    return ".".join(str(part) for part in complaint["loc"] if part != "[key]")
+    return _plain(".".join(str(part) for part in complaint["loc"] if part != "[key]"))
 
 
 def _origin(error: ValidationError, name: str, settings: list[str]) -> str:
@@ -367,8 +376,14 @@ def _origin(error: ValidationError, name: str, settings: list[str]) -> str:
     for setting in reversed(settings):
         key = setting.partition("=")[0].strip()
         if f"{where}.".startswith(f"{key}.") or f"{key}.".startswith(f"{where}."):
-            return f"--set {setting}"
+            return f"--set {_plain(setting)}"
     return name
+
+
+def _plain(text: str) -> str:
+    """A text as a message shows it: one line, of bounded length."""
+    text = text if text.isprintable() else repr(text)[1:-1]
+    return text if len(text) <= 200 else text[:197] + "..."
 
 
 def _sentence(error: ValidationError) -> str:
