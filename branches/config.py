@@ -279,12 +279,42 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
         if not equals or "" in parts:
             raise ConfigError(f"--set {setting!r}: must be key=value, as in nu=0.2 or mesh.degree=5")
         _put(values, parts, _yaml(value, f"--set {_plain(key)}"))
+    if "strip" in values:
+        values = _of_strip(values, name)
     if _is_diagram(values):
         return _diagram(values, name, settings)
     try:
         return Config.model_validate(values)
     except ValidationError as error:
         raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
+
+
+def _of_strip(values: dict, name: str) -> dict:
+    """The scene with the dimensionless numbers of its ``strip``, in SI units: law, nu, Gamma; its kappa_n is labelled UZ."""
+    from ribbon_model.strip import NAMES, Strip
+
+    strip = values["strip"]
+    if not isinstance(strip, dict):
+        raise ConfigError(f"{name}: strip: must hold the fields {', '.join(NAMES)}, not {_show(strip)}")
+    for field in strip:
+        if field not in NAMES:
+            raise ConfigError(f"{name}: unknown field 'strip.{field}'; the fields are {', '.join(NAMES)}")
+    for field in NAMES:
+        if field not in strip:
+            raise ConfigError(f"{name}: the field 'strip.{field}' is missing")
+    for field in ("law", "nu", "Gamma"):
+        if field in values:
+            raise ConfigError(f"{name}: {field}: stands beside strip, which says it already")
+    try:
+        found = Strip(**strip)
+    except ValueError as error:
+        raise ConfigError(f"{name}: strip: {error}") from error
+    rest = {key: value for key, value in values.items() if key != "strip"}
+    rest |= {"law": "finite width", "nu": found.poisson_ratio, "Gamma": found.Gamma}
+    zeros = rest.get("zeros", {})
+    if isinstance(zeros, dict) and isinstance(zeros.get("kappa_n", []), list):  # else its own check complains
+        rest["zeros"] = {**zeros, "kappa_n": [*zeros.get("kappa_n", []), found.kappa_n]}
+    return rest
 
 
 # --- YAML ---------------------------------------------------------------------------------------------------------

@@ -1,0 +1,139 @@
+"""Strips in SI units: the numbers they resolve to, what the command says of them, and what is refused."""
+
+import math
+import re
+import shlex
+
+import pytest
+
+from branches.config import ConfigError, DiagramConfig, dump, load, parse
+from branches.strip import answer, buckled, circles, main
+from ribbon_model.exact_finite_width import curve
+from ribbon_model.laws import FINITE_WIDTH, RIBBON
+from ribbon_model.linear import thresholds
+from ribbon_model.strip import Strip
+
+BLADE = Strip(0.00565, 0.00065, 3.0, 0.143, 0.3, 210e9)
+TAPE = Strip(0.016, 0.00012, 0.6, 0.03, 0.3, 200e9)
+SCENE = (
+    "m: 1\nn: 2\nstrip: {width: .016, thickness: .00012, length: .6, natural_radius: .03, poisson_ratio: .3, "
+    "youngs_modulus: 200.0e9}\n"
+)
+
+
+def test_energies_and_moments_of_a_narrow_strip_are_those_of_a_beam():
+    """Gamma = .1: E I (1/r - 1/R_n) and its square over 2 E I, times L, but for terms of order (nu Gamma)**2."""
+    inertia = BLADE.width * BLADE.thickness**3 / 12
+    for ring in circles(BLADE):
+        change = 2 * math.pi * ring.m / BLADE.length - 1 / BLADE.natural_radius
+        assert ring.moment == pytest.approx(210e9 * inertia * abs(change), rel=3e-3)
+        assert ring.energy == pytest.approx(210e9 * inertia * change**2 / 2 * BLADE.length, rel=3e-3)
+        assert ring.strain == pytest.approx(BLADE.thickness / 2 * abs(change), rel=1e-12)
+
+
+def test_a_wide_strip_has_the_ribbons_threshold_in_millimetres():
+    """Equation (27): the single loop is stable for kappa_n L/2pi below 2.5, here at w**2/(h L/2pi) = 1e8."""
+    length = 2 * math.pi
+    wide = Strip(1.0, 1e-8, length, 1 / 2.4, 0.3, 1e9)
+    assert thresholds(RIBBON, 1, 2, 0.3) == (2.5,)
+    assert circles(wide)[0].stable and not circles(Strip(1.0, 1e-8, length, 1 / 2.6, 0.3, 1e9))[0].stable
+
+
+def test_buckled_states_are_those_of_the_quadrature():
+    """The stable state of the tape on (1, 2), by the exact quadrature up to its own kappa_n."""
+    states, folds = buckled(TAPE)
+    (stable,) = (state for state in states if state.stable)
+    assert stable.name == "buckled (1, 2)"
+    points = curve(1, 2, 0.3, TAPE.Gamma, kappa_limits=(-100.0, TAPE.kappa_n))
+    assert points[-1].label == "EP"
+    energy = (points[-1].energy + TAPE.kappa_n**2 / 2) * TAPE.energy_unit
+    assert stable.energy == pytest.approx(energy, rel=1e-8)
+    (fold,) = (point for point in curve(1, 2, 0.3, TAPE.Gamma) if point.label == "LP")
+    assert folds[0][1] == pytest.approx(fold.kappa_n, abs=1e-9)
+    assert TAPE.kappa_n > thresholds(FINITE_WIDTH, 1, 2, 0.3, TAPE.Gamma)[0]
+
+
+def test_the_strain_is_the_largest_principal_one():
+    half = TAPE.thickness / 2 * 2 * math.pi / TAPE.length
+    assert TAPE.strain(-2.0) == pytest.approx(2 * half) and TAPE.strain(0.0, 3.0) == pytest.approx(3 * half)
+    assert TAPE.strain(3.0, 2.0) == pytest.approx(4 * half)  # eigenvalues of [[3, 2], [2, 0]]: 4 and -1
+
+
+def test_cautions():
+    thick = answer(BLADE, 0.002)
+    assert "h/w = 0.115 is not thin: a plate's torsional stiffness is too large by about 7 %" in thick
+    assert (
+        re.search(r"yield strain 0.002 \(marked !\): 7-fold circle\n", thick) and thick.count("%  !") + thick.count("% !") == 1
+    )
+    assert "law: flat rod (" in thick
+    slim = answer(Strip(0.003, 0.0001, 3.0, 0.5, 0.3, 1e9), 0.02)
+    assert "caution" not in slim
+
+
+def test_the_pages_numbers_are_the_commands(root, capsys):
+    page = (root / "docs" / "strips.md").read_text(encoding="utf-8")
+    examples = re.findall(r"```console\n\.venv/bin/python -m branches\.strip (.*?)\n(.*?)```", page.replace("\\\n", ""), re.S)
+    assert len(examples) == 3
+    for arguments, printed in examples:
+        assert main(shlex.split(arguments)) == 0
+        assert capsys.readouterr().out.split() == printed.split()
+
+
+def test_a_scene_with_a_strip_is_one_with_its_numbers():
+    config = parse(SCENE, "x")
+    assert (config.law, config.nu) == ("finite width", 0.3)
+    assert config.Gamma == pytest.approx(0.016**2 / (0.00012 * 0.6 / (2 * math.pi)), rel=1e-14)
+    assert config.zeros == {"kappa_n": [pytest.approx(0.6 / (2 * math.pi * 0.03), rel=1e-14)]}
+    assert parse(dump(config), "y") == config
+    straight = parse(SCENE, "x", ["strip.natural_radius=.inf", "zeros={kappa_n: [1.0], M2: [2.0]}"])
+    assert straight.zeros == {"kappa_n": [1.0, 0.0], "M2": [2.0]}
+
+
+def test_the_scenes_that_come_with_it(root):
+    assert load(root / "configs" / "strip_bandsaw.yaml").Gamma == pytest.approx(BLADE.Gamma)
+    diagram = load(root / "configs" / "strip_tape.yaml")
+    assert isinstance(diagram, DiagramConfig) and {config.Gamma for config in diagram.branches} == {TAPE.Gamma}
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["strip.width=-1"], "strip: width: -1 must be positive and finite"),
+        (["strip.width=wide"], "strip: width: must be a number, not 'wide'"),
+        (["strip.width=true"], "strip: width: must be a number, not True"),
+        (["strip.length=.inf"], "strip: length: inf must be positive and finite"),
+        (["strip.poisson_ratio=.7"], "poisson_ratio: 0.7 must be greater than -1 and at most 0.5"),
+        (["strip.thickness=.02"], "thickness: 0.02 m must not exceed the width, 0.016 m"),
+        (["strip.width=1.0"], "width: 1 m must not exceed the length, 0.6 m"),
+        (["strip.natural_radius=0"], "natural_radius: 0 must be positive, .inf for a straight strip"),
+        (["strip.colour=1"], "unknown field 'strip.colour'; the fields are width, thickness"),
+        (["strip={width: 1}"], "the field 'strip.thickness' is missing"),
+        (["strip=3"], "strip: must hold the fields width"),
+        (["nu=.3"], "nu: stands beside strip"),
+        (["zeros=3"], "zeros: must hold"),
+        (["strip.thickness=1e-300", "strip.youngs_modulus=1e-300"], "overflow"),
+    ],
+)
+def test_scenes_that_are_refused(settings, words):
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        parse(SCENE, "x", settings)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"--width": "0"}, "width: 0 must be positive and finite"),
+        ({"--width": "x"}, "argument --width: invalid float value: 'x'"),
+        ({"--natural-radius": "nan"}, "natural_radius: nan must be positive"),
+        ({"--yield-strain": "-1"}, "yield_strain: -1 must be positive and finite"),
+    ],
+)
+def test_strips_that_are_refused(changed, words, capsys):
+    options = {"--width": ".01", "--thickness": "1e-4", "--length": "1", "--natural-radius": "1", "--poisson-ratio": ".3"}
+    options |= {"--youngs-modulus": "1e9", **changed}
+    try:
+        code = main([word for option in options.items() for word in option])
+    except SystemExit as left:
+        code = left.code
+    captured = capsys.readouterr()
+    assert code == 2 and words in captured.err and captured.err.count("\n") == 1 and captured.out == ""
