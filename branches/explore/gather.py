@@ -7,6 +7,7 @@ bits a number; the browser unfolds it by the symmetries of `ribbon_model.shape`.
 from __future__ import annotations
 
 import base64
+import itertools
 import math
 from pathlib import Path
 
@@ -33,6 +34,8 @@ INFINITE, UNKNOWN = -2, -1
 _LOOP_NODES, _FEWEST = 384, 16
 #: Circles reach as far in kappa_n as the branches do, in about twice so many steps. (On a circle all columns are parabolas.)
 _CIRCLE_STEPS = 50
+#: An integration takes a few hundred evaluations; the end conditions, which hold moments, are met to about 1e-6 of those.
+_MOST_EVALUATIONS, _OPEN = 50_000, 1e-3
 _KINDS = {"LP": "fold", "SB": "secondary", "UZ": "user", "MX": "lost"}
 
 
@@ -116,6 +119,8 @@ def _mark(event, reason: str, secondary: bool) -> dict:
     """A labelled point: its number, kind, and what it is called."""
     name, place = event["name"].decode(), {"point": int(event["point"])}
     values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
+    if not all(map(math.isfinite, values.values())):
+        raise StoreError(f"the labelled point {event['point']} has columns that are no numbers")
     kind = _KINDS.get(event["label"].decode(), "end")
     if name == "trivial branch" or (name == "start" and not secondary):
         return place | {"kind": "circle", "covering": covering(**values)} | values
@@ -131,36 +136,47 @@ def shapes(branch: StoredBranch) -> np.ndarray:
 
     All of a solution follows from the moment and force at S = 0, which are columns: the equations of the domain are integrated
     from there, whether the file keeps the solution or not.
+
+    Raises
+    ------
+    StoreError
+        The columns of a point are not those of a closed strip.
     """
     config = branch.config
     problem = DOMAINS[config["domain"]](LAWS[config["law"]]).problem
     parts = 4 * config["n"] if config["domain"] == "cell" else 2
     t = np.linspace(0, 1, max(_FEWEST, math.ceil(_LOOP_NODES / parts)) + 1)
-    return np.array([_integrated(problem, row, t) for row in branch.points])
+    name = f"branch ({config['m']}, {config['n']})"
+    return np.array([_integrated(problem, row, t, f"{name}, point {row['point']}") for row in branch.points])
 
 
-def _integrated(problem, row, t) -> np.ndarray:
-    """The states of one point at t, shape (len(t), len(CHANNELS))."""
+def _integrated(problem, row, t, name: str) -> np.ndarray:
+    """The states of one point at t, shape (len(t), len(CHANNELS)); it is called ``name`` in messages."""
     from scipy.integrate import solve_ivp
 
+    wrong = StoreError(f"{name}: its columns are not those of a closed strip")
     parameters = np.array([row[name] if name in row.dtype.names else value for name, value in problem.parameters.items()])
     field, none, size = problem.batch("field"), np.empty((0, len(problem.states))), len(problem.states)
-    length = row["length"]
+    evaluations = itertools.count()
 
     def rates(s, u):
         frame = field.values(np.array([s]), u[None, :size], none, parameters)[0]
-        return frame if size > 4 else np.append(frame, length * np.array(equilibrium.directors(*u[:4])[6:]))
+        if next(evaluations) > _MOST_EVALUATIONS or not np.isfinite(frame).all():
+            raise wrong
+        return frame if size > 4 else np.append(frame, row["length"] * np.array(equilibrium.directors(*u[:4])[6:]))
 
     start = np.array([1.0, 0, 0, 0, 0, 0, 0])
-    solution = solve_ivp(rates, (0, 1), start, method="DOP853", t_eval=t, rtol=1e-9, atol=1e-10)
-    if not solution.success:
-        raise StoreError(f"the shape of point {row['point']} cannot be computed: {solution.message}")
-    states = solution.y.T
+    states = solve_ivp(rates, (0, 1), start, method="DOP853", t_eval=t, rtol=1e-9, atol=1e-10).y.T
+    frames = np.ascontiguousarray(states[:, :size])
+    open_ends = problem.batch("boundary").values(t[:1], frames[:1], frames[-1:], parameters)
+    if len(states) < len(t) or np.abs(open_ends).max() > _OPEN * (1 + np.abs(parameters).max()):
+        raise wrong
     q0, q1, q2, q3 = states[:, :4].T
-    p0, p1, p2, p3 = field.values(t, np.ascontiguousarray(states[:, :size]), none, parameters)[:, :4].T
+    p0, p1, p2, p3 = field.values(t, frames, none, parameters)[:, :4].T
     omega_1 = q0 * p1 - q1 * p0 - q2 * p3 + q3 * p2  # times length / 2: `spin` of the equations, inverted
     omega_3 = q0 * p3 - q3 * p0 - q1 * p2 + q2 * p1
-    return np.column_stack([states[:, :4], omega_3 / omega_1, states[:, 4:]])
+    eta = np.divide(omega_3, omega_1, out=np.zeros_like(t), where=omega_1 != 0)
+    return np.column_stack([states[:, :4], eta, states[:, 4:]])
 
 
 # --- circles ------------------------------------------------------------------------------------------------------

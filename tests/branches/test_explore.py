@@ -17,6 +17,7 @@ from branches.diagram import run_diagram
 from branches.display import Display
 from branches.explore.__main__ import main
 from branches.explore.gather import CHANNELS, gather, shapes
+from branches.files import StoreError
 from branches.job import run_branch
 from branches.read import read_branch
 
@@ -406,3 +407,11 @@ def test_stored_branch_in_a_notebook(results):
     root = ElementTree.fromstring(branch._repr_html_())
     assert root.find("{http://www.w3.org/2000/svg}svg") is not None
     assert [row[1].text for row in root.iterfind("table/tbody/tr")] == ["BP", "LP", "EP"]
+
+
+@pytest.mark.parametrize("column, value", [("kappa_n", np.nan), ("M1", 1e200), ("M2", 0.3), ("length", 0.0)])
+def test_columns_that_are_no_solution_are_refused(column, value, results):
+    branch = read_branch(results / "m1_n2.h5")
+    branch.points[column][3] = value
+    with pytest.raises(StoreError, match=r"branch \(1, 2\), point 3: its columns are not those of a closed strip"):
+        shapes(branch)
