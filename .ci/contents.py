@@ -12,10 +12,9 @@ listed = subprocess.run(["git", "ls-files", "contin", "ribbon_model", "branches"
 packages = set(listed.stdout.split())
 (wheel,), (sdist,) = dist.glob("*.whl"), dist.glob("*.tar.gz")
 in_wheel = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-in_sdist = {member.name.partition("/")[2] for member in tarfile.open(sdist) if member.isfile()}
-about = re.compile(
-    r"LICENSE|MANIFEST\.in|PKG-INFO|README\.md|pyproject\.toml|setup\.cfg|configs/[^/]+\.yaml|[^/]+\.egg-info/[^/]+"
-)
+with tarfile.open(sdist) as archive:
+    in_sdist = {member.name.partition("/")[2] for member in archive if member.isfile()}
+about = re.compile(r"(LICENSE|MANIFEST\.in|PKG-INFO|README\.md|pyproject\.toml|setup\.cfg|configs/.+\.yaml|.+\.egg-info/.+)")
 problems = {
     "not in the wheel": packages - in_wheel,
     "in the wheel, and should not be": in_wheel - packages,
