@@ -327,7 +327,7 @@ def _check(graph) -> None:
     for _, data in graph.nodes(data=True):
         if not (isinstance(data["kind"], str) and isinstance(data["law"], str)):
             raise TypeError("kind and law are texts")
-        np.array([data[name] for name in ("nu", *COLUMNS[:3])], dtype=float)
+        np.array([data[name] for name in ("nu", "kappa_n", "kappa_star")], dtype=float)
     for *_, data in graph.edges(data=True):
         if not all(isinstance(data[name], kind) for name, kind in (("law", str), ("m", int), ("n", int))):
             raise TypeError("a branch is known by its law, m and n")
