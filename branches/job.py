@@ -109,7 +109,7 @@ def compute_branch(config: Config, display) -> tuple[bytes, str]:
 
 def _writer(path, config: Config, run: Continuation, watch, image=None) -> BranchWriter:
     system = run.state.system
-    return BranchWriter(path, dump(config), system.problem, system.free, config.stride, image, watch and watch.index)
+    return BranchWriter(path, dump(config), system.problem, system.free, config.stride, image, watch)
 
 
 def _watch(config: Config, system, x):

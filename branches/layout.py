@@ -70,7 +70,7 @@ def _table(file: h5py.File, name: str) -> h5py.Dataset:
     for column in _COLUMNS[name]:
         _require(column in kinds, f"no column {column} in /{name}")
     for column, kind in kinds.items():
-        texts = column in ("label", "name")
+        texts = column in ("label", "name", "breaks")
         _require(kind.kind in ("S" if texts else "if") and not kind.shape, f"column {column} of /{name} is of type {kind}")
     for column in _TEXTS[name]:
         np.char.decode(table[column], "utf-8")

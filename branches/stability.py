@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from contin import Monitor
+from contin import ConvergenceError, Monitor, correct
+from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
 from ribbon_model.second_variation import from_solution
-from ribbon_model.secondary import force
+from ribbon_model.secondary import breaking, force
 from ribbon_model.stability import Stability, index
 
 #: Label of a secondary bifurcation: one that breaks a symmetry of the domain, which its own equations cannot see.
@@ -24,6 +27,31 @@ _LITTLE_FORCE = 0.5
 _ZERO_BESIDE = 1e-8
 #: The class that keeps all symmetry: an eigenvalue of it passes zero at folds, which the engine finds by itself.
 _FULL = (0, "even")
+
+
+#: Distance along the branch at which the index beside a bifurcation is taken, relative to 1 + |x|.
+_BESIDE = 1e-3
+
+
+@dataclass(frozen=True)
+class Change:
+    """How the index changes at a labelled point.
+
+    Attributes
+    ----------
+    before, after : int
+        The index on either side, in the direction of travel; `UNDECIDED` elsewhere than at folds and secondary bifurcations.
+    kernel : int
+        Number of modes that are neutral there.
+    breaks : str
+        The symmetries of the branch that its neutral modes break, '' at a fold: what a branch that leaves there has lost. A
+        pair of modes may have two kinds of branches, 'or' between them.
+    """
+
+    before: int = UNDECIDED
+    after: int = UNDECIDED
+    kernel: int = 0
+    breaks: str = ""
 
 
 class Watch:
@@ -63,6 +91,26 @@ class Watch:
         result = self.at(point.system, point.x)
         return result.index if result.decided else UNDECIDED
 
+    def change(self, point) -> Change:
+        """The index on both sides of a fold or secondary bifurcation, from two points close by on the branch."""
+        if point.label not in ("LP", LABEL):
+            return Change()
+        before, after = (self._beside(point, side) for side in (-1, 1))
+        if point.label == "LP":
+            return Change(before, after, 1)
+        return Change(before, after, *_broken(point))
+
+    def _beside(self, point, side: int) -> int:
+        """The index at a small distance along the branch."""
+        tangent = point.tangent / np.linalg.norm(point.tangent)
+        distance = side * _BESIDE * (1 + np.linalg.norm(point.x))
+        try:
+            there = correct(point.system, point.x + distance * tangent, tangent, tangent @ point.x + distance)
+        except ConvergenceError:  # at a bifurcation that could not be located, say
+            return UNDECIDED
+        result = self.at(point.system, there.x)
+        return result.index if result.decided else UNDECIDED
+
     def _monitor(self, name) -> Monitor:
         """The determinant of one symmetry class, whose zeros are bifurcations that break the symmetry."""
 
@@ -78,3 +126,14 @@ class Watch:
 
         wavenumber, parity = name
         return Monitor(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant)
+
+
+def _broken(point) -> tuple[int, str]:
+    """Dimension of the kernel of a secondary bifurcation, and the symmetries that it breaks."""
+    if "turn" not in point.parameters:  # a half loop: its one reversal is all that there is
+        return 1, "two-fold axis" if "axes" in point.parameters else "mirror"
+    n = round(LENGTH / (4 * point["length"]))
+    how = breaking(n, point.name.removeprefix("possible "))
+    if not how.keeps:
+        return how.dimension, f"{n} mirrors, {n} two-fold axes"
+    return how.dimension, " or ".join(how.broken(reversal) for reversal in how.keeps)

@@ -71,7 +71,14 @@ def _columns(problem, free, watched: bool) -> dict[str, tuple]:
     values = [(name, "f8", MEANINGS.get(name, name)) for name in (*problem.parameters, *problem.functionals)]
     errors = [(f"error_{name}", "f8", f"estimated discretization error of {name}") for name in free]
     named = [("name", "S64", "what the label refers to")]
-    return {"points": (*_BOOKKEEPING, *values, *watch), "events": (*_BOOKKEEPING, *named, *values, *errors, *watch)}
+    changes = [
+        ("index_before", "i4", "the index just before this point; -1 elsewhere than at LP and SB"),
+        ("index_after", "i4", "the index just after it"),
+        ("kernel", "i4", "number of neutral modes: 1 at LP, 1 or 2 at SB"),
+        ("breaks", "S128", "symmetries that the modes break, which a branch that leaves here has lost; empty at LP"),
+    ] * watched
+    events = (*_BOOKKEEPING, *named, *values, *errors, *watch, *changes)
+    return {"points": (*_BOOKKEEPING, *values, *watch), "events": events}
 
 
 def _kind(columns) -> np.dtype:
@@ -95,15 +102,16 @@ class BranchWriter:
         The full solution is kept of every stride-th point, and of labelled ones.
     image : bytes, optional
         An unfinished file to go on with.
-    index : callable, optional
-        ``index(point)``, the value of the column of that name; no such column without.
+    watch : optional
+        ``watch.index(point)`` is the value of the column of that name, ``watch.change(point)`` what the events have besides
+        (`branches.stability.Watch`); no such columns without.
     """
 
     #: Seconds between checkpoints while a run goes.
     INTERVAL = 0.5
 
-    def __init__(self, path: Path | None, config_text: str, problem, free, stride: int, image: bytes | None = None, index=None):
-        self.path, self._stride, self._free, self._index = path and Path(path), stride, tuple(free), index
+    def __init__(self, path: Path | None, config_text: str, problem, free, stride: int, image: bytes | None = None, watch=None):
+        self.path, self._stride, self._free, self._watch = path and Path(path), stride, tuple(free), watch
         self._buffer: list[tuple[Point, int]] = []
         self._mark: tuple[State, int] | None = None
         with damage_told(path):
@@ -122,7 +130,7 @@ class BranchWriter:
             "units": "bending modulus B = 1, length L = 2 pi", "platform": platform.platform(),
             "versions": json.dumps(versions()), "states": list(problem.states), "free_parameters": list(free),
         })  # fmt: skip
-        for table, columns in _columns(problem, free, self._index is not None).items():
+        for table, columns in _columns(problem, free, self._watch is not None).items():
             data = file.create_dataset(table, (0,), _kind(columns), maxshape=(None,), chunks=(256,), fletcher32=True)
             for name, _, meaning in columns:
                 data.attrs[name] = meaning
@@ -216,8 +224,12 @@ class BranchWriter:
             "iterations": point.iterations, "newton_error": point.newton_error,
             **{f"error_{name}": point.errors.get(name, np.nan) for name in self._free},
         }  # fmt: skip
-        if self._index is not None:
-            values["index"] = self._index(point)
+        if self._watch is not None:
+            values["index"] = self._watch.index(point)
+            if table == "events":
+                change = self._watch.change(point)
+                values |= {"index_before": change.before, "index_after": change.after, "kernel": change.kernel}
+                values["breaks"] = change.breaks.encode()
         return tuple(values[name] for name in self._types[table].names)
 
     # --- what a resumed run needs --------------------------------------------------------------------------------
@@ -239,7 +251,7 @@ class BranchWriter:
 
         What came after them is computed again: a limit that ended the run, say, need not end the one resumed.
         """
-        for table, columns in _columns(problem, self._free, self._index is not None).items():
+        for table, columns in _columns(problem, self._free, self._watch is not None).items():
             if self._file[table].dtype != _kind(columns):
                 raise StoreError(f"cannot go on with {str(self.path)!r}: its columns are not those of this version")
         points, solutions = int(self._file["resume"].attrs["points"]), self._file["solutions"]

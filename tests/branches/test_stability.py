@@ -27,6 +27,8 @@ def test_a_secondary_bifurcation_is_located_and_changes_the_index_by_one(branch)
     at = int(event["point"])
     index = branch.points["index"]
     assert set(index[1:at]) == {2} and set(index[at + 1 :]) == {1} and index[0] == index[at] == -1
+    assert [event[name] for name in ("index_before", "index_after", "kernel")] == [2, 1, 1]
+    assert event["breaks"] == b"one two-fold axis, 2-fold rotary reflection"
 
 
 def test_pieces_of_the_diagram_carry_the_index(branch):
@@ -53,6 +55,19 @@ def test_the_fold_of_the_single_loop_is_where_stability_ends(tmp_path):
     (fold,) = found.events["point"][found.events["label"] == b"LP"]
     index = found.points["index"]
     assert set(index[1:fold]) == {0} and set(index[fold + 1 : -1]) == {1}
+    changes = [[event[name] for name in ("index_before", "index_after", "kernel", "breaks")] for event in found.events]
+    assert changes == [[-1, -1, 0, b""], [0, 1, 1, b""], [-1, -1, 0, b""]]
+
+
+def test_a_pair_of_modes_changes_the_index_by_two(tmp_path):
+    run_branch(
+        parse("{m: 5, n: 2, stability: true, limits: {kappa_n: [-30, 0]}}", "scene"), tmp_path / "x.h5", Display(silent=True)
+    )
+    (event,) = [event for event in read_branch(tmp_path / "x.h5").events if event["label"] == b"SB"]
+    assert [event[name] for name in ("index_before", "index_after", "kernel")] == [4, 2, 2]
+    one, other = event["breaks"].decode().split(" or ")
+    assert one == "one mirror, 2 two-fold axes, 4-fold rotary reflection"
+    assert other == "2 mirrors, one two-fold axis, 4-fold rotary reflection"
 
 
 def test_a_run_resumed_is_the_run_undisturbed(silent, tables, tmp_path):
