@@ -188,8 +188,7 @@ def _circle(law: str, nu: float, m: int, ends: tuple[float, float], bifurcations
     neutral = [mark["kappa_n"] for mark in bifurcations if mark["covering"] == m]
     if m >= 1:
         neutral += [m * end for end in energy_interval(material, m, nu, Gamma) if ends[0] < m * end < ends[1]]
-    neutral = np.unique(np.round(neutral, 9))
-    kappa_n = np.unique(np.append(np.linspace(*ends, _CIRCLE_STEPS + 1), neutral))
+    kappa_n = np.unique(np.round(np.append(np.linspace(*ends, _CIRCLE_STEPS + 1), neutral), 9))
     kappa_n = np.sort(np.append(kappa_n, (kappa_n[1:] + kappa_n[:-1]) / 2))  # one between any two neutral ones
     values = [circle(material, m, k, nu, Gamma) for k in kappa_n]
     columns = {"kappa_n": kappa_n, "index": [_circle_index(material, m, k, nu, Gamma, neutral) for k in kappa_n]}

@@ -93,35 +93,41 @@ function styleOf(group) {
   return { color: hue, dash, width: 1.8 };
 }
 
-/** Every computed point, invisible but for special ones, to hover and click. */
+const SYMBOLS = { circle: ["circle", 7, "meets a flat ring"], fold: ["star", 12, "fold"], secondary: ["diamond", 9, "secondary bifurcation"], user: ["square", 7, ""] };
+
+/** Every computed point, to hover and click: a line that is not seen, since markers by the thousand are slow. */
 function points() {
-  const trace = { x: [], y: [], customdata: [], text: [], symbol: [], size: [], shown: [] };
-  const symbols = { circle: ["circle", 7], fold: ["star", 12], secondary: ["diamond", 9], user: ["square", 7] };
+  const trace = { x: [], y: [], customdata: [], hovertext: [] };
   now.family.branches.forEach((branch, b) => {
+    const { kappa_n, kappa_star, energy } = branch.columns;
     for (let i = 0; i < branch.size; i++) {
-      const mark = markAt(branch, i), [symbol, size] = symbols[mark && mark.kind] || ["circle", 6], [kind, word, index] = stability(branch, i);
-      trace.x.push(branch.columns.kappa_n[i]);
-      trace.y.push(branch.columns.kappa_star[i]);
+      const mark = markAt(branch, i), [kind, word, index] = stability(branch, i);
+      const special = mark && mark.kind in SYMBOLS ? `<br>${SYMBOLS[mark.kind][2] || mark.name}` : "";
+      trace.x.push(kappa_n[i]);
+      trace.y.push(kappa_star[i]);
       trace.customdata.push([b, i]);
-      const special = mark && symbols[mark.kind] ? `<br>${{ circle: "meets a flat ring", fold: "fold", secondary: "secondary bifurcation", user: mark.name }[mark.kind]}` : "";
-      trace.text.push(`<b>${nameOf(branch)}</b>${special}<br>κ<sub>n</sub>L/2π = ${digits(branch.columns.kappa_n[i])}<br>κ* = ${digits(branch.columns.kappa_star[i])}<br>energy = ${digits(branch.columns.energy[i])}<br>${word}${index && kind !== "unknown" ? `, index ${index}` : ""}`);
-      trace.symbol.push(symbol);
-      trace.size.push(size);
-      trace.shown.push(special ? 1 : 0);
+      trace.hovertext.push(`<b>${nameOf(branch)}</b>${special}<br>κ<sub>n</sub>L/2π = ${digits(kappa_n[i])}<br>κ* = ${digits(kappa_star[i])}<br>energy = ${digits(energy[i])}<br>${word}${index && kind !== "unknown" ? `, index ${index}` : ""}`);
     }
   });
-  return trace;
+  return { type: "scatter", mode: "lines", line: { width: 0 }, hoverinfo: "text", showlegend: false, ...trace };
+}
+
+/** Folds, bifurcations and other labelled points, to be seen. */
+function specialPoints() {
+  const found = now.family.branches.flatMap((branch) => branch.marks || []).filter((mark) => mark.kind in SYMBOLS);
+  return {
+    type: "scatter", mode: "markers", x: found.map((mark) => mark.kappa_n), y: found.map((mark) => mark.kappa_star), hoverinfo: "skip", showlegend: false,
+    marker: { symbol: found.map((mark) => SYMBOLS[mark.kind][0]), size: found.map((mark) => SYMBOLS[mark.kind][1]), color: colour("mark"), line: { width: 1, color: colour("card") } },
+  };
 }
 
 function diagramTraces() {
   const drawn = [...lines()].map(([group, { x, y }]) => ({ type: "scatter", mode: "lines", name: group, x, y, line: styleOf(group), hoverinfo: "skip", showlegend: false }));
   const order = ["unknown", "unstable", "stable"];
   drawn.sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name));
-  const { x, y, customdata, text, symbol, size, shown } = points();
   const halo = { type: "scatter", mode: "lines", ...selected(), line: { color: colour("front"), width: 9 }, opacity: 0.38, hoverinfo: "skip", showlegend: false };
-  const marks = { type: "scatter", mode: "markers", x, y, customdata, hovertext: text, hoverinfo: "text", showlegend: false, marker: { symbol, size, opacity: shown, color: colour("mark"), line: { width: 1, color: colour("card") } } };
   const here = { type: "scatter", mode: "markers", x: [], y: [], hoverinfo: "skip", showlegend: false, marker: { size: 13, color: colour("front"), line: { width: 2, color: colour("mark") } } };
-  return [halo, ...drawn, marks, here];
+  return [halo, ...drawn, points(), specialPoints(), here];
 }
 
 function diagramLayout() {
