@@ -27,7 +27,7 @@ def executor(
     scheduler : str, optional
         Address of a Dask scheduler, as in ``tcp://host:8786``; local processes without.
     workers : int, optional
-        Local processes; :func:`cores` by default.
+        Local processes; `cores` by default.
     time_limit : float, optional
         Seconds after which a job in a local process is killed; its future then raises TimeoutError. A process that dies takes
         its own job with it and no other.

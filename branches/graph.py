@@ -97,7 +97,7 @@ def _common_index(values) -> int:
 
 
 def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dict], **attributes) -> bool:
-    """Add a branch: its nodes from end to end, as of :func:`node`, and the columns of the pieces between; see `add_branch`."""
+    """Add a branch: its nodes from end to end, as of `node`, and the columns of the pieces between; see `add_branch`."""
     if _circle(family, family["m"]) in graph and nodes[-1][1]["kind"] == "circle" and nodes[-1][0] in graph:
         return False
     graph.add_nodes_from(nodes)
@@ -393,7 +393,7 @@ def describe(graph, m: int, n: int, law: str, nu: float) -> str:
 
 
 def describe_secondary(branch: dict) -> str:
-    """Where a secondary branch, as of :func:`secondaries`, goes, in a line."""
+    """Where a secondary branch, as of `secondaries`, goes, in a line."""
     return f"{branch['mode']}, {branch['domain']}: " + " -> ".join(map(_describe, branch["nodes"]))
 
 

@@ -112,7 +112,7 @@ def dataset(group: h5py.Group, name: str, dimensions: int, kinds: str) -> h5py.D
 
 
 def vector(group: h5py.Group, name: str) -> np.ndarray:
-    """Finite numbers of a file, shape (K,); errors as of :func:`dataset`."""
+    """Finite numbers of a file, shape (K,); errors as of `dataset`."""
     values = dataset(group, name, 1, "f")[:]
     _require(np.all(np.isfinite(values)), f"/{name} has numbers that are not finite")
     return values

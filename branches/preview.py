@@ -26,12 +26,12 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
     ----------
     config : Config or DiagramConfig
     step : float
-        Largest distance between points, as for :func:`ribbon_model.exact.curve`.
+        Largest distance between points, as for `ribbon_model.exact.curve`.
 
     Returns
     -------
     networkx.MultiGraph
-        As of :func:`branches.diagram.run_diagram`. Its edges' arclength is that in the plane of the quadrature's unknowns; a
+        As of `branches.diagram.run_diagram`. Its edges' arclength is that in the plane of the quadrature's unknowns; a
         branch whose quadrature fails is named, with the reason, in ``graph.graph["failed"]``.
     """
     single = isinstance(config, Config)

@@ -52,7 +52,7 @@ class StoredBranch:
         return self.t[here], self.states[here], int(row["degree"]), {name: float(self.points[point][name]) for name in names}
 
     def shape(self, point: int) -> Shape:
-        """The closed strip at a kept point; see :meth:`solution`."""
+        """The closed strip at a kept point; see `solution`."""
         t, states, degree, parameters = self.solution(point)
         return closed_strip(LAWS[self.config["law"]], t, states, degree, parameters)
 
@@ -63,7 +63,7 @@ class StoredBranch:
         return pandas.DataFrame(self.points).assign(label=[label.decode() for label in self.points["label"]])
 
     def plot(self, shapes: int = 6, width: float = 0.3):
-        """The branch as a matplotlib figure; see :func:`branches.draw_branch.figure`."""
+        """The branch as a matplotlib figure; see `branches.draw_branch.figure`."""
         from branches.draw_branch import figure
 
         return figure(self, shapes, width)
@@ -80,7 +80,7 @@ def read_branch(path: str | Path) -> StoredBranch:
     Raises
     ------
     StoreError
-        See :func:`branches.store.open_branch`; or its scene is none that this version knows.
+        See `branches.store.open_branch`; or its scene is none that this version knows.
     """
     with open_branch(Path(path)) as file:
         solutions, attributes = file["solutions"], file.attrs

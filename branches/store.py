@@ -91,7 +91,7 @@ class BranchWriter:
     Parameters
     ----------
     path : Path or None
-        The final name. It is replaced at every checkpoint. None keeps the file in memory, for :meth:`image`.
+        The final name. It is replaced at every checkpoint. None keeps the file in memory, for `image`.
     config_text : str
         The scene, as text; also of a run resumed, which may stop elsewhere.
     problem : BoundaryValueProblem

@@ -102,7 +102,7 @@ class Algebraic(System):
     """An algebraic problem with chosen free parameters, as the continuation sees it.
 
     Unknowns ``x`` are the states, then the free parameters. The interface is that of
-    :class:`contin.collocation.Collocation`; there is no mesh to adapt.
+    `contin.collocation.Collocation`; there is no mesh to adapt.
 
     Raises
     ------
@@ -199,7 +199,7 @@ class Algebraic(System):
 
 
 class DenseFactors:
-    """LU of a dense matrix with the interface of :class:`contin.condensation.Factorization`."""
+    """LU of a dense matrix with the interface of `contin.condensation.Factorization`."""
 
     def __init__(self, matrix: Array) -> None:
         if matrix.shape[0] != matrix.shape[1]:

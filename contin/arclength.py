@@ -281,7 +281,7 @@ class Continuation:
         return not sign_changed(segment.before.sign, trial.sign) or segment.crossing().name != "possible"
 
     def _passed(self, segment: Segment) -> tuple[int, bool]:
-        """How many branch points the step passes, by :func:`crossings` (the determinant sees the parity only).
+        """How many branch points the step passes, by `crossings` (the determinant sees the parity only).
 
         Factors from Newton's last iterates do where nothing happens; the rest is decided by those right at both ends.
         """
@@ -366,7 +366,7 @@ class Continuation:
 
 
 def follow(system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None) -> Branch:
-    """Run to the end and return the branch: :class:`Continuation` as one call."""
+    """Run to the end and return the branch: `Continuation` as one call."""
     run = Continuation(system, x, settings, tangent)
     points = list(run)
     return Branch(points, run.stop)

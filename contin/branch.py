@@ -35,7 +35,7 @@ class Point:
         Estimated error of the free parameters, where it was asked for: of the discretization or, without a mesh, of the
         location alone. NaN where the point was not found again, and at points of higher codimension.
     details : object
-        What the location found besides: the :class:`contin.switching.BranchPoint` of a BP.
+        What the location found besides: the `contin.switching.BranchPoint` of a BP.
     """
 
     label: str
@@ -90,13 +90,13 @@ class Branch:
         return [point for point in self.points if point.label == label]
 
     def to_pandas(self) -> Any:
-        """All points as a ``pandas.DataFrame``; see :func:`contin.notebook.to_pandas`."""
+        """All points as a ``pandas.DataFrame``; see `contin.notebook.to_pandas`."""
         from contin import notebook
 
         return notebook.to_pandas(self)
 
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
-        """One column against another, by matplotlib; see :func:`contin.notebook.plot`."""
+        """One column against another, by matplotlib; see `contin.notebook.plot`."""
         from contin import notebook
 
         return notebook.plot(self, x, y, axes)

@@ -109,7 +109,7 @@ def assemble(
     border: Array,
     corner: Array,
 ) -> None:
-    """Fill the blocks that :class:`contin.condensation.Factorization` takes.
+    """Fill the blocks that `contin.condensation.Factorization` takes.
 
     ``jacobian`` (points, n + n_int, n + k) of rhs and integrands; ``columns`` (c, equations) and ``rows`` (r, unknowns)
     are the extra ones. Equations are scaled by h.
@@ -260,7 +260,7 @@ class Collocation(System):
         return self._residual(x, u, field, boundary)
 
     def _blocks(self, x: Array, rows: Array, columns: Array) -> tuple[Array, tuple[Array, Array, Array, Array, Array]]:
-        """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as :class:`Factorization` takes them."""
+        """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as `Factorization` takes them."""
         problem, n, d, k = self.problem, self._n, self._d, len(self.free)
         p, u = self.all_parameters(x), self.states(x)
         points = self.at_gauss_points(x)

@@ -226,7 +226,7 @@ def _replacement(value: Any) -> Any:
 
 
 def check_names(kind: str, names: Sequence[str]) -> tuple[str, ...]:
-    """``names`` as a tuple, or a :class:`ProblemError` that says which one cannot be used."""
+    """``names`` as a tuple, or a `ProblemError` that says which one cannot be used."""
     names = tuple(_checks.sequence(kind, names, "names"))
     for name in names:
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):

@@ -153,7 +153,7 @@ def _apply_panel(rows, first, block, start, end):
     **_OPTIONS,
 )
 def factorize(n, local, border, border_corner, chain, chain_border, first, last, dense, piv_local, piv_chain, piv_dense):
-    """Factor in place; the arrays are described in :class:`Factorization`. Returns the sign of the determinant."""
+    """Factor in place; the arrays are described in `Factorization`. Returns the sign of the determinant."""
     intervals, rows, width = local.shape
     inner = rows - n
     r, k = border_corner.shape

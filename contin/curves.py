@@ -4,7 +4,7 @@ Fold: F = 0 and g = 0, where the bordered matrix [[F_z, b], [c, 0]] [v; g] = [0;
 has g = 0 exactly where F_z is singular (Griewank & Reddien 1984). The gradient of g is -w.F_zy v, with w from the transposed
 matrix: one difference of transposed products, since w.F_yz v is the change of F_y^T w along v.
 
-Branch point: F + beta psi = 0 and g = 0, the two numbers of :mod:`contin.switching`, beta unknown: the curve of points where
+Branch point: F + beta psi = 0 and g = 0, the two numbers of `contin.switching`, beta unknown: the curve of points where
 two branches cross on the unfolded problem; beta stays zero where the bifurcation is perfect (a symmetry, a trivial branch).
 """
 

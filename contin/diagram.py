@@ -81,7 +81,7 @@ def _values(point: Point) -> dict[str, float]:
 
 
 class _Explorer:
-    """The work of :func:`diagram`."""
+    """The work of `diagram`."""
 
     def __init__(self, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float) -> None:
         self.settings, self.tolerance = settings, tolerance

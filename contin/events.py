@@ -23,7 +23,7 @@ class Monitor:
     name : str
         What the event is about.
     function : callable
-        ``function(trial) -> float``; a :class:`Trial` looks up parameters and functionals by name.
+        ``function(trial) -> float``; a `Trial` looks up parameters and functionals by name.
     terminal : bool
         Whether the run stops there.
     confirm : callable, optional

@@ -1,7 +1,7 @@
 """What the parts of the engine ask of each other: the interface of a discretized problem, of its factors, of its statement.
 
-The continuation loop, the corrector and the locators know a problem by these alone; :class:`contin.Collocation` and
-:class:`contin.Algebraic` are of this kind, and so are the extended systems of :func:`contin.curve`.
+The continuation loop, the corrector and the locators know a problem by these alone; `contin.Collocation` and
+`contin.Algebraic` are of this kind, and so are the extended systems of `contin.curve`.
 """
 
 from __future__ import annotations

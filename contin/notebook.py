@@ -133,7 +133,7 @@ def _table(branch: Branch) -> str:
 
 
 def _columns(branch: Branch, x: str | None, y: str | None) -> tuple[str, str]:
-    """The two columns to draw, with the defaults of :func:`plot`."""
+    """The two columns to draw, with the defaults of `plot`."""
     if not branch.points:
         raise ProblemError("the branch has no points to draw")
     first = branch.points[0]

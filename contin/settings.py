@@ -46,7 +46,7 @@ class Settings:
     accuracy : float
         Distance between predicted and corrected point that the step aims at, as a fraction of the step.
     newton, mesh :
-        See :class:`Newton`, :class:`MeshControl`.
+        See `Newton`, `MeshControl`.
     """
 
     primary: str | None = None

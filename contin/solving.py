@@ -56,7 +56,7 @@ def solve(
     Returns
     -------
     Point
-        With ``free`` as given: pass it to :func:`trace` with the free parameters of a curve.
+        With ``free`` as given: pass it to `trace` with the free parameters of a curve.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     Parameters
     ----------
     start : Point
-        Of :func:`solve`, of another branch, or read back.
+        Of `solve`, of another branch, or read back.
     settings : Settings, optional
         Or any of its fields by name.
     free : sequence of str, optional

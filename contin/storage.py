@@ -26,7 +26,7 @@ _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 def save(branch: Branch, path: str | Path) -> None:
     """Write a branch: all its points, with their solutions.
 
-    The problem itself is code and is not stored: :func:`load` takes it again. Details of branch points are kept, those of other
+    The problem itself is code and is not stored: `load` takes it again. Details of branch points are kept, those of other
     events are not.
 
     Raises
@@ -34,7 +34,7 @@ def save(branch: Branch, path: str | Path) -> None:
     OSError
         The file cannot be written; the one that was there is left as it was.
     ProblemError
-        Points of an extended system (:func:`contin.curve`), which cannot start other runs.
+        Points of an extended system (`contin.curve`), which cannot start other runs.
     """
     _checks.instance("branch", branch, Branch, "a Branch")
     if not branch.points:

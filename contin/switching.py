@@ -196,7 +196,7 @@ def calm(values: ComplexArray) -> bool:
 
 
 def crossings(values: ComplexArray) -> tuple[int, bool]:
-    """How many singular values pass zero, from their :func:`quotients`, and whether that is clear.
+    """How many singular values pass zero, from their `quotients`, and whether that is clear.
 
     Where a watched value shrinks by a large factor, others may have passed behind it: that is not clear.
     """

@@ -44,7 +44,7 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
 
 
 def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, degree: int = 4, root: int = 0, Gamma=None):
-    """Like :func:`primary_branch`, on the half loop, where all wavenumbers live together."""
+    """Like `primary_branch`, on the half loop, where all wavenumbers live together."""
     domain = half_loop(law)
     system = domain.discretize(intervals, degree, law.values(nu, Gamma))
     kappa_n = thresholds(law, m, n, nu, Gamma)[root]

@@ -1,7 +1,7 @@
 """Tool for tool: the time until the fold of (1, 2) is known to 1e-6, 1e-8, 1e-10, 1e-12, each tool at its best setting.
 
 Every tool runs over a range of settings; the time to an error is the fastest setting whose error is at most that. Errors are
-measured against the quadrature of :mod:`ribbon_model.exact`.
+measured against the quadrature of `ribbon_model.exact`.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def child(*command: str, timeout: float = 900, **changes: str) -> dict:
 
 
 def task(name: str, repeats: int = 1, **arguments) -> dict:
-    """One of the functions of :mod:`benchmarks.tasks`, ``repeats`` times after a first time, in a process of its own."""
+    """One of the functions of `benchmarks.tasks`, ``repeats`` times after a first time, in a process of its own."""
     return child(sys.executable, "-m", "benchmarks.tasks", name, json.dumps(arguments), str(repeats))
 
 

@@ -132,7 +132,7 @@ def counted(which="half_loop", **arguments) -> dict:
     return result | COUNTER
 
 
-#: What :func:`counted` counts; a task that follows a branch sets it to zero where the branch begins.
+#: What `counted` counts; a task that follows a branch sets it to zero where the branch begins.
 COUNTER = {"linearizations": 0, "linearize_seconds": 0.0}
 
 

@@ -97,7 +97,7 @@ STATEMENTS = {
 
 
 def study(statement, stop, intervals, degree, tolerance, longest_step):
-    """As :func:`peers.auto_07p.study`; ``seconds`` is all that the two calls of bifpy took, compiling included."""
+    """As `peers.auto_07p.study`; ``seconds`` is all that the two calls of bifpy took, compiling included."""
     began = time.perf_counter()
     from bifpy import auto
 
