@@ -6,6 +6,9 @@ import html
 import json
 from importlib import metadata, resources
 
+#: The page's own programs, in the order in which they build on each other.
+SCRIPTS = ("shapes.js", "state.js", "diagram.js", "strip.js", "readout.js", "page.js")
+
 
 class MissingLibraryError(Exception):
     """The library that draws is not installed; the message says what to install."""
@@ -29,9 +32,7 @@ def library() -> tuple[str, str]:
 def assemble(data: dict) -> str:
     """The page that shows ``data``, as of `gather.gather`."""
     folder = resources.files(__package__)
-    template, style, *scripts = (
-        (folder / name).read_text(encoding="utf-8") for name in ("page.html", "page.css", "shapes.js", "page.js")
-    )
+    template, style, *scripts = ((folder / name).read_text(encoding="utf-8") for name in ("page.html", "page.css", *SCRIPTS))
     code, licence = library()
     parts = {
         "title": html.escape(data["title"] or "Equilibria of a closed ribbon"), "style": style, "library": code,

@@ -29,7 +29,9 @@ class Branch {
 
   /** Pairs of row and weight: cubic Hermite interpolation with slopes of parabolas, on the points themselves exact. */
   weights(s) {
-    const i = Math.min(Math.max(Math.floor(s), 0), this.size - 2), u = s - i, rows = new Map();
+    const i = Math.min(Math.max(Math.floor(s), 0), this.size - 2),
+      u = s - i,
+      rows = new Map();
     const add = (row, weight) => rows.set(row, (rows.get(row) || 0) + weight);
     if (u < 1e-12) return [[i, 1]];
     if (u > 1 - 1e-12) return [[i + 1, 1]];
@@ -44,9 +46,11 @@ class Branch {
   }
 
   slope(i, factor, add) {
-    const a = this.abscissa, last = this.size - 1;
+    const a = this.abscissa,
+      last = this.size - 1;
     const secant = (j, f) => (add(j + 1, f / (a[j + 1] - a[j])), add(j, -f / (a[j + 1] - a[j])));
-    const before = i > 0 ? a[i] - a[i - 1] : 0, after = i < last ? a[i + 1] - a[i] : 0;
+    const before = i > 0 ? a[i] - a[i - 1] : 0,
+      after = i < last ? a[i + 1] - a[i] : 0;
     if (before > 0 && after > 0) {
       secant(i - 1, (factor * after) / (before + after));
       secant(i, (factor * before) / (before + after));
@@ -94,7 +98,8 @@ class Branch {
     for (let i = 1; i < this.size; i++) {
       let change = 1e-3 + 1e-3 * Math.abs(this.columns.kappa_n[i] - this.columns.kappa_n[i - 1]);
       if (!this.circle) {
-        const a = this.states(i - 1), b = this.states(i);
+        const a = this.states(i - 1),
+          b = this.states(i);
         let sum = 0;
         for (let k = 0; k < a.length; k++) if (k % CHANNELS < 4) sum += (a[k] - b[k]) ** 2;
         change += Math.sqrt(sum / this.nodes);
@@ -118,10 +123,12 @@ class Branch {
 
   /** All s at which kappa_n has this value. */
   places(kappa) {
-    const k = this.columns.kappa_n, found = [];
+    const k = this.columns.kappa_n,
+      found = [];
     for (let i = 0; i + 1 < this.size; i++) {
       if (k[i] - kappa > 0 === k[i + 1] - kappa > 0) continue;
-      let low = i, high = i + 1;
+      let low = i,
+        high = i + 1;
       for (let n = 0; n < 45; n++) {
         const middle = (low + high) / 2;
         if (this.value("kappa_n", middle) - kappa > 0 === k[i] - kappa > 0) low = middle;
@@ -138,7 +145,8 @@ class Branch {
 /** Stations {x, d: [d1, d2, d3], eta} of a part, from states at its nodes. */
 function stations(states, nodes) {
   return Array.from({ length: nodes }, (_, k) => {
-    const [q0, q1, q2, q3, eta, x, y, z] = states.subarray(k * CHANNELS, (k + 1) * CHANNELS), n = Math.hypot(q0, q1, q2, q3);
+    const [q0, q1, q2, q3, eta, x, y, z] = states.subarray(k * CHANNELS, (k + 1) * CHANNELS),
+      n = Math.hypot(q0, q1, q2, q3);
     return { x: [x, y, z], d: directors(q0 / n, q1 / n, q2 / n, q3 / n), eta };
   });
 }
@@ -159,24 +167,43 @@ const outer = (a, f, g) => a.map((ai, i) => a.map((aj, j) => f * ai * aj + (i ==
 
 /** A part and its image under the two-fold axis along d2 at its end. */
 function turned(part) {
-  const end = part[part.length - 1], half = outer(end.d[1], 2, -1);
-  return part.concat(part.slice(0, -1).reverse().map((one) => image(one, half, end.x, [-1, 1, -1, 1])));
+  const end = part[part.length - 1],
+    half = outer(end.d[1], 2, -1);
+  return part.concat(
+    part
+      .slice(0, -1)
+      .reverse()
+      .map((one) => image(one, half, end.x, [-1, 1, -1, 1])),
+  );
 }
 
 /** Both sides of the mirror at S = 0, normal to d3 there, starting at the far end. */
 function mirrored(part) {
   const mirror = outer(part[0].d[2], -2, 1);
-  return part.slice(1).reverse().map((one) => image(one, mirror, [0, 0, 0], [1, 1, -1, -1])).concat(part);
+  return part
+    .slice(1)
+    .reverse()
+    .map((one) => image(one, mirror, [0, 0, 0], [1, 1, -1, -1]))
+    .concat(part);
 }
 
 /** The loop: `copies` of a wave, each turned by `angle` about the axis through where mirror plane and two-fold axis meet. */
 function repeated(wave, copies, axis, angle) {
-  const middle = wave[(wave.length - 1) / 2], end = wave[(3 * (wave.length - 1)) / 4], normal = middle.d[2], d2 = end.d[1];
+  const middle = wave[(wave.length - 1) / 2],
+    end = wave[(3 * (wave.length - 1)) / 4],
+    normal = middle.d[2],
+    d2 = end.d[1];
   const centre = Math.abs(Math.sin(angle / 2)) > 1e-9 ? along(end.x, -dot(end.x, normal) / dot(d2, normal), d2) : [0, 0, 0];
   const loop = [];
   for (let copy = 0; copy < copies; copy++) {
-    const c = Math.cos(copy * angle), s = Math.sin(copy * angle), [a, b, g] = axis;
-    const spin = [[0, -s * g, s * b], [s * g, 0, -s * a], [-s * b, s * a, 0]];
+    const c = Math.cos(copy * angle),
+      s = Math.sin(copy * angle),
+      [a, b, g] = axis;
+    const spin = [
+      [0, -s * g, s * b],
+      [s * g, 0, -s * a],
+      [-s * b, s * a, 0],
+    ];
     const rotation = outer(axis, 1 - c, c).map((row, i) => row.map((value, j) => value + spin[i][j]));
     loop.push(...wave.slice(0, -1).map((one) => image(one, rotation, centre, [1, 1, 1, 1])));
   }
@@ -186,8 +213,18 @@ function repeated(wave, copies, axis, angle) {
 /** The planar circle, covered m times. */
 function planar(m) {
   return Array.from({ length: 384 }, (_, k) => {
-    const phi = (m * 2 * Math.PI * k) / 384, c = Math.cos(phi), s = Math.sin(phi);
-    return { x: [0, (c - 1) / m, s / m], d: [[1, 0, 0], [0, c, s], [0, -s, c]], eta: 0 };
+    const phi = (m * 2 * Math.PI * k) / 384,
+      c = Math.cos(phi),
+      s = Math.sin(phi);
+    return {
+      x: [0, (c - 1) / m, s / m],
+      d: [
+        [1, 0, 0],
+        [0, c, s],
+        [0, -s, c],
+      ],
+      eta: 0,
+    };
   });
 }
 
@@ -195,7 +232,9 @@ function planar(m) {
 function placed(loop, axis) {
   const middle = loop.reduce((sum, { x }) => along(sum, 1 / loop.length, x), [0, 0, 0]);
   const area = loop.reduce((sum, { x, d }) => along(sum, 1, cross(along(x, -1, middle), d[2])), [0, 0, 0]);
-  const up = axis || unit(area), side = unit(along([0, 0, 1], -up[2], up)), frame = [cross(side, up), side, up];
+  const up = axis || unit(area),
+    side = unit(along([0, 0, 1], -up[2], up)),
+    frame = [cross(side, up), side, up];
   const flat = new Float64Array(loop.length * STATION);
   loop.forEach(({ x, d, eta }, k) => {
     flat.set([...apply(frame, along(x, -1, middle)), ...d.flatMap((a) => apply(frame, a)), eta], k * STATION);
@@ -216,7 +255,8 @@ function reach(strip) {
 
 /** The widest strip whose rulings (6a) do not cross: 2 / max |eta'|. */
 function widest(strip) {
-  const n = count(strip), eta = (k) => strip[(k % n) * STATION + 12];
+  const n = count(strip),
+    eta = (k) => strip[(k % n) * STATION + 12];
   let most = 0;
   for (let k = 0; k < n; k++) most = Math.max(most, Math.abs(eta(k + 1) - eta(k)));
   return (2 * 2 * Math.PI) / (n * most);
@@ -227,10 +267,12 @@ function widest(strip) {
  * of that width would cross, all are drawn less oblique, so that the picture stays a band.
  */
 function edges(strip, width, scale, every = 1) {
-  const result = [], oblique = Math.min(1, (0.9 * widest(strip)) / width);
+  const result = [],
+    oblique = Math.min(1, (0.9 * widest(strip)) / width);
   for (let k = 0; k < strip.length; k += STATION * every) {
     const at = (i) => [strip[k + i], strip[k + i + 1], strip[k + i + 2]];
-    const x = at(0), ruling = along(at(3), oblique * strip[k + 12], at(9));
+    const x = at(0),
+      ruling = along(at(3), oblique * strip[k + 12], at(9));
     const edge = (side) => along([0, 0, 0], scale, along(x, (side * width) / 2, ruling));
     result.push([edge(-1), edge(1), at(6)]);
   }
@@ -239,9 +281,17 @@ function edges(strip, width, scale, every = 1) {
 
 /** The strip as a mesh of two sheets a hair apart: coordinates of 4 vertices a station. */
 function sheets(strip, width, scale, gap = 0.004) {
-  const n = count(strip), x = new Float32Array(4 * n), y = new Float32Array(4 * n), z = new Float32Array(4 * n);
+  const n = count(strip),
+    x = new Float32Array(4 * n),
+    y = new Float32Array(4 * n),
+    z = new Float32Array(4 * n);
   edges(strip, width, scale).forEach(([left, right, normal], k) => {
-    [[left, 1], [right, 1], [left, -1], [right, -1]].forEach(([point, side], v) => {
+    [
+      [left, 1],
+      [right, 1],
+      [left, -1],
+      [right, -1],
+    ].forEach(([point, side], v) => {
       [x[4 * k + v], y[4 * k + v], z[4 * k + v]] = along(point, side * gap, normal);
     });
   });
@@ -250,9 +300,12 @@ function sheets(strip, width, scale, gap = 0.004) {
 
 /** Corners of the triangles of `sheets`. */
 function triangles(n) {
-  const i = [], j = [], k = [];
+  const i = [],
+    j = [],
+    k = [];
   for (let a = 0; a < n; a++) {
-    const p = 4 * a, q = 4 * ((a + 1) % n);
+    const p = 4 * a,
+      q = 4 * ((a + 1) % n);
     i.push(p, p + 1, p + 2, p + 3);
     j.push(p + 1, q + 1, q + 2, q + 2);
     k.push(q, q, p + 3, q + 3);
@@ -265,10 +318,15 @@ function triangles(n) {
  * For small pictures, for vector graphics, and where there is no WebGL.
  */
 function polygons(strip, width, scale, eye, every = 1) {
-  const view = unit(eye), right = unit(cross([0, 0, 1], view)), top = cross(view, right), light = unit([0.3, -0.4, 0.85]);
-  const rows = edges(strip, width, scale, every), result = [];
+  const view = unit(eye),
+    right = unit(cross([0, 0, 1], view)),
+    top = cross(view, right),
+    light = unit([0.3, -0.4, 0.85]);
+  const rows = edges(strip, width, scale, every),
+    result = [];
   rows.forEach(([a, b, normal], k) => {
-    const [c, d] = rows[(k + 1) % rows.length], corners = [a, b, d, c];
+    const [c, d] = rows[(k + 1) % rows.length],
+      corners = [a, b, d, c];
     result.push({
       points: corners.map((p) => [dot(p, right), -dot(p, top)]),
       depth: corners.reduce((sum, p) => sum + dot(p, view), 0),

@@ -1,0 +1,75 @@
+"use strict";
+// The read-out, and all states that share the present kappa_n.
+
+let idle = 0; // timer: pictures of the other states are drawn when nothing has moved for a moment
+
+function readOut() {
+  const { branch, s } = now,
+    whole = Math.abs(s - Math.round(s)) < 1e-9,
+    [kind, word, index] = stability(branch, s);
+  const rows = [
+    ["branch", nameOf(branch)],
+    ["κ<sub>n</sub> L/2π", digits(branch.value("kappa_n", s)), "kappa_n"],
+    ["κ*", digits(branch.value("kappa_star", s)), "kappa_star"],
+    ["energy", digits(branch.value("energy", s)), "energy"],
+    [
+      "stability",
+      `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`,
+      "stability",
+    ],
+    ...(branch.ruled ? [["rulings cross beyond", percent(widest(branch.strip(s))), "widest"]] : []),
+    [
+      "point",
+      branch.circle
+        ? "exact"
+        : whole
+          ? `${Math.round(s)} of ${branch.size - 1}${branch.labels[Math.round(s)] ? ` (${branch.labels[Math.round(s)]})` : ""}`
+          : `${Math.floor(s)} – ${Math.ceil(s)}`,
+      "point",
+    ],
+  ];
+  $("readout").innerHTML = rows
+    .map(([name, value, id]) => `<div><dt>${name}</dt><dd${id ? ` data-value="${id}"` : ""}>${value}</dd></div>`)
+    .join("");
+  const text = story();
+  if (!now.playing && $("story").textContent !== text) $("story").textContent = text;
+}
+
+/** All states of the family at the present kappa_n, by energy. */
+function coexisting() {
+  const kappa = now.branch.value("kappa_n", now.s),
+    found = [{ branch: now.branch, s: now.s }];
+  for (const branch of now.family.branches)
+    for (const s of branch.places(kappa))
+      if (!found.some((one) => one.branch === branch && Math.abs(one.s - s) < 0.02)) found.push({ branch, s });
+  found.forEach((one) => (one.energy = one.branch.value("energy", one.s)));
+  return found.sort((a, b) => a.energy - b.energy);
+}
+
+function drawStates() {
+  clearTimeout(idle);
+  const found = coexisting();
+  $("states-note").textContent = `${found.length} at κₙL/2π = ${short(now.branch.value("kappa_n", now.s))}, least energy first`;
+  $("states").replaceChildren(
+    ...found.map((one) => {
+      const item = document.createElement("li"),
+        button = item.appendChild(document.createElement("button")),
+        [kind, word] = stability(one.branch, one.s);
+      button.type = "button";
+      button.innerHTML = `<canvas aria-hidden="true"></canvas><b>${nameOf(one.branch)}</b><small>energy ${minus(one.energy.toFixed(5))}</small><span class="tag ${kind}">${word}</span>`;
+      if (one.branch === now.branch && one.s === now.s) button.setAttribute("aria-current", "true");
+      button.onclick = () => go(one.branch, one.s);
+      return item;
+    }),
+  );
+  const current = $("states").querySelector("[aria-current]").parentElement;
+  const left = current.offsetLeft - $("states").offsetLeft,
+    room = $("states").clientWidth - current.clientWidth - 20;
+  $("states").scrollLeft = Math.max(0, left - room);
+  $("states")
+    .querySelectorAll("canvas")
+    .forEach((canvas, i) => {
+      const strip = found[i].branch.strip(found[i].s);
+      paint(canvas, strip, eyeNow(), scaleOf(strip) * 1.05, Math.max(1, Math.round(count(strip) / 190)));
+    });
+}

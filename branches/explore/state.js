@@ -1,0 +1,81 @@
+"use strict";
+// The state of the page, one place on one branch, and the words for it.
+
+const $ = (id) => document.getElementById(id);
+const DATA = JSON.parse($("data").textContent);
+const FAMILIES = DATA.families.map((family) => ({
+  ...family,
+  branches: [
+    ...family.branches.map((about) => new Branch(about, family.law)),
+    ...family.circles.map((about) => new Branch(about, family.law)),
+  ],
+}));
+const now = { family: FAMILIES[0], branch: null, s: 0, playing: false };
+
+// --- words ---------------------------------------------------------------------------------------------------------
+
+const LOOPS = {
+  1: "single",
+  2: "double",
+  3: "triple",
+  4: "fourfold",
+  5: "fivefold",
+  6: "sixfold",
+  7: "sevenfold",
+  8: "eightfold",
+  9: "ninefold",
+};
+
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const minus = (text) => text.replace("-", "−");
+const short = (value) =>
+  minus(
+    value
+      .toPrecision(5)
+      .replace(/(\.\d*?)0+$/, "$1")
+      .replace(/\.$/, ""),
+  );
+const digits = (value) => minus(value.toFixed(8));
+const loopName = (m) => (m < 0 ? `${LOOPS[-m] || -m + "-fold"} loop, curled the wrong way` : `${LOOPS[m] || m + "-fold"} loop`);
+const percent = (width) => (width < 2 * Math.PI ? `${((100 * width) / (2 * Math.PI)).toPrecision(2)} % width` : "never");
+const nameOf = (branch) => {
+  if (branch.circle) return loopName(branch.m);
+  return "origin" in branch ? `from (${branch.m}, ${branch.n}) at ${short(branch.origin)}` : `(${branch.m}, ${branch.n})`;
+};
+
+function stability(branch, s) {
+  const index = branch.index(s);
+  const there = Math.abs(s - Math.round(s)) < 1e-6 && branch.m > 0; // a point where some direction is neutral
+  if (index === null) return ["unknown", !branch.columns.index ? "not computed" : there ? "on the verge" : "not known", ""];
+  return index === 0 ? ["stable", "stable", "0"] : ["unstable", "unstable", index === -2 ? "∞" : String(index)];
+}
+
+/** The labelled point at s, if there is one. */
+const markAt = (branch, s) => (branch.marks || []).find((mark) => Math.abs(mark.point - s) < 1e-6);
+
+const MARK_WORDS = {
+  fold: "At this fold the branch turns back: push the strip on, and it snaps to another shape.",
+  secondary: "Another branch, with less symmetry, crosses here.",
+  limit: "The computation was told to stop here; the branch goes on.",
+};
+
+function story() {
+  const { branch, s } = now,
+    mark = markAt(branch, s),
+    [kind] = stability(branch, s);
+  const steady = {
+    stable: "It is stable: push it a little and it comes back.",
+    unstable: "It is unstable: it can rest here, but the least push makes it leave.",
+    unknown: "",
+  }[kind];
+  if (branch.circle)
+    return `A flat ring: the strip goes round ${Math.abs(branch.m) === 1 ? "once" : `${Math.abs(branch.m)} times`} (${loopName(branch.m)}). ${steady}`;
+  if (mark && mark.kind === "circle")
+    return `Here the branch meets the ${loopName(mark.covering)}, flat again. Beyond it, waves grow.`;
+  const to = branch.to === null ? "does not come back" : `ends on the ${loopName(branch.to)}`;
+  const way =
+    "origin" in branch
+      ? `This shape has less symmetry than the branch (${branch.m}, ${branch.n}) that it comes from.`
+      : `This branch leaves the ${loopName(branch.m)} with ${branch.n} wave${branch.n > 1 ? "s" : ""} round the strip, and ${to}.`;
+  return `${way} ${(mark && MARK_WORDS[mark.kind]) || steady}`;
+}
