@@ -96,6 +96,7 @@ function specialPoints() {
       symbol: found.map((mark) => SYMBOLS[mark.kind][0]),
       size: found.map((mark) => SYMBOLS[mark.kind][1]),
       color: colour("mark"),
+      opacity: 1,
       line: { width: 1, color: colour("card") },
     },
   };
