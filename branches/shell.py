@@ -52,9 +52,9 @@ class Case:
     thinness: float
     along: int = 60
     across: int = 6
-    first: float = 0.5
+    first: float = 0.3
     last: float = 0.95
-    step: float = 0.05
+    step: float = 0.1
 
     def __post_init__(self):
         if self.way not in TIME_LIMITS:
@@ -221,8 +221,8 @@ def first_root(function: Callable[[float], float], first: float, last: float, st
     """The first zero of a function that begins positive and cannot be had everywhere: it may raise `Unusable`.
 
     Going up by steps until the sign changes, hardly farther than to where a straight line through the last two points vanishes:
-    beyond the zero CalculiX is slow or fails. Then false position, until the bracket is no wider than `BRACKET`. Where the
-    function cannot be had, points ever nearer to the last one where it could are tried.
+    beyond the zero CalculiX is slow or fails. Then false position or, where that is lopsided, halving, until the bracket is no
+    wider than `BRACKET`. Where the function cannot be had, points ever nearer to the last one where it could are tried.
 
     Raises
     ------
@@ -240,7 +240,8 @@ def first_root(function: Callable[[float], float], first: float, last: float, st
             elif high is None:
                 x = min(target, falls_to_zero + BRACKET / 2)
             else:
-                x = low + (high - low) * min(max(at_low / (at_low - at_high), 0.1), 0.9)
+                part = at_low / (at_low - at_high)
+                x = low + (high - low) * (part if 0.1 < part < 0.9 else 0.5)
             try:
                 value = function(x)
             except Unusable as error:

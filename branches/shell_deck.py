@@ -7,7 +7,7 @@ symmetry is x = 0. Two ways to the same planar state:
   step, and may approach each other along x.
 - 'thermal', for thin strips, where the direct way is slow or fails: the arc of radius R/(1 - xi) is meshed, both end faces are
   held, and expansion along the strip, linear through the thickness, gives it the natural curvature 1/R. Its ends cannot
-  approach each other, so its in-plane modes mean nothing; it is for 0 <= xi < 1.
+  approach each other, so in-plane vibrations would mean nothing; only the others are computed. It is for 0 < xi < 1.
 
 Each state is followed by the lowest vibrations about it. omega**2 comes with its sign: it is negative where the state is
 unstable. Lengths in mm, steel; results do not depend on either.
@@ -25,10 +25,10 @@ import numpy as np
 RADIUS, YOUNG, DENSITY = 100.0, 210e3, 7.8e-9  # mm, MPa, t/mm^3
 #: Spacing of the states that the direct way passes through.
 STEP = 0.1
-#: Vibrations looked for at a state, so many that out-of-plane ones are among them where they are stiff, near the flat state.
-_MODES = 12
-#: Above this part of the motion in the plane a vibration is an in-plane one.
-_IN_PLANE = 0.02
+#: Vibrations looked for at a state; directly so many that out-of-plane ones are among them where they are stiff.
+_MODES = {"thermal": 4, "direct": 12}
+#: Motion of the centre line in the plane over that of the edge, squared: near 1 for in-plane vibrations, 0 for the others.
+_IN_PLANE = 0.5
 #: Beyond this part of the width the centre line of a state has left the plane.
 _OUT = 0.01
 #: Twenty-node bricks: corners, then the middles of these edges.
@@ -157,31 +157,41 @@ def _static() -> list[str]:
 
 
 _SHAPE = ["*NODE PRINT,NSET=CENTRE\nU", "*END STEP"]
-_VIBRATIONS = ["*STEP,PERTURBATION", f"*FREQUENCY\n{_MODES}", "*NODE PRINT,NSET=EDGE\nU", *_SHAPE]
+
+
+def _vibrations(way: str, *conditions: str) -> list[str]:
+    return ["*STEP,PERTURBATION", f"*FREQUENCY\n{_MODES[way]}", *conditions, "*NODE PRINT,NSET=EDGE\nU", *_SHAPE]
 
 
 def thermal_deck(strip: Strip, xi: float) -> str:
-    """The deck of one state, 0 < xi < 1, the thermal way."""
+    """The deck of one state, 0 < xi < 1, the thermal way.
+
+    By symmetry the centre line of the state does not move along z, and that of an out-of-plane vibration along z only. Both are
+    prescribed: near the instability round-off would drive Newton's method out of the plane, and vibrations would mix.
+    """
     if not 0 < xi < 1:
         raise ValueError(f"xi = {xi:g}: the thermal way is for 0 < xi < 1")
     mesh = _Mesh(strip, RADIUS / (1 - xi), math.pi * (1 - xi))
     lines = [*mesh.text(), *_set("ENDS", mesh.end(0) + mesh.end(2 * strip.along)), *_material(strip)]
     lines += ["*EXPANSION,TYPE=ORTHO\n0,1,0", "*ORIENTATION,NAME=O,SYSTEM=CYLINDRICAL\n0,0,0,0,0,1"]
     lines += ["*SOLID SECTION,ELSET=STRIP,MATERIAL=M,ORIENTATION=O", "*INITIAL CONDITIONS,TYPE=TEMPERATURE\nALL,0"]
-    lines += ["*BOUNDARY\nENDS,1,3", *_static(), "*TEMPERATURE"]
+    lines += ["*BOUNDARY\nENDS,1,3\nCENTRE,3,3", *_static(), "*TEMPERATURE"]
     outer = xi / RADIUS * strip.thickness / 2  # y (kappa_n - kappa) on the outer face
     lines += [f"{node},{_real((k - 1) * outer)}" for (_, _, k), node in mesh.nodes.items()]
-    return "\n".join([*lines, *_SHAPE, *_VIBRATIONS, ""])
+    vibrations = _vibrations("thermal", "*BOUNDARY,OP=NEW\nENDS,1,3\nCENTRE,1,2")
+    return "\n".join([*lines, *_SHAPE, *vibrations, ""])
 
 
 def direct_deck(strip: Strip, xis: Sequence[float]) -> str:
     """The deck of several states, xi ascending, the direct way; on the way there it passes through multiples of `STEP`."""
     if not (xis and xis[0] > 0 and all(a < b for a, b in zip(xis, xis[1:]))):
         raise ValueError(f"xi = {', '.join(f'{xi:g}' for xi in xis)}: must be positive and ascending")
-    mesh, nodes = _Mesh(strip, RADIUS, math.pi), 0
+    mesh = _Mesh(strip, RADIUS, math.pi)
     lines = [*mesh.text(), *_material(strip), "*SOLID SECTION,ELSET=STRIP,MATERIAL=M"]
-    nodes = len(mesh.points)
-    inner, outer = nodes + 1, nodes + 2  # carry u_x of two layers of the end that moves, less that of its centre
+    inner, outer = (
+        len(mesh.points) + 1,
+        len(mesh.points) + 2,
+    )  # carry u_x of two layers of the end that moves, less that of its centre
     lines.append(f"*NODE\n{inner},0,-10,0\n{outer},0,-20,0")
     right, left = 0, 2 * strip.along
     centre = mesh.nodes[right, strip.across, 1]
@@ -193,7 +203,7 @@ def direct_deck(strip: Strip, xis: Sequence[float]) -> str:
     path = sorted({round(STEP * n, 9) for n in range(1, int(xis[-1] / STEP) + 1)} | set(xis))
     for xi in path:
         lines += [*_static(), "*BOUNDARY", *_turned(mesh, left, right, inner, outer, math.pi * xi / 2)]
-        lines += [*_SHAPE, *_VIBRATIONS] if xi in xis else ["*END STEP"]
+        lines += [*_SHAPE, *_vibrations("direct")] if xi in xis else ["*END STEP"]
     return "\n".join([*lines, ""])
 
 

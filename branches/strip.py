@@ -175,7 +175,7 @@ def answer(strip: Strip, yield_strain: float | None = None) -> str:
     lines = [
         f"Gamma = w^2/(h L/2pi) = {strip.Gamma:.4g}, natural curvature kappa_n L/2pi = {strip.kappa_n:.4g}",
         f"law: {_law(strip)}",
-        *_assumptions(strip, rings, yield_strain),
+        *assumptions(strip, rings, yield_strain),
         "",
         f"{'circle  radius mm  stable for natural radii (mm)':57s}  {'here':14s}  moment N m   energy J  strain",
         *(_circle_line(strip, ring, yield_strain) for ring in rings),
@@ -190,8 +190,8 @@ def answer(strip: Strip, yield_strain: float | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _assumptions(strip: Strip, rings: list[State], yield_strain) -> Iterator[str]:
-    """Each one that is not small, with its size."""
+def assumptions(strip: Strip, rings: list[State], yield_strain: float | None = None) -> Iterator[str]:
+    """A caution for each assumption that fails, or whose error is not small, with its size."""
     if strip.torsion_excess > _SMALL / 2:
         ratio, excess = strip.thickness / strip.width, 100 * strip.torsion_excess
         yield f"caution: h/w = {ratio:.3g} is not thin: a plate's torsional stiffness is too large by about {excess:.0f} %"
@@ -291,7 +291,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ValueError as error:
         complain(f"error: {error}")
         return 2
-    write_output(answer(strip, yield_strain))
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):  # the matrices are small
+        write_output(answer(strip, yield_strain))
     return 0
 
 

@@ -7,7 +7,7 @@ import shlex
 import pytest
 
 from branches.config import ConfigError, DiagramConfig, dump, load, parse
-from branches.strip import answer, buckled, circles, main
+from branches.strip import assumptions, buckled, circles, deviations, main
 from ribbon_model.exact_finite_width import curve
 from ribbon_model.laws import FINITE_WIDTH, RIBBON
 from ribbon_model.linear import thresholds
@@ -60,14 +60,21 @@ def test_the_strain_is_the_largest_principal_one():
 
 
 def test_cautions():
-    thick = answer(BLADE, 0.002)
-    assert "h/w = 0.115 is not thin: a plate's torsional stiffness is too large by about 7 %" in thick
-    assert (
-        re.search(r"yield strain 0.002 \(marked !\): 7-fold circle\n", thick) and thick.count("%  !") + thick.count("% !") == 1
-    )
-    assert "law: flat rod (" in thick
-    slim = answer(Strip(0.003, 0.0001, 3.0, 0.5, 0.3, 1e9), 0.02)
-    assert "caution" not in slim
+    torsion, strain = assumptions(BLADE, circles(BLADE), 0.002)
+    assert torsion == "caution: h/w = 0.115 is not thin: a plate's torsional stiffness is too large by about 7 %"
+    assert strain == "caution: strains beyond the yield strain 0.002 (marked !): 7-fold circle"
+    (slender,) = assumptions(TAPE, circles(TAPE))
+    assert "0.17 on the single loop and more" in slender
+    slim = Strip(0.003, 0.0001, 3.0, 0.5, 0.3, 1e9)
+    assert not list(assumptions(slim, circles(slim), 0.02))
+
+
+def test_which_law_holds():
+    """Thresholds of the tape's Gamma, in docs/finite-width.md between those of the rod and the ribbon."""
+    blade, tape = deviations(BLADE), deviations(TAPE)
+    assert blade["flat rod"] < 1e-3 < 0.1 < blade["ribbon"]
+    assert min(tape.values()) > 0.1
+    assert deviations(Strip(1.0, 1e-8, 6.0, 1.0, 0.3, 1e9))["ribbon"] < 1e-3
 
 
 def test_the_pages_numbers_are_the_commands(root, capsys):
