@@ -2,7 +2,6 @@
 // The strip in space, a lit mesh drawn by plotly; flat polygons where there is no WebGL, in small pictures and in SVG.
 
 const EYE = { x: 0.78, y: -1.02, z: 0.8 };
-const TRIADS = ["#d55e00", "#009e73", "#0072b2"]; // d1, d2, d3
 const flat = !hasWebGL();
 let flatEye = EYE;
 
@@ -39,7 +38,7 @@ function ribbonTraces(strip) {
         type: "scatter3d",
         mode: "lines",
         ...line,
-        line: { color: TRIADS[i], width: 6 },
+        line: { color: colour(`d${i + 1}`), width: 6 },
         hoverinfo: "skip",
         showlegend: false,
       }),
