@@ -109,8 +109,8 @@ def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[di
     display.begin_diagram(config, len(configs), len(configs) - len(fresh))
     if fresh:
         _load_kernels(fresh)
-        with run as (submit, limit):
-            for one, result in run_jobs(plan.next, _compute_one, submit, limit):
+        with run as (submit, wait, limit):
+            for one, result in run_jobs(plan.next, _compute_one, submit, limit, wait):
                 problem = _take(folder, one, result, graph)
                 if problem:
                     failed[file_name(one)] = problem

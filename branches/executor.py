@@ -2,32 +2,42 @@
 
 from __future__ import annotations
 
+import collections
 import concurrent.futures as futures
 import contextlib
+import math
 import multiprocessing
+import multiprocessing.connection
 import os
+import pickle
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 
 class ExecutorError(Exception):
     """A scheduler that cannot be used; the message is one sentence."""
 
 
+Submit = Callable[[Callable[[Any], Any], Any], futures.Future]
+Wait = Callable[[Iterable[futures.Future]], set[futures.Future]]
+
+
 @contextlib.contextmanager
 def executor(
     scheduler: str | None = None, workers: int | None = None, time_limit: float | None = None
-) -> Iterator[tuple[Callable[..., futures.Future], int]]:
-    """A function ``submit(function, job)`` that returns a future, and the number of jobs that run at a time.
+) -> Iterator[tuple[Submit, Wait, int]]:
+    """A function ``submit(function, job)`` that returns a future, one that waits for some, and how many run at a time.
 
     Parameters
     ----------
     scheduler : str, optional
         Address of a Dask scheduler, as in ``tcp://host:8786``; local processes without.
     workers : int, optional
-        Local processes; `cores` by default.
+        Local processes; :func:`cores` by default.
     time_limit : float, optional
         Seconds after which a job in a local process is killed; its future then raises TimeoutError. A process that dies takes
         its own job with it and no other.
@@ -38,13 +48,9 @@ def executor(
         Dask is not installed, or the scheduler does not answer.
     """
     if scheduler is None:
-        from pebble import CONSTS, ProcessPool
-
-        CONSTS.sleep_unit = 0.02  # seconds between its looks at its processes, the last of which the end of a run waits for
         count = workers or cores()
-        context = multiprocessing.get_context(_start_method())
-        with ProcessPool(count, initializer=_begin_worker, context=context) as pool:
-            yield lambda function, job: pool.schedule(function, [job], timeout=time_limit), count
+        with contextlib.closing(_Processes(count, time_limit)) as processes:
+            yield processes.submit, processes.wait, count
         return
     try:
         from distributed import Client
@@ -55,7 +61,129 @@ def executor(
     except (OSError, ValueError) as error:
         raise ExecutorError(f"--scheduler {scheduler!r}: no Dask scheduler answers there") from error
     with client:
-        yield client.get_executor().submit, max(1, sum(client.nthreads().values()))
+        yield client.get_executor().submit, first_done, max(1, sum(client.nthreads().values()))
+
+
+def first_done(running: Iterable[futures.Future]) -> set[futures.Future]:
+    """Wait until some futures are done."""
+    return futures.wait(running, return_when=futures.FIRST_COMPLETED).done
+
+
+class _Worker:
+    """A process that does one job after the other, with a pipe of its own: what happens to it, happens to no other."""
+
+    def __init__(self, context):
+        self.pipe, its_end = context.Pipe()
+        self.process = context.Process(target=_work, args=(its_end,), daemon=True)
+        self.process.start()
+        its_end.close()
+        self.future: futures.Future | None = None
+        self.deadline = math.inf
+
+    def begin(self, future: futures.Future, task: tuple, time_limit: float | None) -> None:
+        """Hand it a job."""
+        self.future = future
+        self.deadline = time.monotonic() + time_limit if time_limit else math.inf
+        with contextlib.suppress(OSError):  # it died meanwhile; that will be seen when the answer is read
+            self.pipe.send(task)
+
+    def finish(self) -> futures.Future:
+        """Read its answer, or find that it died; the job's future, settled."""
+        future, self.future, self.deadline = self.future, None, math.inf
+        try:
+            good, result = pickle.loads(self.pipe.recv_bytes())
+        except (EOFError, OSError):
+            self.process.join()
+            good, result = False, WorkerDied(self.process.exitcode)
+        (future.set_result if good else future.set_exception)(result)
+        return future
+
+    def kill(self) -> None:
+        """End it at once."""
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+
+
+class WorkerDied(Exception):
+    """A process that ended before its job."""
+
+    def __init__(self, exitcode: int | None):
+        super().__init__(f"its process died (exit code {exitcode})")
+
+
+class _Processes:
+    """Local processes, looked after by the thread that uses them: no lock is shared, so that none can be left behind locked."""
+
+    def __init__(self, count: int, time_limit: float | None):
+        self._context = multiprocessing.get_context(_start_method())
+        self._count, self._time_limit = count, time_limit
+        self._workers: list[_Worker] = []
+        self._queue: collections.deque[tuple[futures.Future, tuple]] = collections.deque()
+
+    def submit(self, function: Callable[[Any], Any], job: Any) -> futures.Future:
+        """Have ``function(job)`` done as soon as a process is free."""
+        future: futures.Future = futures.Future()
+        self._queue.append((future, (function, job)))
+        self._dispatch()
+        return future
+
+    def _dispatch(self) -> None:
+        while self._queue:
+            self._workers = [worker for worker in self._workers if worker.future is not None or worker.process.is_alive()]
+            worker = next((worker for worker in self._workers if worker.future is None), None)
+            if worker is None:
+                if len(self._workers) == self._count:
+                    return
+                worker = _Worker(self._context)
+                self._workers.append(worker)
+            worker.begin(*self._queue.popleft(), self._time_limit)
+
+    def wait(self, running: Iterable[futures.Future]) -> set[futures.Future]:
+        """Wait until some are done."""
+        while not (done := {future for future in running if future.done()}):
+            busy = {worker.pipe: worker for worker in self._workers if worker.future is not None}
+            left = min(worker.deadline for worker in busy.values()) - time.monotonic()
+            for pipe in multiprocessing.connection.wait(list(busy), None if left == math.inf else max(left, 0)):
+                worker = busy[pipe]
+                worker.finish()
+                if not worker.process.is_alive():
+                    self._workers.remove(worker)
+            self._end_late_ones()
+            self._dispatch()
+        return done
+
+    def _end_late_ones(self) -> None:
+        for worker in [worker for worker in self._workers if time.monotonic() > worker.deadline]:
+            self._workers.remove(worker)
+            worker.kill()
+            worker.future.set_exception(TimeoutError())
+
+    def close(self) -> None:
+        """End all processes."""
+        for worker in self._workers:
+            worker.kill()
+
+
+def _work(pipe) -> None:
+    """What a worker process does."""
+    _begin_worker()
+    while True:
+        function, job = pipe.recv()
+        try:
+            answer = pickle.dumps((True, function(job)))
+        except Exception as error:
+            answer = pickle.dumps((False, _sendable(error)))
+        pipe.send_bytes(answer)
+
+
+def _sendable(error: Exception) -> Exception:
+    """The error, or one that says the same where it does not survive being sent."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:  # whatever its own methods do
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
 
 
 #: What the schedulers of clusters (Slurm, PBS, Grid Engine, LSF) call the cores that a job was given.
@@ -90,8 +218,8 @@ def trouble(error: BaseException) -> str:
     """Why a job gave no result, in words."""
     if isinstance(error, TimeoutError):
         return "not finished within the time limit"
-    if hasattr(error, "exitcode"):  # pebble's ProcessExpired
-        return f"its process died (exit code {error.exitcode})"
+    if isinstance(error, WorkerDied):
+        return str(error)
     return f"{type(error).__name__}: {error}"
 
 
@@ -99,7 +227,9 @@ def trouble(error: BaseException) -> str:
 WAIT = object()
 
 
-def run_jobs(source: Callable, function: Callable, submit: Callable, limit: int) -> Iterator[tuple[object, object]]:
+def run_jobs(
+    source: Callable, function: Callable, submit: Submit, limit: int, wait: Wait = first_done
+) -> Iterator[tuple[object, object]]:
     """Run ``function(job)`` for every job, ``limit`` at a time; yield (job, result or exception) as they finish.
 
     Parameters
@@ -122,7 +252,6 @@ def run_jobs(source: Callable, function: Callable, submit: Callable, limit: int)
                 running[submit(function, job)] = job
         if not running:
             return
-        done, _ = futures.wait(running, return_when=futures.FIRST_COMPLETED)
-        for future in done:
+        for future in wait(running):
             job = running.pop(future)
             yield job, future.exception() or future.result()

@@ -4,6 +4,7 @@ import itertools
 import json
 import os
 import signal
+import threading
 import time
 
 import networkx
@@ -144,6 +145,37 @@ def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatc
     monkeypatch.undo()
     assert run_diagram(scene, tmp_path, Display(), workers=2) == "complete"
     assert "1 of them computed before" in capsys.readouterr().out
+
+
+def _die_while_sending(size):
+    """A job whose process is killed when it has sent a part of its result."""
+    if size > 100:
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGKILL)).start()
+    return bytes(size)
+
+
+class _Odd(Exception):
+    def __init__(self, a, b):
+        super().__init__("odd")
+
+
+def _raise(job):
+    raise _Odd(1, 2)
+
+
+def test_a_process_killed_while_it_sends_its_result():
+    """A part of a result in the pipe must not keep anybody waiting; nor may an error that cannot be sent."""
+    with executor(workers=2) as (submit, wait, _):
+        jobs = [submit(_die_while_sending, size) for size in (100_000_000, 10, 100_000_000, 20)]
+        time.sleep(0.5)
+        while not all(job.done() for job in jobs):
+            wait([job for job in jobs if not job.done()])
+        assert [jobs[i].result() for i in (1, 3)] == [bytes(10), bytes(20)]
+        for i in (0, 2):
+            assert executors.trouble(jobs[i].exception()) == "its process died (exit code -9)"
+        odd = submit(_raise, None)
+        wait([odd])
+        assert "odd" in str(odd.exception())
 
 
 def test_where_processes_cannot_be_forked(tmp_path, monkeypatch):
