@@ -32,7 +32,7 @@ SECONDARY = "{m: 3, n: 1, domain: half loop, stability: true, limits: {kappa_n: 
 ORIGIN = "{kappa_n: -21.62681748, kappa_star: 2.78375737, mode: wavenumber 1 even}"
 SCENES = {
     "branch": "{m: 1, n: 2, steps: {largest: 0.05}, zeros: {kappa_n: [3.0, 1.0]}, stride: 3}",
-    "stability": "{m: 3, n: 1, stability: true, steps: {largest: 0.5}, limits: {kappa_n: [-60, 100]}, stride: 3}",
+    "stability": "{m: 1, n: 2, stability: true, stride: 3}",
     "half loop": "{m: 3, n: 4, domain: half loop, steps: {largest: 0.1}, stride: 3}",
     "secondary": SECONDARY % ORIGIN,
     "diagram": "{m: [1, 3], n: [4, 5], steps: {largest: 0.5}, stride: 10}",
