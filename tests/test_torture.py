@@ -1,0 +1,21 @@
+"""Some trials of scripts/torture.py: every kind of fault once on a branch, and once on a diagram; each ends in the same bits.
+
+Takes longer than other tests: every trial computes its scene in two to four processes.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("fcntl", reason="needs POSIX")
+SCRIPT = Path(__file__).parent.parent / "scripts" / "torture.py"
+
+
+@pytest.mark.parametrize(("scene", "faults"), [("branch", 14), ("diagram", 4)])
+def test_every_fault_once(scene, faults, tmp_path):
+    words = [sys.executable, SCRIPT, "--scenes", scene, "--trials", str(faults), "--seed", "3", "--keep", tmp_path]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=600)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert done.stdout.endswith(f"{faults} trials, 0 failed\n") and done.stdout.count(f"{scene} 1") == faults
