@@ -53,7 +53,7 @@ class Display:
         self._quiet, quiet = quiet or silent, quiet or silent
         self._silent = silent
         self._moving = not quiet and sys.stderr is not None and sys.stderr.isatty()
-        self._label = self._first = 0
+        self._label = self._first = self._most = 0
         self._began = self._shown = time.monotonic()
 
     def note(self, text: str) -> None:
@@ -63,7 +63,7 @@ class Display:
 
     def begin(self, config, count: int, labels: int) -> None:
         """Say what is about to be computed, after ``count`` points, ``labels`` of them labelled, of a run resumed."""
-        self._first, self._label = count, labels
+        self._first, self._label, self._most = count, labels, config.steps.max_points
         if not self._quiet:
             resumed = f", resumed after {count} points" if count else ""
             self.note(f"{name_of(config)} on the {config.domain}{resumed}\n{_HEADER}")
@@ -84,7 +84,10 @@ class Display:
         if self._moving and now - self._shown > 0.1:
             self._shown = now
             rate = (number - self._first) / max(now - self._began, 1e-9)
-            self._line(f"point {number}: kappa_n = {point['kappa_n']:.4f}, step {step:.1e}, {rate:.0f} points/s")
+            self._line(
+                f"point {number}: kappa_n = {point['kappa_n']:.4f}, step {step:.1e}, error {point.newton_error:.0e}, "
+                f"{rate:.0f} points/s, max_points in {(self._most - number) / max(rate, 1e-9):.0f} s"
+            )
 
     def clear(self) -> None:
         """Take the moving line away."""

@@ -179,14 +179,15 @@ def test_a_process_killed_while_it_sends_its_result():
 
 
 def test_where_processes_cannot_be_forked(tmp_path, monkeypatch):
-    """As on Windows and macOS: each process starts from nothing; the same bits come out."""
+    """As on Windows and macOS: each process starts from nothing; the same bits come out, also of one process."""
     scene = parse("{m: [3], n: [4, 5], stride: 20}", "scene")
+    run_diagram(scene, tmp_path / "one", Display(silent=True), workers=1)
     run_diagram(scene, tmp_path / "fork", Display(silent=True), workers=2)
     monkeypatch.setattr(executors, "_start_method", lambda: "spawn")
     run_diagram(scene, tmp_path / "spawn", Display(silent=True), workers=2)
     for config in scene.branches:
-        a, b = (read_branch(tmp_path / place / file_name(config)).points for place in ("fork", "spawn"))
-        assert np.array_equal(a, b)
+        a, *others = (read_branch(tmp_path / place / file_name(config)).points for place in ("one", "fork", "spawn"))
+        assert all(np.array_equal(a, other) for other in others)
 
 
 def test_two_runs_into_one_folder(tmp_path):

@@ -245,6 +245,18 @@ def test_sigterm_does_the_same(tmp_path, silent, undisturbed, tables, number):
     assert tables(path) == undisturbed(config)
 
 
+def test_the_number_of_threads_makes_no_difference(command, scene, tables):
+    """With the index, whose eigenvalues come from LAPACK; and whatever the scheduler of a cluster sets."""
+    found = []
+    for count in ("1", "4"):
+        names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "SLURM_CPUS_PER_TASK")
+        path = command.folder / f"{count}.h5"
+        done = command(scene, "--out", path, "--quiet", "--set", "stability=true", env=dict.fromkeys(names, count))
+        assert (done.returncode, done.err) == (0, "")
+        found.append(tables(path))
+    assert found[0] == found[1]
+
+
 def test_a_second_ctrl_c_stops_at_once(tmp_path, silent):
     path = tmp_path / "x.h5"
     run_branch(scene_of(), path, silent())
@@ -409,7 +421,7 @@ def test_the_moving_line_fits_the_terminal(columns, tmp_path, silent, monkeypatc
     run_branch(scene_of(steps={"max_points": 4}), tmp_path / "x.h5", display)
     drawn = capsys.readouterr().err.split("\r")
     assert max(map(len, drawn)) <= max(columns - 1, 0)
-    assert columns < 80 or any("points/s" in line for line in drawn)
+    assert columns < 80 or any("step" in line and "error" in line and "points/s" in line for line in drawn)
 
 
 def test_on_a_terminal(command, scene):
