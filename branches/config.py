@@ -298,7 +298,7 @@ def _of_strip(values: dict, name: str) -> dict:
         raise ConfigError(f"{name}: strip: must hold the fields {', '.join(NAMES)}, not {_show(strip)}")
     for field in strip:
         if field not in NAMES:
-            raise ConfigError(f"{name}: unknown field 'strip.{field}'; the fields are {', '.join(NAMES)}")
+            raise ConfigError(f"{name}: unknown field 'strip.{_plain(str(field))}'; the fields are {', '.join(NAMES)}")
     for field in NAMES:
         if field not in strip:
             raise ConfigError(f"{name}: the field 'strip.{field}' is missing")
