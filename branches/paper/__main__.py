@@ -37,8 +37,9 @@ ITEMS: dict[str, Callable[[Path], Section]] = {
     "fig12": _later("branches.paper.diagram", "fig12"),
     "fig12b": _later("branches.paper.stability", "fig12b"),
     "curves": _later("branches.paper.curves", "curves"),
-    "fig7": _later("branches.paper.shell", "fig7"),  # last: minutes of CalculiX
     "snaps": _later("branches.paper.snaps", "snaps"),
+    "finite-width": _later("branches.paper.finite_width", "finite_width"),
+    "fig7": _later("branches.paper.shell", "fig7"),  # last: minutes of CalculiX
 }
 
 

@@ -20,6 +20,7 @@ NUMBERS = {
     "fig12b": 0,
     "curves": 0,
     "fig7": 0,
+    "finite-width": 0,
     "snaps": 0,
 }
 
@@ -69,6 +70,13 @@ def test_where_folds_are_born(computed):
     assert all(by_quadrature == pytest.approx(by_collocation, abs=1e-6) for by_quadrature, by_collocation in births)
     at_03 = [row.ours for row in rows if row.what == "secondary bifurcation of (3, 1) at ν = 0.3: κₙL/2π ="]
     assert float(at_03[0]) == pytest.approx(-21.62681748742, abs=1e-8)  # the half loop's branch point
+
+
+def test_where_the_fold_of_finite_width_is_born(computed):
+    """4.45212, where the quadrature's slope dkappa_n/dA at the circle vanishes (extrapolated from A = .0004 and .0016)."""
+    rows = {row.what: row.ours for row in computed("finite-width")[0].rows}
+    assert float(rows["fold of (1, 2) exists for Γ above"]) == pytest.approx(4.45212, abs=2e-4)
+    assert float(rows["fold of (1, 2) at Γ = 10: κₙL/2π ="]) == pytest.approx(3.97953925582077, abs=1e-9)
 
 
 def test_verdicts_are_those_of_the_printed_digits():
