@@ -12,6 +12,7 @@ import io
 import math
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -398,6 +399,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--full", action="store_true", help="the fuller set: finer meshes, xi up to 4.5, other strips")
     options = parser.parse_args(argv)
     survive_any_encoding()
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # unwinds, and so ends CalculiX too
     cases = DEFAULT + FULLER if options.full else DEFAULT
     try:
         compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"))
