@@ -8,6 +8,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from contin import ConvergenceError, Monitor, correct
+from ribbon_model.convexity import margin
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
 from ribbon_model.second_variation import from_solution
@@ -27,6 +28,8 @@ _LITTLE_FORCE = 0.5
 _ZERO_BESIDE = 1e-8
 #: The class that keeps all symmetry: an eigenvalue of it passes zero at folds, which the engine finds by itself.
 _FULL = (0, "even")
+#: A strain energy with a smaller margin of convexity is at its end: there is no index.
+_CONVEX = 1e-6
 
 
 #: Distance along the branch at which the index beside a bifurcation is taken, relative to 1 + |x|.
@@ -68,6 +71,7 @@ class Watch:
 
     def __init__(self, law: Law, system, x, from_circle: bool = True):
         self._law, self._known, self._blas, self._from_circle = law, [], ThreadpoolController(), from_circle
+        self._margin = margin(law)
         names = [entry.name for entry in self.at(system, x).classes]
         self.monitors = [self._monitor(name) for name in names if name != _FULL]
 
@@ -86,10 +90,21 @@ class Watch:
         self._known = [*self._known[-3:], (x, result)]
         return result
 
+    def _within_law(self, system, x) -> Stability | None:
+        """The stability of a point; None at the end of a law whose energy is convex no further, where there is no index."""
+        if self._margin is None:
+            return self.at(system, x)
+        if not self._margin(system, x) > _CONVEX:
+            return None
+        try:
+            return self.at(system, x)
+        except ValueError:  # not convex somewhere between the places where the margin was looked at
+            return None
+
     def index(self, point) -> int:
         """The index of a point, or `UNDECIDED`."""
-        result = self.at(point.system, point.x)
-        return result.index if result.decided else UNDECIDED
+        result = self._within_law(point.system, point.x)
+        return result.index if result is not None and result.decided else UNDECIDED
 
     def change(self, point) -> Change:
         """The index on both sides of a fold or secondary bifurcation, from two points close by on the branch."""
@@ -108,14 +123,17 @@ class Watch:
             there = correct(point.system, point.x + distance * tangent, tangent, tangent @ point.x + distance)
         except ConvergenceError:  # at a bifurcation that could not be located, say
             return UNDECIDED
-        result = self.at(point.system, there.x)
-        return result.index if result.decided else UNDECIDED
+        result = self._within_law(point.system, there.x)
+        return result.index if result is not None and result.decided else UNDECIDED
 
     def _monitor(self, name) -> Monitor:
         """The determinant of one symmetry class, whose zeros are bifurcations that break the symmetry."""
 
         def determinant(trial):
-            entry = self.at(trial.system, trial.x)[name]
+            result = self._within_law(trial.system, trial.x)
+            if result is None:
+                return np.nan  # no event: the run ends before
+            entry = result[name]
             values = entry.eigenvalues
             if not self._from_circle:
                 beside = force(trial) < _LITTLE_FORCE and abs(values[entry.nearest]) < _ZERO_BESIDE

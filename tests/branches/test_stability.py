@@ -76,3 +76,11 @@ def test_a_run_resumed_is_the_run_undisturbed(silent, tables, tmp_path):
     run_branch(parse(SCENE.replace("stability", "steps: {max_points: 20}, stability"), "scene"), stopped, silent())
     run_branch(parse(SCENE, "scene", ["steps.max_points=2000"]), stopped, silent(), resume=True)
     assert tables(whole) == tables(stopped)
+
+
+def test_the_index_ends_with_the_law(silent, tmp_path):
+    """Beyond the end of its convex energy a strip of finite width has no index; the run ends there, as without the index."""
+    scene = "{m: 3, n: 1, law: finite width, Gamma: 10, stability: true, limits: {kappa_n: [-60, 100]}, stride: 50}"
+    assert run_branch(parse(scene, "scene"), tmp_path / "x.h5", silent()) == "complete"
+    branch = read_branch(tmp_path / "x.h5")
+    assert branch.events[-1]["name"] == b"the end of the convex strain energy" and branch.events[-1]["index"] == -1
