@@ -27,8 +27,8 @@ RADIUS, YOUNG, DENSITY = 100.0, 210e3, 7.8e-9  # mm, MPa, t/mm^3
 STEP = 0.1
 #: Vibrations looked for at a state; directly so many that out-of-plane ones are among them where they are stiff.
 _MODES = {"thermal": 4, "direct": 12}
-#: Motion of the centre line in the plane over that of the edge, squared: near 1 for in-plane vibrations, 0 for the others. Where
-#: the two kinds have nearly the same frequency they mix, directly, and neither is taken.
+#: Motion of the centre line in the plane over that of the edge, squared: near 1 for in-plane vibrations, 0 for the others.
+#: Where the two kinds have nearly the same frequency they may mix, directly, and then neither is taken.
 _IN_PLANE = 0.02
 #: Beyond this part of the width the centre line of a state has left the plane.
 _OUT = 0.01
