@@ -138,7 +138,7 @@ class Config(_Strict):
         Raises
         ------
         ValueError
-            The mode has no bifurcation; see :func:`ribbon_model.linear.thresholds`.
+            The mode has no bifurcation; see `ribbon_model.linear.thresholds`.
         """
         from ribbon_model.laws import LAWS
         from ribbon_model.linear import circle, thresholds
@@ -368,7 +368,7 @@ class _Dumper(yaml.SafeDumper):
 
 
 def dump(config: Config | DiagramConfig) -> str:
-    """The YAML text of a scene, fields at their defaults left out; :func:`parse` reads it back."""
+    """The YAML text of a scene, fields at their defaults left out; `parse` reads it back."""
     values = config.values if isinstance(config, DiagramConfig) else config.model_dump(mode="json", exclude_defaults=True)
     return yaml.dump(values, Dumper=_Dumper, sort_keys=False)
 
