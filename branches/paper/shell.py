@@ -129,7 +129,7 @@ def _means(outcomes: list[Outcome]) -> list[str]:
         "vibration about the planar state; roots by false position to ±.0005. The paper's strips are unbent step by step; the "
         "others are meshed as they are and get their natural curvature by expansion, linear through the thickness. The "
         "search begins at ξ = .3.",
-        "Finer meshes, ξ up to 4.5 and more strips: python -m branches.shell --full --out DIR/shell.h5, then this item again.",
+        "Finer meshes and more strips: python -m branches.shell --full --out DIR/shell.h5, then this item again.",
     ]
 
 
