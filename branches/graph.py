@@ -327,12 +327,14 @@ def _check(graph) -> None:
     for _, data in graph.nodes(data=True):
         if not (isinstance(data["kind"], str) and isinstance(data["law"], str)):
             raise TypeError("kind and law are texts")
-        np.array([data[name] for name in ("nu", "kappa_n", "kappa_star")], dtype=float)
+        for name in ("nu", "kappa_n", "kappa_star", *(("covering",) if data["kind"] == "circle" else ())):
+            float(data[name])
     for *_, data in graph.edges(data=True):
         if not all(isinstance(data[name], kind) for name, kind in (("law", str), ("m", int), ("n", int))):
             raise TypeError("a branch is known by its law, m and n")
-        if np.array([data[name] for name in COLUMNS], dtype=float).ndim != 2 or not len(data[COLUMNS[0]]):
-            raise ValueError("columns are as long as each other")
+        columns = np.array([data[name] for name in COLUMNS], dtype=float)
+        if columns.ndim != 2 or not columns.shape[1] or not np.isfinite(columns).all():
+            raise ValueError("columns are as long as each other, and numbers")
         float(data["nu"])
 
 

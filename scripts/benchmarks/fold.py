@@ -51,19 +51,24 @@ def run(quick: bool, bifpy_python: str, exact_fold: float, budget: float) -> dic
     return {"rows": rows, "best": best(rows), "skipped": skipped, "exact_fold": exact_fold}
 
 
+#: First steps that are tried.
+FIRST_STEPS = {"contin": (0.05, 0.5, 2.0), "AUTO-07p": (0.05, 0.2)}  # AUTO-07p does not stay on the branch with 0.5
+
+
 def _contin() -> dict[tuple[str, str], Callable]:
-    """Intervals, degree, Newton's tolerance."""
+    """Intervals, degree, Newton's tolerance; the first step."""
     settings = [(6, 4, 1e-8), (10, 4, 1e-9), (4, 6, 1e-9), (4, 8, 1e-11), (6, 8, 1e-12), (8, 7, 1e-12)]
     return {
-        (CELL, f"{n} × {d}, tolerance {t:.0e}"): lambda n=n, d=d, t=t: second_run(
-            "cell", intervals=n, degree=d, tolerance=t, angle=1.2
+        (CELL, f"{n} × {d}, tolerance {t:.0e}, first step {s:g}"): lambda n=n, d=d, t=t, s=s: second_run(
+            "cell", intervals=n, degree=d, tolerance=t, angle=1.2, accuracy=0.3, step=s
         )
         for n, d, t in settings
+        for s in FIRST_STEPS["contin"]
     }
 
 
 def _auto() -> dict[tuple[str, str], Callable]:
-    """Intervals, degree and tolerance."""
+    """Intervals, degree and tolerance; the first step."""
     settings = {
         LOOP: [(15, 4, 1e-6), (30, 4, 1e-6), (60, 4, 1e-6), (90, 4, 1e-7), (160, 4, 1e-8), (30, 7, 1e-8)],
         HALF: [(10, 4, 1e-6), (15, 4, 1e-6), (30, 4, 1e-6), (45, 4, 1e-7), (80, 4, 1e-8), (15, 7, 1e-8)],
@@ -71,11 +76,12 @@ def _auto() -> dict[tuple[str, str], Callable]:
     }
     statements = {LOOP: "loop", HALF: "half", AUTO_CELL: "cell"}
     return {
-        (tool, f"{n} × {d}, tolerance {t:.0e}"): lambda tool=tool, n=n, d=d, t=t: auto_07p.study(
-            statements[tool], "LP", n, d, t, longest_step=2.0
+        (tool, f"{n} × {d}, tolerance {t:.0e}, first step {s:g}"): lambda tool=tool, n=n, d=d, t=t, s=s: auto_07p.study(
+            statements[tool], "LP", n, d, t, longest_step=2.0, first_step=s
         )
         for tool, some in settings.items()
         for n, d, t in some
+        for s in FIRST_STEPS["AUTO-07p"]
     }
 
 

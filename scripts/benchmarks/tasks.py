@@ -63,10 +63,10 @@ def half_loop(intervals=40, degree=4, tolerance=1e-10, stop="BP") -> dict:
     return {"seconds": time.perf_counter() - switched, "circle_seconds": switched - began, **_summary(points)}
 
 
-def cell(intervals=8, degree=6, tolerance=1e-12, angle=0.35, stop="LP", m=1, n=2) -> dict:
+def cell(intervals=8, degree=6, tolerance=1e-12, angle=0.35, accuracy=0.02, step=0.05, stop="LP", m=1, n=2) -> dict:
     """The branch (m, n) on its quarter wave, from its bifurcation to its fold (LP) or end (BP), on a fixed number of intervals.
 
-    ``angle`` is how far the tangent may turn in a step; the accuracy of the prediction that is asked for goes along with it.
+    ``angle``, ``accuracy`` and ``step``, the first one, are settings of contin that say how long its steps are.
     """
     import contin
     from ribbon_model.laws import RIBBON
@@ -74,8 +74,9 @@ def cell(intervals=8, degree=6, tolerance=1e-12, angle=0.35, stop="LP", m=1, n=2
 
     mesh = contin.MeshControl(every=3 if stop == "BP" else 0, min_intervals=intervals, max_intervals=intervals)
     settings = contin.Settings(
-        newton=contin.Newton(tolerance), mesh=mesh, errors=False, branch_points=stop == "BP", angle=angle, accuracy=angle / 17.5
-    )
+        newton=contin.Newton(tolerance), mesh=mesh, errors=False, branch_points=stop == "BP",
+        angle=angle, accuracy=accuracy, step=step,
+    )  # fmt: skip
     began = time.perf_counter()
     system, x, tangent = primary_branch(RIBBON, m, n, 0.3, intervals, degree)
     switched = time.perf_counter()

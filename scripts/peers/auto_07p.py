@@ -26,7 +26,7 @@ CONSTANTS = """\
 NDIM={ndim}, IPS=4, IRS={restart}, ISW={switch}, ICP=[{free}], NBC={nbc}, NINT=0, JAC=1
 NTST={intervals}, NCOL={degree}, IAD=3, ILP={folds}, ISP={branch_points}, NMX=2000, NPR=0, MXBF=0, IID={diagnostics}, IPLT=0
 ITMX=9, ITNW=7, NWTN=3, EPSL={tolerance}, EPSU={tolerance}, EPSS={event_tolerance}
-DS=0.05, DSMIN=1e-6, DSMAX={longest_step}, IADS=1, SP=['{stop}']
+DS={first_step}, DSMIN=1e-6, DSMAX={longest_step}, IADS=1, SP=['{stop}']
 """
 
 
@@ -58,7 +58,9 @@ def build(statement: str) -> tuple[Path, float]:
 _FOLDERS: list[tempfile.TemporaryDirectory] = []
 
 
-def study(statement: str, stop: str = "BP", intervals=40, degree=4, tolerance=1e-10, longest_step=1.0, count=False) -> dict:
+def study(
+    statement: str, stop: str = "BP", intervals=40, degree=4, tolerance=1e-10, longest_step=1.0, first_step=0.05, count=False
+) -> dict:
     """From the circle through its bifurcation along the branch to the first fold (``stop`` LP) or to its end (BP).
 
     ``seconds`` is AUTO's own "Total Time" of the second run, ``circle_seconds`` of the first, ``process_seconds`` the wall
@@ -68,7 +70,8 @@ def study(statement: str, stop: str = "BP", intervals=40, degree=4, tolerance=1e
     program, _ = build(statement)
     ndim, nbc, free = SHAPES[statement]
     values = {"ndim": ndim, "nbc": nbc, "free": free, "intervals": intervals, "degree": degree, "tolerance": tolerance,
-              "event_tolerance": 10 * tolerance, "longest_step": longest_step, "diagnostics": 2 if count else 0}  # fmt: skip
+              "event_tolerance": 10 * tolerance, "longest_step": longest_step, "first_step": first_step,
+              "diagnostics": 2 if count else 0}  # fmt: skip
     first = {"restart": 0, "switch": 1, "folds": 0, "branch_points": 1, "stop": "BP1"}
     second = {"restart": 2, "switch": -1, "folds": 1, "branch_points": 1 if stop == "BP" else 0, "stop": f"{stop}1"}
     with tempfile.TemporaryDirectory(prefix="bench-auto-") as name:
