@@ -1,6 +1,6 @@
 """The code in docs/ runs as written, block after block: Python, and commands of this project (file-format.md: in test_store).
 
-Left out: commands of other programs (a browser, apt), and finite elements, which take many minutes.
+Left out: commands of other programs (a browser, apt), finite elements, which take many minutes, and what test_strip runs.
 """
 
 import os
@@ -15,7 +15,7 @@ import pytest
 PROJECT = Path(__file__).resolve().parent.parent
 PAGES = [page for page in sorted((PROJECT / "docs").glob("*.md")) if "```" in page.read_text() and page.stem != "file-format"]
 PROGRAM = ".venv/bin/python "
-FINITE_ELEMENTS = re.compile(r"-m branches\.(shell|paper .*fig7)")
+ELSEWHERE = re.compile(r"-m branches\.(shell|strip|paper .*fig7)")
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_blocks_run(page, project):
             exec(compile(block, str(page), "exec"), scope)
             continue
         for line in block.replace("\\\n", " ").splitlines():
-            if line.startswith(PROGRAM) and not FINITE_ELEMENTS.search(line):  # the others are what it prints
+            if line.startswith(PROGRAM) and not ELSEWHERE.search(line):  # the others are what it prints
                 _run(shlex.split(line.removeprefix(PROGRAM), comments=True))
 
 
