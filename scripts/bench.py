@@ -1,6 +1,6 @@
 """Times contin and its peers on the user's own machine: pictures, a table of ratios, and every number as JSON.
 
-    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [--quick] [--out DIR]
+    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [stress] [--quick] [--out DIR]
 
 Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A peer
 that is not installed is left out, and named. See docs/performance.md.
@@ -22,7 +22,7 @@ from benchmarks.measure import ONE_THREAD  # noqa: E402  (it imports nothing tha
 
 os.environ.update(ONE_THREAD)
 
-PARTS = ("like-for-like", "fold", "cost", "startup")
+PARTS = ("like-for-like", "fold", "cost", "startup", "stress")
 
 
 def arguments(argv=None) -> argparse.Namespace:
@@ -52,7 +52,7 @@ def arguments(argv=None) -> argparse.Namespace:
 
 def measure(part: str, quick: bool, bifpy_python: str) -> dict:
     """One part."""
-    from benchmarks import cost, fold, like_for_like, startup
+    from benchmarks import cost, fold, like_for_like, startup, stress
 
     from ribbon_model import exact
 
@@ -60,6 +60,8 @@ def measure(part: str, quick: bool, bifpy_python: str) -> dict:
         return cost.run(quick)
     if part == "startup":
         return startup.run(quick)
+    if part == "stress":
+        return stress.run(quick)
     exact_fold = exact.folds(1, 2)[0].kappa_n
     if part == "fold":
         return fold.run(quick, bifpy_python, exact_fold, budget=30 if quick else 150)

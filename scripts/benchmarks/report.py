@@ -5,15 +5,24 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from benchmarks import cost, fold, like_for_like, startup
+import numpy as np
+
+from benchmarks import cost, fold, like_for_like, startup, stress
 
 TITLES = {
     "like-for-like": "Like for like",
     "fold": "Tool for tool: the fold of (1, 2)",
     "cost": "Cost laws",
     "startup": "Start-up",
+    "stress": "Numerical stability",
 }
-TABLES = {"like-for-like": like_for_like.table, "fold": fold.table, "cost": cost.table, "startup": startup.table}
+TABLES = {
+    "like-for-like": like_for_like.table,
+    "fold": fold.table,
+    "cost": cost.table,
+    "startup": startup.table,
+    "stress": stress.table,
+}
 
 
 def markdown(results: dict) -> dict[str, str]:
@@ -92,9 +101,11 @@ def _fold(results):
     for axes, key, title in zip(
         figure.subplots(1, 2, sharey=True), ("seconds", "process_seconds"), ("in the process, warm", "whole processes")
     ):
-        for tool in tools:
-            rows = sorted((row for row in results["rows"] if row["tool"] == tool), key=lambda row: row[key])
-            axes.loglog([row[key] for row in rows], [max(row["error"], 1e-16) for row in rows], "o-", label=tool, markersize=4)
+        for number, tool in enumerate(tools):
+            places = sorted((row[key], max(row["error"], 1e-16)) for row in results["rows"] if row["tool"] == tool)
+            axes.loglog(*zip(*places), "o", color=f"C{number}", alpha=0.3, markersize=3)
+            best = [place for at, place in enumerate(places) if place[1] < min((e for _, e in places[:at]), default=np.inf)]
+            axes.loglog(*zip(*best), "o-", color=f"C{number}", label=tool, markersize=4)
         axes.set(xlabel=f"seconds, {title}", title=title)
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("error of $\\kappa_n$ at the fold of (1, 2)")
