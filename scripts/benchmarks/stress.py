@@ -77,7 +77,8 @@ def _case(what, m, n, nu, changes) -> dict:
         abs(a[name] - getattr(b, name)) / (1 + abs(getattr(b, name))) for a, b in pairs for name in ("kappa_n", "kappa_star")
     ]
     return {
-        "what": what, "mode": (m, n), "stop": branch.stop.reason + ", not located" * lost, "points": len(branch), "seconds": seconds,
+        "what": what, "mode": (m, n), "stop": branch.stop.reason + ", not located" * lost, "points": len(branch),
+        "seconds": seconds,
         "special": (len(ours), len(known)), "error": max(errors, default=None), "drift": max(map(_drift, branch)),
         "singular": max(map(_singular, branch.points[1 : -1 : max(1, len(branch) // 20)]), default=np.nan),
         "intervals": max(point.system.intervals for point in branch), "length": branch.points[-1].arclength,
