@@ -310,8 +310,9 @@ def test_a_second_run_on_the_same_file_is_refused(command, scene, undisturbed, t
     first = command.start(scene, "--out", path, "--quiet", *LONG_SETTINGS)
     while not path.exists() and first.poll() is None:
         time.sleep(0.01)
+    first.send_signal(signal.SIGSTOP)  # it must not end while the second one starts
     second = command(scene, "--out", path, *LONG_SETTINGS, option)
-    assert first.poll() is None, "the first run was too short for this test"
+    first.send_signal(signal.SIGCONT)
     assert (second.returncode, second.out) == (2, "")
     assert second.err.startswith(f"error: another run (process {first.pid} on ") and second.err.count("\n") == 1
     assert first.communicate()[1] == "" and first.returncode == 0
