@@ -54,7 +54,7 @@ class _Plan:
         return law, nu, 2 * n - m, n
 
     def next(self, running):
-        """The next branch, :data:`WAIT`, or None."""
+        """The next branch, `WAIT`, or None."""
         busy = {self._key(config) for config in running}
         for config in list(self._open):
             other = self._later.get(self._key(config))

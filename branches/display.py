@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import math
 import os
@@ -44,6 +45,14 @@ def write_output(text: str = "") -> None:
             complain(f"error: cannot write to standard output: {error.strerror}")
         # what is still buffered must go somewhere, or Python complains about it at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class Parser(argparse.ArgumentParser):
+    """A command line whose mistakes are answered in one sentence."""
+
+    def error(self, message):
+        complain(f"error: {message} (--help shows what there is)")
+        raise SystemExit(2)
 
 
 class Display:

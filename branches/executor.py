@@ -37,7 +37,7 @@ def executor(
     scheduler : str, optional
         Address of a Dask scheduler, as in ``tcp://host:8786``; local processes without.
     workers : int, optional
-        Local processes; :func:`cores` by default.
+        Local processes; `cores` by default.
     time_limit : float, optional
         Seconds after which a job in a local process is killed; its future then raises TimeoutError. A process that dies takes
         its own job with it and no other.
@@ -235,7 +235,7 @@ def run_jobs(
     Parameters
     ----------
     source : callable
-        ``source(running)``, given the list of jobs handed out, returns the next one; None at the end; or :data:`WAIT`.
+        ``source(running)``, given the list of jobs handed out, returns the next one; None at the end; or `WAIT`.
     function : callable
         At module level, so that it can be sent to another process.
     """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -10,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from branches.display import complain, survive_any_encoding, write_output
+from branches.display import Parser, complain, survive_any_encoding, write_output
 from ribbon_model.strip import NAMES, Strip
 
 #: Covering indices looked at: odd ones, which a loop can be folded into; up to the second beyond the natural curvature.
@@ -262,15 +261,9 @@ def _millimetres(metres: float) -> str:
 # --- the command ------------------------------------------------------------------------------------------------------
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message):
-        complain(f"error: {message} (--help shows what there is)")
-        raise SystemExit(2)
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the answer; the exit code: 0, or 2 for a strip that cannot be."""
-    parser = _Parser(
+    parser = Parser(
         prog="python -m branches.strip",
         description="A strip whose ends are joined: which circles are stable, what else there is, moments, energies, strains. "
         "SI units.",

@@ -40,7 +40,7 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
     values = {**law.values(nu, Gamma), "length": LENGTH / (4 * n), "turn": math.pi * m / (2 * n), "sense": sense}
     domain = cell(law)
     system = domain.discretize(intervals, degree, values)
-    return _leave(system, domain.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
+    return leave_circle(system, domain.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
 
 
 def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, degree: int = 4, root: int = 0, Gamma=None):
@@ -48,7 +48,7 @@ def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, d
     domain = half_loop(law)
     system = domain.discretize(intervals, degree, law.values(nu, Gamma))
     kappa_n = thresholds(law, m, n, nu, Gamma)[root]
-    return _leave(system, domain.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
+    return leave_circle(system, domain.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
 
 
 def whole_loop(law: Law, t, states, degree: int, parameters: Mapping[str, float]):
@@ -74,7 +74,7 @@ def whole_loop(law: Law, t, states, degree: int, parameters: Mapping[str, float]
     return system, system.pack(np.hstack([q, x]), values)
 
 
-def _leave(system: Collocation, circle: np.ndarray):
+def leave_circle(system: Collocation, circle: np.ndarray):
     """The branch point at a circle, and the tangent that is not the circle's own."""
     found = locate_branch_point(system, circle)
     if not found.tangents:

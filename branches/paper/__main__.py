@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import sys
 import time
@@ -10,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from branches.display import complain, survive_any_encoding, write_output
+from branches.display import Parser, complain, survive_any_encoding, write_output
 
 if TYPE_CHECKING:  # --help needs neither numpy nor matplotlib
     from branches.paper.page import Section
@@ -43,15 +42,9 @@ ITEMS: dict[str, Callable[[Path], Section]] = {
 }
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message):
-        complain(f"error: {message} (--help shows what there is)")
-        raise SystemExit(2)
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Compute what is asked for and write the page; the exit code: 0, or 2 for a request that cannot be met."""
-    parser = _Parser(
+    parser = Parser(
         prog="python -m branches.paper",
         description="The tables and figures of Audoly & Seffen (2015): pictures, and a page (index.md, index.html) where each "
         "published number stands beside ours. The page holds the items of this call.",

@@ -46,7 +46,7 @@ def _case(what, m, n, nu, changes) -> dict:
     import contin
     from ribbon_model import exact
     from ribbon_model.laws import RIBBON
-    from ribbon_model.seeds import primary_branch
+    from ribbon_model.seeds import leave_circle, primary_branch
 
     given = {"limits": (-100, 100), "intervals": 8, "degree": 7, "tolerance": 1e-12, "step": 0.05, "min_step": 1e-6} | changes
     limits, count = given["limits"], given["intervals"]
@@ -60,10 +60,7 @@ def _case(what, m, n, nu, changes) -> dict:
         system, x, tangent = primary_branch(RIBBON, m, n, nu, count, given["degree"])
         if "digits" in given:
             x = np.array([float(f"{value:.{given['digits']}g}") for value in x])
-            found = contin.locate_branch_point(system, x, contin.Newton(given["tolerance"]))
-            at = system.parameter_index("M2")
-            x, tangent = found.x, max(found.tangents, key=lambda vector: abs(vector[at]))
-            tangent = tangent * np.sign(tangent[at])
+            _, x, tangent = leave_circle(system, x)
         branch = contin.follow(system, x, settings, tangent)
     except (contin.ContinError, ValueError) as error:
         return {"what": what, "mode": (m, n), "stop": f"refused: {error}", "points": 0, "seconds": time.perf_counter() - began}

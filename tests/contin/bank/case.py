@@ -37,14 +37,11 @@ class Case:
         ``run()`` computes the branch.
     specials : sequence of Special
         Everything labelled after the first point, in the order of the run, its end included.
-    broken : str
-        What the engine is known to do wrong here; empty if nothing.
     """
 
     name: str
     run: Callable[[], Branch]
     specials: Sequence[Special]
-    broken: str = ""
 
 
 def value(point: Point, name: str) -> float:
@@ -76,10 +73,9 @@ def run_until(start: Point, free: Sequence[str], labels: int, **settings) -> Bra
 
 
 def bank(*names: str) -> list:
-    """The cases of these problems as pytest's parameters; those known to be broken are expected to fail."""
+    """The cases of these problems as pytest's parameters."""
     cases = [case for name in names for case in importlib.import_module(f"bank.{name}").CASES]
-    marks = [[pytest.mark.xfail(reason=case.broken, strict=True)] if case.broken else [] for case in cases]
-    return [pytest.param(case, id=case.name, marks=mark) for case, mark in zip(cases, marks)]
+    return [pytest.param(case, id=case.name) for case in cases]
 
 
 def check(case: Case):
