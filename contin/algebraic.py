@@ -138,7 +138,8 @@ class Algebraic(System):
 
     def _jacobian(self, x: Array) -> tuple[Array, Array]:
         u, p = self.states(x), self.all_parameters(x)
-        values, jacobian = self.problem.batch("residual").jacobian(_NO_TIME, u, _none(self.state_size), p, self._free)
+        batch = self.problem.batch("residual")
+        values, jacobian = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.seeds(self._free))
         return values[0], jacobian[0]
 
     def linearize(
@@ -154,7 +155,8 @@ class Algebraic(System):
         """Derivatives of F by any parameters, free or not, shape (equations, len(names))."""
         which = self._indices(names)
         u, p, n = self.states(x), self.all_parameters(x), self.state_size
-        return self.problem.batch("residual").jacobian(_NO_TIME, u, _none(n), p, which)[1][0, :, n:]
+        batch = self.problem.batch("residual")
+        return batch.jacobian(_NO_TIME, u, _none(n), p, batch.seeds(which))[1][0, :, n:]
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """F_x^T w, shape (size,)."""

@@ -289,7 +289,7 @@ class Continuation:
         system, rows = state.system, (state.system.weights * state.tangent,)
         if before.factors is None:
             before.factors = system.linearize(before.x, rows)[1]
-        if before.sign == trial.sign and calm(quotients(before, trial)):
+        if before.sign == trial.sign and calm(quotients(before, trial, 1)):
             return 0, True
         before.factors = system.linearize(before.x, rows)[1]
         if not trial.exact:

@@ -8,18 +8,20 @@ satisfies the equation at the d Gauss points: error O(h^(2 d)) at the mesh point
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin._kernels import njit
+from contin._vector import scale_into
 from contin.condensation import Factorization
 from contin.errors import ProblemError
 from contin.interface import Array, Carrier, Discretization, Factors
 from contin.mesh import MeshControl, adapted_mesh
 from contin.problem import BoundaryValueProblem
+from contin.structure import Layout, Seeds
 from contin.system import System
 
 if TYPE_CHECKING:
@@ -84,25 +86,18 @@ def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
     return result
 
 
-@njit(inline="always", error_model="numpy")
-def _scaled(target: Array, factor: float, source: Array) -> None:
-    """target = factor * source, a loop from 0 so that it becomes vector instructions."""
-    for b in range(target.size):
-        target[b] = factor * source[b]
-
-
 @njit(
-    "void(f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,::1], i8, f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1],"
-    "f8[:,::1])",
+    "void(UniTuple(i8[::1], 9), f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1],"
+    "f8[:,:,::1], f8[:,::1])",
     cache=True, error_model="numpy", nogil=True,
 )  # fmt: skip
 def assemble(
+    layout: Any,
     value: Array,
     slope: Array,
     weights: Array,
     h: Array,
     jacobian: Array,
-    n: int,
     columns: Array,
     rows: Array,
     local: Array,
@@ -111,46 +106,78 @@ def assemble(
 ) -> None:
     """Fill the blocks that `contin.condensation.Factorization` takes.
 
-    ``jacobian`` (points, n + n_int, n + k) of rhs and integrands; ``columns`` (c, equations) and ``rows`` (r, unknowns)
-    are the extra ones. Equations are scaled by h.
+    ``jacobian`` (points, n + n_int, n + k) of rhs and integrands is by the states in the layout's order; ``columns`` (c,
+    equations) and ``rows`` (r, unknowns) are the extra ones. Equations are scaled by h. Interior columns of states that do not
+    occur in a row are left as they are: nobody looks at them.
     """
-    d = weights.size
+    order, offsets, follows, equations, inside, ends, left, right, remaining = layout
+    d, n, groups = weights.size, order.size, offsets.size - 1
     intervals = h.size
     n_int = jacobian.shape[1] - n
     k = jacobian.shape[2] - n
     c, r = columns.shape[0], rows.shape[0]
     inner = n * (d - 1)
+    rest = inner + 2 * n
     size = (intervals * d + 1) * n
+    starts = np.empty((groups, d + 1), np.int64)  # where a group's states at a node begin
+    for g in range(groups):
+        first = offsets[g]
+        for node in range(d + 1):
+            starts[g, node] = (d - 1) * first + (node - 1) * (offsets[g + 1] - first)
+        starts[g, 0], starts[g, d] = left[order[first]], right[order[first]]
     for q in range(n_int + r):
         for b in range(k + c):
             corner[q, b] = rows[q - n_int, size + b] if q >= n_int else 0.0
     for j in range(intervals):
-        for q in range(n_int + r):
+        for g in range(groups):
+            first, last = offsets[g], offsets[g + 1]
+            for place in range(d * first, d * last):
+                row, equation = local[j, place], equations[place]
+                i, a = equation // n, equation % n
+                point, target, source = jacobian[j * d + i, a], row.ctypes.data, jacobian[j * d + i, a].ctypes.data
+                if place >= d * first + (d - 1) * (last - first):  # a row that remains: its zeros are looked at, too
+                    for b in range(inner, rest):
+                        row[b] = 0.0
+                for f in range(g + 1):
+                    low, number = offsets[f], offsets[f + 1] - offsets[f]
+                    if follows[f * groups + g] == 1:
+                        for node in range(d + 1):
+                            scale_into(target + 8 * starts[f, node], -h[j] * value[i, node], source + 8 * low, number)
+                    else:
+                        for b in range(number):
+                            row[starts[f, 0] + b] = row[starts[f, d] + b] = 0.0
+                if follows[g * groups + g] == 0:
+                    for node in range(1, d):
+                        for b in range(last - first):
+                            row[starts[g, node] + b] = 0.0
+                own = (place - d * first) % (last - first)
+                for node in range(d + 1):
+                    row[starts[g, node] + own] += slope[i, node]
+                for b in range(k):
+                    row[rest + b] = -h[j] * point[n + b]
+                for b in range(c):
+                    row[rest + k + b] = columns[b, j * d * n + equation]
+        for q in range(n_int):
             for b in range(border.shape[2]):
                 border[j, q, b] = 0.0
-        for i in range(d):
-            point = jacobian[j * d + i]
-            for a in range(n):
-                row = local[j, i * n + a]
+            for i in range(d):
+                point, share = jacobian[j * d + i, n + q], weights[i] * h[j]
                 for node in range(d + 1):
-                    start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
-                    _scaled(row[start : start + n], -h[j] * value[i, node], point[a, :n])
-                    row[start + a] += slope[i, node]
-                _scaled(row[inner + 2 * n : inner + 2 * n + k], -h[j], point[a, n:])
-                for b in range(c):
-                    row[inner + 2 * n + k + b] = columns[b, (j * d + i) * n + a]
-            for q in range(n_int):
-                for node in range(d + 1):
-                    start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
-                    for b in range(n):
-                        border[j, q, start + b] += weights[i] * h[j] * value[i, node] * point[n + q, b]
+                    for g in range(groups):
+                        start = starts[g, node]
+                        for b in range(offsets[g + 1] - offsets[g]):
+                            border[j, q, start + b] += share * value[i, node] * point[offsets[g] + b]
                 for b in range(k):
-                    corner[q, b] += weights[i] * h[j] * point[n + q, n + b]
+                    corner[q, b] += share * point[n + b]
         for q in range(r):
-            for node in range(d + (1 if j == intervals - 1 else 0)):
-                start = inner if node == 0 else (inner + n if node == d else (node - 1) * n)
-                for b in range(n):
-                    border[j, n_int + q, start + b] = rows[q, (j * d + node) * n + b]
+            target, source = border[j, n_int + q], rows[q, j * d * n :]
+            for b in range(inner):
+                target[b] = source[inside[b]]
+            for b in range(2 * n):
+                at_end = ends[b] >= n * d
+                target[inner + b] = source[ends[b]] if not at_end or j == intervals - 1 else 0.0
+            for b in range(k + c):
+                target[rest + b] = 0.0
     tail = columns.shape[1] - n_int
     for b in range(c):
         for q in range(n_int):
@@ -215,6 +242,14 @@ class Collocation(System):
         #: Weights of the inner product: the mean over the domain of u.v, plus p.q of the free parameters.
         self.weights = np.concatenate([np.repeat(node_weights, self._n), np.ones(len(self.free))])
 
+    @functools.cached_property
+    def _layout(self) -> Layout:
+        return self.problem.layout(self.degree)
+
+    @functools.cached_property
+    def _seeds(self) -> tuple[Seeds, Seeds]:
+        return self.problem.seeds(self._free)
+
     # --- vectors of unknowns -------------------------------------------------------------------------------------
 
     @property
@@ -259,20 +294,22 @@ class Collocation(System):
         boundary = self.problem.batch("boundary").values(_TIME, u[:1], u[-1:], p)
         return self._residual(x, u, field, boundary)
 
-    def _blocks(self, x: Array, rows: Array, columns: Array) -> tuple[Array, tuple[Array, Array, Array, Array, Array]]:
+    def _blocks(
+        self, x: Array, rows: Array, columns: Array, new: Callable[[tuple[int, ...]], Array] = np.empty
+    ) -> tuple[Array, tuple[Array, Array, Array, Array, Array]]:
         """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as `Factorization` takes them."""
         problem, n, d, k = self.problem, self._n, self._d, len(self.free)
         p, u = self.all_parameters(x), self.states(x)
         points = self.at_gauss_points(x)
-        field, jacobian = problem.batch("field").jacobian(self._times, points, _NONE(n), p, self._free)
-        boundary, ends = problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, self._free)
+        of_field, of_boundary = self._seeds
+        field, jacobian = problem.batch("field").jacobian(self._times, points, _NONE(n), p, of_field)
+        boundary, ends = problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
         c, r = len(columns), len(rows) + problem.integral_size
-        local = np.empty((self.intervals, n * d, n * (d + 1) + k + c))
+        local = new((self.intervals, n * d, n * (d + 1) + k + c))
         border = np.empty((self.intervals, r, n * (d + 1) + k + c))
         corner = np.empty((r, k + c))
-        assemble(
-            self.basis.value, self.basis.slope, self.basis.weights, self._h, jacobian, n, columns, rows, local, border, corner
-        )
+        tables = (self.basis.value, self.basis.slope, self.basis.weights)
+        assemble(tuple(self._layout), *tables, self._h, jacobian, columns, rows, local, border, corner)
         bc = self.intervals * n * d
         at_boundary = columns[:, bc : bc + problem.boundary_size].T
         last = np.concatenate([ends[0, :, n:], at_boundary], axis=1)
@@ -290,33 +327,33 @@ class Collocation(System):
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
         residual, blocks = self._blocks(x, rows, columns)
-        return residual, Factorization(*blocks)
+        return residual, Factorization(self._layout, *blocks)
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
         n, p, u = self._n, self.all_parameters(x), self.states(x)
-        which = self._indices(names)
-        field = self.problem.batch("field").jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, which)[1][:, :, n:]
-        ends = self.problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, which)[1][0, :, 2 * n :]
+        of_field, of_boundary = self.problem.seeds(self._indices(names))
+        field = self.problem.batch("field").jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, :, n:]
+        ends = self.problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0, :, 2 * n :]
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
         return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self._quadrature, field[:, n:])])
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """F_x^T w, shape (size,), for w (equations,)."""
         n = self._n
-        _, (local, border, corner, first, last) = self._blocks(x, np.empty((0, self.size)), np.empty((0, self.equations)))
-        collocation = self.intervals * self._d * n
-        conditions = collocation + len(first)
-        inside = np.einsum("jr,jrc->jc", w[:collocation].reshape(self.intervals, -1), local)
-        inner = n * (self._d - 1)
+        _, (local, border, corner, first, last) = self._blocks(
+            x, np.empty((0, self.size)), np.empty((0, self.equations)), np.zeros
+        )
+        layout, collocation = self._layout, self.intervals * self._d * n
+        conditions, inner = collocation + len(first), n * (self._d - 1)
+        by_interval = w[:collocation].reshape(self.intervals, -1)[:, layout.rows]
+        inside = np.einsum("jr,jrc->jc", by_interval, local)
         inside[:, : inner + 2 * n] += np.einsum("q,jqc->jc", w[conditions:], border[:, :, : inner + 2 * n])
         result = np.zeros(self.size)
-        states = result[: self.state_size]
-        by_interval = states[:-n].reshape(self.intervals, self._d * n)
-        by_interval[:, n:] = inside[:, :inner]
-        by_interval[:, :n] = inside[:, inner : inner + n]
-        states[n:].reshape(self.intervals, self._d * n)[:, -n:] += inside[:, inner + n : inner + 2 * n]
-        states[:n] += first.T @ w[collocation:conditions]
+        at = self._d * n * np.arange(self.intervals)[:, None]
+        np.add.at(result, at + layout.inside, inside[:, :inner])
+        np.add.at(result, at + layout.ends, inside[:, inner : inner + 2 * n])
+        result[:n] += first.T @ w[collocation:conditions]
         result[self.state_size - n :] += last.T @ w[collocation:conditions]
         result[self.state_size :] += inside[:, inner + 2 * n :].sum(axis=0) + corner.T @ w[conditions:]
         return result

@@ -10,7 +10,8 @@ from typing import cast
 from contin import _checks
 from contin.compilation import Batch, argument_count, check_statement, outputs
 from contin.errors import ProblemError
-from contin.interface import Function
+from contin.interface import Function, Indices
+from contin.structure import Layout, Seeds, layout
 
 #: Names of the arguments of a function that are named tuples; None for one that is a number.
 _Arguments = Sequence[tuple[str, ...] | None]
@@ -64,6 +65,7 @@ class BoundaryValueProblem:
     integral_count: int | None = None
     _counts: dict[str, int] = field(init=False, repr=False)
     _batches: dict[str, Batch] = field(init=False, repr=False)
+    _layouts: dict[int, Layout] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
@@ -81,6 +83,7 @@ class BoundaryValueProblem:
             raise ProblemError(f"rhs returns {counts['rhs']} values for the {len(u)} states {', '.join(u[:8])}")
         object.__setattr__(self, "_counts", counts)
         object.__setattr__(self, "_batches", {})
+        object.__setattr__(self, "_layouts", {})
 
     @staticmethod
     def _count(name: str, function: Function | None, arguments: _Arguments, given: int | None) -> int:
@@ -122,6 +125,17 @@ class BoundaryValueProblem:
         if name not in self._batches:
             self._batches[name] = self._compile(name)
         return self._batches[name]
+
+    def layout(self, degree: int) -> Layout:
+        """Where the unknowns of an interval stand in its block; states that do not depend on each other apart."""
+        if degree not in self._layouts:
+            n = len(self.state_names)
+            self._layouts[degree] = layout(self.batch("field").depends[:n, :n], degree)
+        return self._layouts[degree]
+
+    def seeds(self, free: Indices) -> tuple[Seeds, Seeds]:
+        """What to perturb for the Jacobians of field (by states in the layout's order) and boundary, by parameters ``free`` too."""
+        return self.batch("field").seeds(free, self.layout(2).order), self.batch("boundary").seeds(free)
 
     def _compile(self, name: str) -> Batch:
         p, u = tuple(self.parameters), self.state_names

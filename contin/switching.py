@@ -124,7 +124,7 @@ def _random_block(count: int, size: int) -> Array:
     return block
 
 
-@njit("void(f8[:,::1])", cache=True, error_model="numpy", nogil=True)
+@njit("void(f8[:,::1])", cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc"})
 def _orthonormalize(rows: Array) -> None:
     """Make the rows orthonormal, in place: Gram-Schmidt, twice."""
     count, size = rows.shape
@@ -143,7 +143,7 @@ def _orthonormalize(rows: Array) -> None:
                 rows[i, k] = rows[i, k] - product * rows[j, k] if j < i else rows[i, k] / np.sqrt(product)
 
 
-def smallest_directions(factors: Factors, size: int) -> tuple[Array, Array, Array]:
+def smallest_directions(factors: Factors, size: int, rounds: int = 2) -> tuple[Array, Array, Array]:
     """Right and left singular vectors, as rows, of the smallest singular values: inverse iteration on a block.
 
     It starts from random vectors, not from those of the point before: a run resumed must decide as one undisturbed.
@@ -155,7 +155,7 @@ def smallest_directions(factors: Factors, size: int) -> tuple[Array, Array, Arra
         right J^-1 left^T: about the reciprocals of the singular values.
     """
     right = _random_block(min(_WATCHED, size), size)
-    for _ in range(2):
+    for _ in range(rounds):
         left = factors.solve_transposed(right)
         _orthonormalize(left)
         solved = factors.solve(left)
@@ -172,7 +172,7 @@ _VANISHES = 1e4
 _CALM = 2.0
 
 
-def quotients(before: Trial, after: Trial) -> ComplexArray:
+def quotients(before: Trial, after: Trial, rounds: int = 2) -> ComplexArray:
     """How the smallest singular values change between two neighbouring trials, from their factors: shape (watched,), complex.
 
     In the directions in which ``after`` is nearest to singular, J^-1 of the two is compared: each passage of a singular value
@@ -180,7 +180,7 @@ def quotients(before: Trial, after: Trial) -> ComplexArray:
     together, or two branch points in one step, are seen here. NaN where a matrix is exactly singular.
     """
     with np.errstate(all="ignore"):
-        right, left, response = smallest_directions(after.factors, after.system.size)
+        right, left, response = smallest_directions(after.factors, after.system.size, rounds)
         earlier = right @ before.factors.solve(left).T
         if not (np.all(np.isfinite(response)) and np.all(np.isfinite(earlier))):
             return np.full(len(response), np.nan, dtype=complex)

@@ -4,13 +4,31 @@ import numpy as np
 import pytest
 
 from contin.condensation import Factorization
+from contin.structure import layout
 
 
-def random_blocks(n, degree, intervals, k, r, seed=0):
-    """Blocks of a random matrix, and the same matrix dense with equations and unknowns in the documented order."""
+def random_blocks(n, degree, intervals, k, r, seed=0, depends=None):
+    """Layout and blocks of a random matrix, and the same matrix dense with equations and unknowns in the documented order.
+
+    Where ``depends`` says that equations do not contain states, zeros stand there, or nothing at all (NaN).
+    """
     random = np.random.default_rng(seed)
+    places = layout(np.ones((n, n), bool) if depends is None else depends, degree)
     rows, width = n * degree, n * (degree + 1) + k
+    inner = n * (degree - 1)
     local = random.standard_normal((intervals, rows, width))
+    known = local.copy()
+    if depends is not None:
+        equation, unknown = places.rows % n, np.concatenate([places.inside, places.ends]) % n
+        coupled = depends[equation][:, unknown] | (equation[:, None] == unknown)
+        known[:, :, : inner + 2 * n] *= coupled
+        local = known.copy()
+        group = np.empty(n, int)
+        for g, (a, b) in enumerate(zip(places.offsets, places.offsets[1:])):
+            group[places.order[a:b]] = g
+        follows = places.follows.reshape(group.max() + 1, -1).astype(bool) | np.eye(group.max() + 1, dtype=bool)
+        unread = ~follows[group[unknown[:inner]][None, :], group[equation][:, None]]
+        local[:, :, :inner][:, unread] = np.nan
     border = random.standard_normal((intervals, r, width))
     corner = random.standard_normal((r, k))
     boundary_count = n + k - r
@@ -18,20 +36,16 @@ def random_blocks(n, degree, intervals, k, r, seed=0):
     last = random.standard_normal((boundary_count, n + k))
     size = (intervals * degree + 1) * n + k
     dense = np.zeros((size, size))
-    inner = n * (degree - 1)
     for j in range(intervals):
         start = j * rows
-        columns = np.concatenate([
-            np.arange(start + n, start + n + inner), np.arange(start, start + n),
-            np.arange(start + rows, start + rows + n), np.arange(size - k, size),
-        ])  # fmt: skip
-        dense[start : start + rows, columns] = local[j]
+        columns = np.concatenate([start + places.inside, start + places.ends, np.arange(size - k, size)])
+        dense[np.ix_(start + places.rows, columns)] = known[j]
         dense[size - r :, columns[: inner + 2 * n]] += border[j, :, : inner + 2 * n]
     at = intervals * rows
     dense[at : at + boundary_count, :n] = first
     dense[at : at + boundary_count, size - k - n :] = last
     dense[size - r :, size - k :] = corner
-    return (local, border, corner, first, last), dense
+    return (places, local, border, corner, first, last), dense
 
 
 @pytest.mark.parametrize(
@@ -47,6 +61,21 @@ def test_solves_agree_with_dense(n, degree, intervals, k, r):
     assert np.allclose(factors.solve_transposed(b), np.linalg.solve(dense.T, b), atol=tolerance, rtol=tolerance)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_solves_with_states_that_do_not_depend_on_each_other(seed):
+    """What does not couple is not looked at: NaN stands there."""
+    random = np.random.default_rng(seed)
+    n, degree = int(random.integers(1, 10)), int(random.integers(2, 9))
+    depends = random.random((n, n)) < 0.25
+    blocks, dense = random_blocks(n, degree, 4, 2, 1, seed, depends)
+    factors = Factorization(*blocks)
+    b = random.standard_normal((6, len(dense)))
+    tolerance = 1e-14 * np.linalg.cond(dense)
+    assert np.allclose(factors.solve(b), np.linalg.solve(dense, b.T).T, atol=tolerance, rtol=tolerance)
+    assert np.allclose(factors.solve_transposed(b), np.linalg.solve(dense.T, b.T).T, atol=tolerance, rtol=tolerance)
+    assert np.array_equal(factors.solve(b[2]), factors.solve(b)[2])
+
+
 def test_determinant_changes_sign_with_the_dense_one():
     """Up to one factor for the shape: products of signs over random matrices agree."""
     signs = []
@@ -59,4 +88,4 @@ def test_determinant_changes_sign_with_the_dense_one():
 def test_the_count_must_be_square():
     blocks, _ = random_blocks(2, 3, 4, 2, 1)
     with pytest.raises(ValueError, match="2 states and 2 parameters"):
-        Factorization(*blocks[:3], blocks[3][:-1], blocks[4][:-1])
+        Factorization(*blocks[:4], blocks[4][:-1], blocks[5][:-1])
