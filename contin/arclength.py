@@ -270,13 +270,11 @@ class Continuation:
 
         Without one, a change of the determinant's sign means that Newton left the branch.
         """
-        if not segment.steady():
-            return False
         if not self.settings.branch_points:
-            return True
+            return segment.steady()
         trial = segment.trial
         trial.passed, clear = self._passed(segment)
-        if trial.passed > 1 or not clear:
+        if trial.passed > 1 or not clear or not segment.steady():
             return False
         return not sign_changed(segment.before.sign, trial.sign) or segment.crossing().name != "possible"
 
@@ -295,7 +293,11 @@ class Continuation:
         if not trial.exact:
             trial.factors, trial.exact = system.linearize(trial.x, rows)[1], True
             trial.sign = trial.factors.sign
-        return crossings(quotients(before, trial))
+        values = quotients(before, trial)
+        passing = np.abs(values[values.real < 0])
+        if len(passing) == 1:  # the singular value changes about evenly
+            segment.share = float(passing[0] / (1 + passing[0]))
+        return crossings(values)
 
     def _accept(self, state: State, trial: Trial, step: float, distance: float) -> State:
         """The next state, its step chosen so that the predictor's error is ``accuracy`` of it."""
@@ -331,8 +333,8 @@ class Continuation:
             done = correct(system, x, row, row @ x, self.settings.newton)
         except ConvergenceError:
             return  # the old mesh still serves; the step control will notice if it does not
-        _, factors = system.linearize(done.x, (row,))
-        end = Trial(system, done.x, unit_tangent(system, factors), factors.sign, factors=factors, exact=True)
+        along = unit_tangent(system, done.factors, done.along)
+        end = Trial(system, done.x, along, done.factors.sign, factors=done.factors)
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(monitor)) != np.sign(end.value(monitor)) for monitor in self._comparable):
             return  # an event would fall between the meshes; the next point will do as well

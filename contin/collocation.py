@@ -86,6 +86,47 @@ def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
     return result
 
 
+_VECTORIZED = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
+
+
+@njit("void(f8[:,::1], Array(f8, 1, 'C', readonly=True), f8[:,::1])", **_VECTORIZED)
+def at_points(value: Array, x: Array, points: Array) -> None:
+    """Fill ``points`` (N d, n) with the states at the Gauss points, from the nodal values in x."""
+    d = value.shape[0]
+    count, n = points.shape
+    for j in range(count // d):
+        for i in range(d):
+            row = points[j * d + i]
+            for a in range(n):
+                row[a] = 0.0
+            for node in range(d + 1):
+                factor, start = value[i, node], (j * d + node) * n
+                for a in range(n):
+                    row[a] += factor * x[start + a]
+
+
+@njit("void(i8, f8[:,::1], f8[::1], f8[::1], Array(f8, 1, 'C', readonly=True), f8[:,::1], f8[:,::1], f8[::1])", **_VECTORIZED)
+def collocate(n: int, slope: Array, weights: Array, h: Array, x: Array, field: Array, boundary: Array, residual: Array) -> None:
+    """Fill the ``residual`` from values of rhs and integrands at the Gauss points (N d, n + n_int) and boundary (1, n_bc)."""
+    d, conditions, integrals = weights.size, boundary.shape[1], field.shape[1] - n
+    last = residual[residual.size - integrals :]
+    for q in range(integrals):
+        last[q] = 0.0
+    for j in range(h.size):
+        for i in range(d):
+            values, start = field[j * d + i], (j * d + i) * n
+            for a in range(n):
+                residual[start + a] = -h[j] * values[a]
+            for node in range(d + 1):
+                factor, first = slope[i, node], (j * d + node) * n
+                for a in range(n):
+                    residual[start + a] += factor * x[first + a]
+            for q in range(integrals):
+                last[q] += weights[i] * h[j] * values[n + q]
+    for q in range(conditions):
+        residual[field.shape[0] * n + q] = boundary[0, q]
+
+
 @njit(
     "void(UniTuple(i8[::1], 9), f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1],"
     "f8[:,:,::1], f8[:,::1])",
@@ -269,7 +310,8 @@ class Collocation(System):
 
     def at_gauss_points(self, x: Array) -> Array:
         """States at the Gauss points, shape (N d, n)."""
-        points: Array = np.matmul(self.basis.value, self._local(self.states(x))).reshape(-1, self._n)
+        points = np.empty((self._times.size, self._n))
+        at_points(self.basis.value, x, points)
         return points
 
     def evaluate(self, x: Array, times: Array) -> Array:
@@ -281,18 +323,17 @@ class Collocation(System):
 
     # --- the discrete equations ----------------------------------------------------------------------------------
 
-    def _residual(self, x: Array, states: Array, field: Array, boundary: Array) -> Array:
-        n = self._n
-        slope = np.matmul(self.basis.slope, self._local(states)).reshape(-1, n)
-        collocation = slope - self._h_points * field[:, :n]
-        return np.concatenate([collocation.ravel(), boundary[0], self._quadrature @ field[:, n:]])
+    def _residual(self, x: Array, field: Array, boundary: Array) -> Array:
+        residual = np.empty(self.equations)
+        collocate(self._n, self.basis.slope, self.basis.weights, self._h, x, field, boundary, residual)
+        return residual
 
     def residual(self, x: Array) -> Array:
         """Residual of the discrete equations at x, shape (equations,)."""
         p, u = self.all_parameters(x), self.states(x)
         field = self.problem.batch("field").values(self._times, self.at_gauss_points(x), _NONE(self._n), p)
         boundary = self.problem.batch("boundary").values(_TIME, u[:1], u[-1:], p)
-        return self._residual(x, u, field, boundary)
+        return self._residual(x, field, boundary)
 
     def _blocks(
         self, x: Array, rows: Array, columns: Array, new: Callable[[tuple[int, ...]], Array] = np.empty
@@ -314,7 +355,7 @@ class Collocation(System):
         at_boundary = columns[:, bc : bc + problem.boundary_size].T
         last = np.concatenate([ends[0, :, n:], at_boundary], axis=1)
         first = np.ascontiguousarray(ends[0, :, :n])
-        return self._residual(x, u, field, boundary), (local, border, corner, first, np.ascontiguousarray(last))
+        return self._residual(x, field, boundary), (local, border, corner, first, np.ascontiguousarray(last))
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()

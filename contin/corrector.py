@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from contin import _checks
+from contin._kernels import njit
 from contin.errors import ConvergenceError
 from contin.interface import Array, Equations, Factors
 
@@ -31,12 +32,16 @@ class Newton:
 
 @dataclass(frozen=True)
 class Corrected:
-    """A corrected x, the last factorization (taken at an iterate before x), and the estimated error left."""
+    """A corrected x, the last factorization (taken at an iterate before x), and the estimated error left.
+
+    ``along`` is what this factorization gives for the vector t with F_x t = 0 and row.t = 1; None where it is not at hand.
+    """
 
     x: Array
     factors: Factors
     iterations: int
     error: float
+    along: Array | None = None
 
 
 #: After a larger update the next iteration takes the Jacobian anew.
@@ -81,7 +86,7 @@ def correct(
             return _chords(system, guess, row, target, newton, factors)
     rows = () if row is None else (row,)
     x, history, moved = np.array(guess, dtype=float), [], 1.0
-    factors = None
+    factors, along = None, None
     with np.errstate(all="ignore"):
         for _ in range(newton.max_iterations):
             if factors is None:
@@ -89,18 +94,23 @@ def correct(
                 fresh = True
             else:
                 residual, fresh = system.residual(x), False
-            full = residual if row is None else np.append(residual, row @ x - target)
-            update = factors.solve(full)
-            size = float(np.max(np.abs(update) / (1 + np.abs(x))))
+            if row is None:
+                update = factors.solve(residual)
+            elif not fresh:
+                update = factors.solve(np.append(residual, row @ x - target))
+            else:  # the direction along the curve comes with it, at next to no cost
+                both = np.zeros((2, residual.size + 1))
+                both[0, :-1], both[0, -1], both[1, -1] = residual, row @ x - target, 1.0
+                update, along = factors.solve(both)
+            size = _move(x, update)
             if not np.isfinite(size):
                 break
             history.append(size)
-            x = x - update
             moved = size if fresh else moved + size
             rate = _rate(history, fresh, moved)
             confirmed = len(history) > 1 or size <= newton.tolerance
             if (confirmed and size * rate <= newton.tolerance) or (size < _ROUND_OFF and len(history) > 1 and rate >= 0.5):
-                return Corrected(x, factors, len(history), size * rate)
+                return Corrected(x, factors, len(history), size * rate, along)
             if len(history) > 2 and size > 2 * history[-2] > _ROUND_OFF:
                 break
             if size > _FAR or not rate < 0.5 or np.log(newton.tolerance / size) < _CHORDS * np.log(rate):
@@ -118,8 +128,7 @@ def _chords(
         while len(history) < _CHORDS:
             residual = system.residual(x)
             update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
-            history.append(float(np.max(np.abs(update) / (1 + np.abs(x)))))
-            x = x - update
+            history.append(_move(x, update))
             if history[-1] <= _EXACT:
                 return Corrected(x, factors, len(history), history[-1])
             if not history[-1] < _CLOSE * (history[-2] if len(history) > 1 else 1.0):
@@ -129,6 +138,18 @@ def _chords(
                 if history[-1] * ratio / (1 - ratio) <= newton.tolerance:
                     return Corrected(x, factors, len(history), history[-1] * ratio / (1 - ratio))
     raise _failure(history)
+
+
+@njit("f8(f8[::1], f8[::1])", cache=True, error_model="numpy", nogil=True)
+def _move(x: Array, update: Array) -> float:
+    """x -= update, in place; the largest component of the update relative to 1 + |x|, NaN if one is."""
+    largest = 0.0
+    for i in range(x.size):
+        size = abs(update[i]) / (1 + abs(x[i]))
+        if size > largest or size != size:  # noqa: PLR0124
+            largest = size
+        x[i] -= update[i]
+    return largest
 
 
 def _failure(history: list[float]) -> ConvergenceError:

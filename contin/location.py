@@ -98,6 +98,8 @@ class Segment:
         self.settings, self.start = settings, start
         self.fold: Any = fold
         self._last: tuple[float, Located] | None = None
+        #: At which part of the step the branch point is expected that lies inside it.
+        self.share = 0.5
 
     def events(self, monitors: Iterable[Monitor]) -> list[Event]:
         """What happens in the step, in order."""
@@ -309,8 +311,8 @@ class Segment:
         """The branch point inside a step, its bracket halved until the locator's answer lies inside it."""
         state, trial, step = self.state, self.trial, self.step
         low, high = self.low, step
+        middle = low + self.share * (high - low)
         for _ in range(12):
-            middle = (low + high) / 2
             try:
                 found = locate_branch_point(state.system, self._between(middle), self.settings.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
@@ -327,6 +329,7 @@ class Segment:
             except ConvergenceError:
                 break
             low, high = (middle, high) if sign == self.before.sign else (low, middle)
+            middle = (low + high) / 2
         return Event(high, "BP", "possible", trial)
 
     def _multiple_point(self) -> Event:

@@ -38,9 +38,9 @@ class State:
     singular: bool
 
 
-def unit_tangent(system: Discretization, factors: Factors) -> Array:
-    """The unit vector along the curve, from factors of [F_x; row], with row.tangent > 0."""
-    tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
+def unit_tangent(system: Discretization, factors: Factors, along: Array | None = None) -> Array:
+    """The unit vector along the curve, from factors of [F_x; row], with row.tangent > 0; ``along``: the solution for it."""
+    tangent = factors.solve(np.append(np.zeros(system.equations), 1.0)) if along is None else along
     unit: Array = tangent / np.sqrt(inner(system, tangent, tangent))
     return unit
 
@@ -82,7 +82,7 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
     ConvergenceError
     """
     done = _corrected(state, guess, step, newton)
-    tangent = unit_tangent(state.system, done.factors)
+    tangent = unit_tangent(state.system, done.factors, done.along)
     return Trial(state.system, done.x, tangent, done.factors.sign, done.iterations, done.error, done.factors)
 
 

@@ -228,22 +228,27 @@ def locate_branch_point(
     phi = _orthonormal(system, random.standard_normal((2, system.size)) if kernel is None else kernel)
     psi = random.standard_normal(system.equations) / np.sqrt(system.equations)
     x, beta, hessian, last = np.array(x, dtype=float), 0.0, None, np.inf
+    slope, drop, before = np.empty((2, 2)), np.zeros(2), np.zeros(2)
     with np.errstate(all="ignore"):
         for iteration in range(max_iterations):
             matrix = _Bordered(system, x, phi, psi)
-            if iteration < 2:  # borders of random numbers first, then of the kernel itself: the best conditioned
+            if iteration == 0:  # borders of random numbers first, then of the kernel itself: the best conditioned
                 if not np.all(np.isfinite(matrix.kernel)):
                     raise ConvergenceError("no branch point near by: the bordered matrix is singular")
                 phi, psi = _orthonormal(system, matrix.kernel), matrix.left(system)
                 continue
             if hessian is None:
                 hessian, origin = _hessian(system, x, matrix), x
+                slope = hessian
+            elif np.any(drop):  # Broyden's update: how the gradient has really changed in the last step
+                slope = slope + np.outer(before - matrix.g - slope @ drop, drop) / (drop @ drop)
             if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(matrix.g))):
                 break
             # one Newton step for F + beta psi = 0 and, through its gradient g, for grad beta = 0
             correction = matrix.factors.solve(np.concatenate([matrix.residual + beta * psi, [0.0, 0.0]]))
-            drop, *_ = np.linalg.lstsq(hessian, matrix.g, rcond=1e-9)
-            if np.abs(hessian @ drop - matrix.g).max() > 0.5 * np.abs(matrix.g).max():
+            drop, *_ = np.linalg.lstsq(slope, matrix.g, rcond=1e-9)
+            before = matrix.g
+            if np.abs(slope @ drop - matrix.g).max() > 0.5 * np.abs(matrix.g).max():
                 break  # a gradient that does not change along the kernel: no branch point here
             update = correction[:-1] + drop @ matrix.kernel
             beta -= correction[-1]
@@ -251,7 +256,8 @@ def locate_branch_point(
             size = float(np.max(np.abs(update) / (1 + np.abs(x))))
             if not np.isfinite(size) or size > 10:
                 break
-            if size <= newton.tolerance or (size < 1e-9 and size > 0.3 * last):
+            rate = min(1.0, size / last) if np.isfinite(last) else 1.0
+            if size * min(1.0, 2 * rate) <= newton.tolerance or (size < 1e-9 and rate > 0.3):
                 if np.max(np.abs(x - origin)) > 1e-3:  # the tangents are wanted as they are right there
                     matrix = _Bordered(system, x, phi, psi)
                     hessian = _hessian(system, x, matrix)
