@@ -6,11 +6,12 @@ import contextlib
 import functools
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, overload
 
 import numba
 from numba.core import sigutils
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 
 class _ForgivingCache(FunctionCache):
@@ -18,7 +19,17 @@ class _ForgivingCache(FunctionCache):
 
     A power cut may leave half a file, a quota may be used up. And processes that compile at the same time may take the same
     name for the code of two signatures (numba writes its index without a lock), so what was loaded is looked at.
+
+    The engine's kernels consist of `contin._vector` too: numba looks at the file of a function only, so that a change there
+    would go unnoticed.
     """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        if function.__module__.startswith("contin."):
+            vector = (Path(__file__).parent / "_vector.py").stat()
+            stamp = (*self._impl.locator.get_source_stamp(), vector.st_mtime, vector.st_size)
+            self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:

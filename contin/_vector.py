@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba import types
+from numba import extending, types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
+intrinsic: Any = extending.intrinsic
 _DOUBLE, _INT32, _BIT = ir.DoubleType(), ir.IntType(32), ir.IntType(1)
 #: Products and sums may be fused.
 _FUSED = ("contract",)
@@ -66,7 +66,7 @@ def _for_tiles(builder: Any, length: Any, tile: Any) -> None:
         offset = builder.select(there, builder.add(offset, _number(word, 8 * width)), offset)
 
 
-@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+@intrinsic(prefer_literal=True)
 def subtract_products(
     typing: Any, target: Any, stride: Any, factors: Any, step: Any, pivots: Any, apart: Any, length: Any, rows: Any, count: Any
 ) -> Any:
@@ -106,7 +106,7 @@ def _fused(builder: Any, factor: Any, vector: Any, total: Any) -> Any:
     return product if total is None else builder.fadd(total, product, _FUSED)
 
 
-@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+@intrinsic(prefer_literal=True)
 def subtract_rows(typing: Any, target: Any, matrix: Any, apart: Any, vectors: Any, length: Any, rows: Any) -> Any:
     """target[r] -= sum over j < length of matrix[r, j] * vectors[j], for r < ``rows``, a literal number.
 
@@ -143,7 +143,7 @@ def subtract_rows(typing: Any, target: Any, matrix: Any, apart: Any, vectors: An
     return types.void(*[types.intp] * 5, rows), generate
 
 
-@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+@intrinsic(prefer_literal=True)
 def subtract_columns(typing: Any, target: Any, matrix: Any, apart: Any, vectors: Any, length: Any, rows: Any) -> Any:
     """target[j] -= sum over r of matrix[r, j] * vectors[r], for j < length; r < ``rows``, a literal number.
 
@@ -173,7 +173,7 @@ def subtract_columns(typing: Any, target: Any, matrix: Any, apart: Any, vectors:
 LOWER, UPPER, LOWER_TRANSPOSED, UPPER_TRANSPOSED = range(4)
 
 
-@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+@intrinsic(prefer_literal=True)
 def apply_triangle(typing: Any, vectors: Any, block: Any, apart: Any, size: Any, kind: Any) -> Any:
     """vectors = T vectors with a triangle T, of the ``kind``, of the block (size, size); both are literal numbers.
 
@@ -200,7 +200,7 @@ def apply_triangle(typing: Any, vectors: Any, block: Any, apart: Any, size: Any,
     return types.void(*[types.intp] * 3, size, kind), generate
 
 
-@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+@intrinsic(prefer_literal=True)
 def solve_triangle(typing: Any, rows: Any, stride: Any, factors: Any, length: Any, count: Any) -> Any:
     """rows[k, :length] -= sum over l < k of factors[k, l] * rows[l, :length], for k = 1 ... count - 1, a literal number."""
 
@@ -229,7 +229,7 @@ def solve_triangle(typing: Any, rows: Any, stride: Any, factors: Any, length: An
     return types.void(*[types.intp] * 4, count), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def exchange(typing: Any, a: Any, b: Any, length: Any) -> Any:
     """Exchange ``length`` numbers at two addresses."""
 
@@ -249,7 +249,7 @@ def exchange(typing: Any, a: Any, b: Any, length: Any) -> Any:
     return types.void(*[types.intp] * 3), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def reduce_column(typing: Any, pivot: Any, stride: Any, count: Any, column: Any, size: Any, inverse: Any) -> Any:
     """Eliminate one column of a panel from the ``count`` rows below its pivot row, within the panel.
 
@@ -293,7 +293,7 @@ def reduce_column(typing: Any, pivot: Any, stride: Any, count: Any, column: Any,
     return types.intp(*[types.intp] * 5, types.float64), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def scale_into(typing: Any, target: Any, factor: Any, source: Any, length: Any) -> Any:
     """target[:length] = factor * source[:length], of two addresses."""
 
@@ -310,7 +310,7 @@ def scale_into(typing: Any, target: Any, factor: Any, source: Any, length: Any) 
     return types.void(types.intp, types.float64, types.intp, types.intp), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def move(typing: Any, target: Any, source: Any) -> Any:
     """Copy `LANES` numbers from one address to another."""
 
@@ -321,7 +321,7 @@ def move(typing: Any, target: Any, source: Any) -> Any:
     return types.void(types.intp, types.intp), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def gather(typing: Any, target: Any, source: Any, distances: Any) -> Any:
     """Put numbers side by side at ``target``: those at ``source`` and at the ``distances`` (a tuple) from it."""
 
@@ -337,9 +337,12 @@ def gather(typing: Any, target: Any, source: Any, distances: Any) -> Any:
     return types.void(types.intp, types.intp, types.UniTuple(types.intp, LANES - 1)), generate
 
 
-@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+@intrinsic(prefer_literal=True)
 def invert_triangles(typing: Any, block: Any, apart: Any, size: Any) -> Any:
-    """Put the inverses in place of both triangles of a block (size, size), a literal number; the lower one has ones as diagonal."""
+    """Put the inverses in place of both triangles of a block (size, size), the lower one with ones on its diagonal.
+
+    ``size`` is a literal number.
+    """
     count = size.literal_value
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -370,7 +373,7 @@ def invert_triangles(typing: Any, block: Any, apart: Any, size: Any) -> Any:
     return types.void(types.intp, types.intp, size), generate
 
 
-@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+@intrinsic(prefer_literal=True)
 def multiply_rows(typing: Any, rows: Any, stride: Any, number: Any, block: Any, apart: Any, size: Any) -> Any:
     """rows[i, :size] = rows[i, :size] @ the upper triangle of the block (size, size), for i < number; size is a literal number.
 

@@ -86,7 +86,7 @@ def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
     return result
 
 
-_VECTORIZED = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
+_VECTORIZED: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
 
 
 @njit("void(f8[:,::1], Array(f8, 1, 'C', readonly=True), f8[:,::1])", **_VECTORIZED)
@@ -128,8 +128,8 @@ def collocate(n: int, slope: Array, weights: Array, h: Array, x: Array, field: A
 
 
 @njit(
-    "void(UniTuple(i8[::1], 9), f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1],"
-    "f8[:,:,::1], f8[:,::1])",
+    "void(UniTuple(i8[::1], 9), f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1],"
+    "f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1])",
     cache=True, error_model="numpy", nogil=True,
 )  # fmt: skip
 def assemble(
@@ -139,17 +139,22 @@ def assemble(
     weights: Array,
     h: Array,
     jacobian: Array,
+    at_ends: Array,
     columns: Array,
     rows: Array,
     local: Array,
     border: Array,
     corner: Array,
+    start: Array,
+    end: Array,
 ) -> None:
     """Fill the blocks that `contin.condensation.Factorization` takes.
 
-    ``jacobian`` (points, n + n_int, n + k) of rhs and integrands is by the states in the layout's order; ``columns`` (c,
-    equations) and ``rows`` (r, unknowns) are the extra ones. Equations are scaled by h. Interior columns of states that do not
-    occur in a row are left as they are: nobody looks at them.
+    ``jacobian`` (points, n + n_int, n + k) of rhs and integrands is by the states in the layout's order, ``at_ends`` (1,
+    n_bc, 2 n + k) of the boundary conditions by those at both ends as they are. ``columns`` (c, equations) and ``rows`` (r,
+    unknowns) are the extra ones; ``start`` and ``end`` are filled with the coefficients of the boundary conditions.
+    Equations are scaled by h. Interior columns of states that do not occur in a row are left as they are: nobody looks at
+    them.
     """
     order, offsets, follows, equations, inside, ends, left, right, remaining = layout
     d, n, groups = weights.size, order.size, offsets.size - 1
@@ -205,9 +210,9 @@ def assemble(
                 point, share = jacobian[j * d + i, n + q], weights[i] * h[j]
                 for node in range(d + 1):
                     for g in range(groups):
-                        start = starts[g, node]
+                        first = starts[g, node]
                         for b in range(offsets[g + 1] - offsets[g]):
-                            border[j, q, start + b] += share * value[i, node] * point[offsets[g] + b]
+                            border[j, q, first + b] += share * value[i, node] * point[offsets[g] + b]
                 for b in range(k):
                     corner[q, b] += share * point[n + b]
         for q in range(r):
@@ -219,10 +224,17 @@ def assemble(
                 target[inner + b] = source[ends[b]] if not at_end or j == intervals - 1 else 0.0
             for b in range(k + c):
                 target[rest + b] = 0.0
-    tail = columns.shape[1] - n_int
+    conditions = start.shape[0]
+    for q in range(conditions):
+        for b in range(n):
+            start[q, b], end[q, b] = at_ends[0, q, b], at_ends[0, q, n + b]
+        for b in range(k):
+            end[q, n + b] = at_ends[0, q, 2 * n + b]
+        for b in range(c):
+            end[q, n + k + b] = columns[b, intervals * d * n + q]
     for b in range(c):
         for q in range(n_int):
-            corner[q, k + b] = columns[b, tail + q]
+            corner[q, k + b] = columns[b, intervals * d * n + conditions + q]
 
 
 class Collocation(System):
@@ -346,16 +358,14 @@ class Collocation(System):
         field, jacobian = problem.batch("field").jacobian(self._times, points, _NONE(n), p, of_field)
         boundary, ends = problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
         c, r = len(columns), len(rows) + problem.integral_size
-        local = new((self.intervals, n * d, n * (d + 1) + k + c))
-        border = np.empty((self.intervals, r, n * (d + 1) + k + c))
-        corner = np.empty((r, k + c))
+        conditions, width = problem.boundary_size, n * (d + 1) + k + c
+        blocks = (
+            new((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k + c)),
+            np.empty((conditions, n)), np.empty((conditions, n + k + c)),
+        )  # fmt: skip
         tables = (self.basis.value, self.basis.slope, self.basis.weights)
-        assemble(tuple(self._layout), *tables, self._h, jacobian, columns, rows, local, border, corner)
-        bc = self.intervals * n * d
-        at_boundary = columns[:, bc : bc + problem.boundary_size].T
-        last = np.concatenate([ends[0, :, n:], at_boundary], axis=1)
-        first = np.ascontiguousarray(ends[0, :, :n])
-        return self._residual(x, field, boundary), (local, border, corner, first, np.ascontiguousarray(last))
+        assemble(tuple(self._layout), *tables, self._h, jacobian, ends, columns, rows, *blocks)
+        return self._residual(x, field, boundary), blocks
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()

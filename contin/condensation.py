@@ -114,7 +114,7 @@ def _finish_pivots(rows, stride, factors, length, count):
 
 @njit(inline="always", **_OPTIONS)
 def _subtract_panel(rows, i, count, block, pivot, start, size, right, tail):
-    """Subtract multiples of ``size`` rows of ``block`` from ``count`` rows from i on, up to column ``right`` and from ``tail`` on.
+    """Subtract multiples of ``size`` rows of ``block`` from ``count`` rows from i on, up to ``right`` and from ``tail`` on.
 
     The multiples stand in columns from ``start`` on; ``pivot`` is the first of the rows of ``block``.
     """
@@ -515,7 +515,10 @@ def solve(layout, local, border, chain, chain_border, dense, piv_local, piv_chai
 
 @njit(inline="never", **_OPTIONS)
 def _forward_transposed(block, top, left, right, tail, X, rest, behind):
-    """Solve U^T z = x for the eliminated columns, in place; what z contributes to ``rest``, from ``behind`` on, is subtracted."""
+    """Solve U^T z = x for the eliminated columns, in place.
+
+    What z contributes to ``rest``, from ``behind`` on, is subtracted from it.
+    """
     apart, after = block.strides[0], block.shape[1] - tail
     start = left
     while start < right:

@@ -38,6 +38,8 @@ _BESIDE = 0.05
 _FAR = 0.05
 #: A tangent's component at a branch point below this is zero: tangents there come from differences.
 _STATIONARY = 1e-5
+#: To which part of a step, and to which part of the corrector's tolerance of it, a zero is looked for.
+_PRECISE, _SHARE = 1e-12, 1e-2
 #: Cosine between the kernels of a branch point on two meshes, below which they are two points.
 _SAME_KERNEL = 0.9
 #: Into how many parts a step is divided to look inside it, and how often parts with several events are halved.
@@ -126,6 +128,8 @@ class Segment:
 
     def _at(self, at: float) -> Trial:
         """The point of the curve at this place along the state's tangent, with its exact tangent and factors."""
+        if self._last is not None and self._last[0] == at:
+            return self._last[1]
         guess, factors = self._between(at), self.trial.factors
         if self._last is not None:  # off the cubic by about as much as the last one was
             place, last = self._last
@@ -205,17 +209,32 @@ class Segment:
             place = (s, self._at(s)) if left[0] < s < right[0] else None
         return None
 
+    def _parabola(self, left: Place, right: Place) -> tuple[float, float, float, float]:
+        """The slope between two places: its values there, and c, d of the parabola first + c z + d z^2, z from 0 to 1.
+
+        The mean of the parabola is the mean slope, known from the parameter itself.
+        """
+        (a, start), (b, end) = left, right
+        first, last = self._slope(start), self._slope(end)
+        at = self.trial.system.parameter_index(self.fold.name)
+        mean = (end.x[at] - start.x[at]) / (b - a)
+        return first, last, 6 * mean - 4 * first - 2 * last, 3 * first + 3 * last - 6 * mean
+
+    def _turn(self, left: Place, right: Place) -> float | None:
+        """About where the slope vanishes between two places, at which it has opposite signs."""
+        first, last, linear, square = self._parabola(left, right)
+        root = np.sqrt(max(linear**2 - 4 * square * first, 0.0))
+        lower = -2 * first / (linear + (root if last > first else -root))  # the zero where the slope grows from first to last
+        return float(left[0] + (right[0] - left[0]) * lower) if 0 < lower < 1 else None
+
     def _suspect(self, left: Place, right: Place, sense: float) -> tuple[Place | None, float]:
         """A place (s, trial) between two where the slope could come near zero, or None, and half its second derivative.
 
         Slopes at both ends and the mean slope between them, from the parameter itself, make a parabola: its vertex. Where that
         lies outside, but the slope at one end is close to zero already: that end.
         """
-        (a, start), (b, end) = left, right
-        first, last = sense * self._slope(start), sense * self._slope(end)
-        at, width = self.trial.system.parameter_index(self.fold.name), b - a
-        mean = sense * (end.x[at] - start.x[at]) / width
-        linear, square = 6 * mean - 4 * first - 2 * last, 3 * first + 3 * last - 6 * mean
+        a, width = left[0], right[0] - left[0]
+        first, last, linear, square = (sense * value for value in self._parabola(left, right))
         smaller = min(first, last)
         if 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * smaller:
             s = a - width * linear / (2 * square)
@@ -290,7 +309,9 @@ class Segment:
             if ends[0] * ends[1] > 0 or ends[0] == 0:  # a limit that the run starts on
                 at, there = a, first
             else:
-                at = find_zero(lambda s: monitor.function(self._at(s)), a, ends[0], b, ends[1], 1e-12 * self.step)
+                precise = max(_PRECISE, _SHARE * self.settings.newton.tolerance) * self.step
+                guess = self._turn(left, right) if monitor is self.fold else None
+                at = find_zero(lambda s: monitor.function(self._at(s)), a, ends[0], b, ends[1], precise, guess)
                 there = self._at(at)
         except ConvergenceError:
             at, there, name = b, last, f"possible {monitor.name}"

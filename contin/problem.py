@@ -134,7 +134,7 @@ class BoundaryValueProblem:
         return self._layouts[degree]
 
     def seeds(self, free: Indices) -> tuple[Seeds, Seeds]:
-        """What to perturb for the Jacobians of field (by states in the layout's order) and boundary, by parameters ``free`` too."""
+        """What to perturb for the Jacobians of field (states in the layout's order) and boundary, parameters ``free`` too."""
         return self.batch("field").seeds(free, self.layout(2).order), self.batch("boundary").seeds(free)
 
     def _compile(self, name: str) -> Batch:

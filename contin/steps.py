@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,6 +138,10 @@ def turn(state: State, trial: Trial) -> float:
     whole = inner(system, trial.tangent, state.tangent)
     weights = system.weights[: system.state_size]
     a, b = trial.tangent[: system.state_size], state.tangent[: system.state_size]
-    sizes = np.sqrt((weights * a) @ a), np.sqrt((weights * b) @ b)
-    part = (weights * a) @ b / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
-    return float(max(np.arccos(np.clip(whole, -1, 1)), np.arccos(np.clip(part, -1, 1)) / 2))
+    sizes = math.sqrt((weights * a) @ a), math.sqrt((weights * b) @ b)
+    part = float((weights * a) @ b) / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
+    return max(_angle(whole), _angle(part) / 2)
+
+
+def _angle(cosine: float) -> float:
+    return math.acos(min(1.0, max(-1.0, cosine))) if cosine == cosine else math.nan  # noqa: PLR0124

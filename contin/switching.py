@@ -72,7 +72,8 @@ class _Bordered:
     """M at x for given borders: its kernel vectors, the numbers g, corrections."""
 
     def __init__(self, system: Discretization, x: Array, phi: Array, psi: Array) -> None:
-        self.rows = np.pad(phi * system.weights, ((0, 0), (0, 1)))
+        self.rows = np.zeros((2, system.size + 1))
+        self.rows[:, :-1] = phi * system.weights
         self.residual, self.factors = system.linearize(x, self.rows, psi[None, :])
         solutions = self.factors.solve(np.hstack([np.zeros((2, system.equations)), np.eye(2)]))
         self.kernel, self.g = solutions[:, :-1], solutions[:, -1]
@@ -228,7 +229,9 @@ def locate_branch_point(
     phi = _orthonormal(system, random.standard_normal((2, system.size)) if kernel is None else kernel)
     psi = random.standard_normal(system.equations) / np.sqrt(system.equations)
     x, beta, hessian, last = np.array(x, dtype=float), 0.0, None, np.inf
-    slope, drop, before = np.empty((2, 2)), np.zeros(2), np.zeros(2)
+    slope: Any = np.empty((2, 2))
+    drop: Array = np.zeros(2)
+    before: Array = np.zeros(2)
     with np.errstate(all="ignore"):
         for iteration in range(max_iterations):
             matrix = _Bordered(system, x, phi, psi)
@@ -241,7 +244,8 @@ def locate_branch_point(
                 hessian, origin = _hessian(system, x, matrix), x
                 slope = hessian
             elif np.any(drop):  # Broyden's update: how the gradient has really changed in the last step
-                slope = slope + np.outer(before - matrix.g - slope @ drop, drop) / (drop @ drop)
+                missed = before - matrix.g - slope @ drop
+                slope = slope + np.outer(missed, drop / (drop @ drop))
             if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(matrix.g))):
                 break
             # one Newton step for F + beta psi = 0 and, through its gradient g, for grad beta = 0

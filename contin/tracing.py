@@ -47,8 +47,7 @@ class _Trace:
     __neg__ = __pos__ = _alone
     sqrt = exp = expm1 = log = log1p = log10 = sin = cos = tan = sinh = cosh = tanh = _alone
     arcsin = arccos = arctan = arcsinh = arccosh = arctanh = _alone
-    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = _refuse  # type: ignore[assignment]
-    __hash__ = None  # type: ignore[assignment]
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __hash__ = _refuse
 
 
 class _Plain(Prepared):
@@ -79,7 +78,10 @@ def dependencies(
     if inputs > _MOST:
         return everything
     marks = [_Trace(1 << slot) for slot in range(inputs)]
-    given = [(namedtuple("U", states), marks[:n]), (namedtuple("P", parameters), marks[inputs - k :])]  # noqa: PYI024
+    given: list[tuple[Any, list[_Trace]]] = [
+        (namedtuple("U", states), marks[:n]),
+        (namedtuple("P", parameters), marks[inputs - k :]),
+    ]  # noqa: PYI024
     if ends:
         given.insert(1, (given[0][0], marks[n : 2 * n]))
     rows: list[int] = []

@@ -1,0 +1,131 @@
+"""Which states depend on which: found by tracing, used by the elimination and by the Jacobian, which must not change by it."""
+
+import math
+
+import numpy as np
+import pytest
+
+import contin
+from contin.compilation import Batch
+from contin.structure import coupled_groups, layout
+
+
+def rod(t, u, p):
+    """A planar elastica: the moment alone, the angle from it, the position from the angle."""
+    return p.stiffness * u.m + t, -math.sin(u.angle) * 0 + u.m, math.cos(u.angle), math.sin(u.angle)
+
+
+ROD = (["m", "angle", "x", "y"], ["stiffness"])
+
+
+def pattern(function, states, parameters, **options):
+    plain = Batch([function], [options.pop("count", len(states))], states, parameters, **options)
+    return plain.depends.astype(int).tolist()
+
+
+def test_what_depends_on_what():
+    assert pattern(rod, *ROD) == [[1, 0, 0, 0, 1], [1, 1, 0, 0, 0], [0, 1, 0, 0, 0], [0, 1, 0, 0, 0]]
+
+
+def test_functions_of_functions_and_arrays_are_followed():
+    def square(x):
+        return np.power(x, 2) if False else x * x
+
+    def filled(t, u, p, out):
+        out[0] = square(u[1])
+        out[1] = np.exp(u[0]) * p[0]
+        out[2] = 3.0
+
+    assert pattern(filled, ["a", "b", "c"], ["k"]) == [[0, 1, 0, 0], [1, 0, 0, 1], [0, 0, 0, 0]]
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda t, u, p: (u.a if u.b > 0 else u.c, u.a, u.b),
+        lambda t, u, p: (abs(u.a), u.a, u.b),
+        lambda t, u, p: (max(u.a, u.b), u.a, u.b),
+        lambda t, u, p: (u.a if t > 0.5 else u.b, u.a, u.b),
+        lambda t, u, p: (u.a if p.k == 1 else u.b, u.a, u.b),
+        lambda t, u, p: (u.a if u.b else u.c, u.a, u.b),
+        lambda t, u, p: (u.a * float(u.b), u.a, u.b),
+    ],
+)
+def test_nothing_is_claimed_of_a_function_that_decides(function):
+    """A comparison could send it another way for other numbers: everything counts as depending on everything."""
+    assert np.all(Batch.depends.func(_Unfinished(function)))
+
+
+class _Unfinished:
+    """As much of a `Batch` as is traced; some of the functions above are none that can be compiled."""
+
+    def __init__(self, function):
+        self._functions, self._counts = (function,), (3,)
+        self.states, self.parameters, self.ends, self.times = ("a", "b", "c"), ("k",), False, True
+
+
+def test_groups_come_after_those_that_they_depend_on():
+    depends = np.zeros((5, 5), bool)
+    for row, column in ((0, 1), (1, 0), (2, 2), (0, 2), (3, 0), (4, 4), (4, 3)):
+        depends[row, column] = True
+    assert coupled_groups(depends) == [[2], [0, 1], [3], [4]]
+    assert coupled_groups(np.ones((3, 3), bool)) == [[0, 1, 2]]
+
+
+def test_every_place_of_a_block_is_used_once():
+    random = np.random.default_rng(0)
+    for n, degree in ((1, 2), (4, 3), (9, 8)):
+        places = layout(random.random((n, n)) < 0.3, degree)
+        assert sorted(places.rows) == list(range(n * degree))
+        assert sorted([*places.inside, *places.ends]) == list(range(n * (degree + 1)))
+        assert sorted([*places.left, *places.right]) == list(range(n * (degree - 1), n * (degree + 1)))
+
+
+def problem():
+    def rhs(t, u, p):
+        return p.load * math.sin(u.b), u.a + 0.1 * u.c, u.a * u.b - u.c, math.cos(u.b) * p.load, u.d * u.c
+
+    def boundary(u, v, p):
+        return u.a - 0.2, v.b, u.c - 0.1, v.d - u.e, u.e - 0.3, v.e - p.target
+
+    def integrals(t, u, p):
+        return (u.c * u.d - p.mean,)
+
+    parameters = {"load": 1.3, "target": 0.4, "mean": 0.2}
+    return contin.BoundaryValueProblem(rhs, boundary, ["a", "b", "c", "d", "e"], parameters, integrals=integrals)
+
+
+def test_jacobian_of_a_problem_in_groups_against_differences():
+    """Solves with the factored matrix undo central differences of the residual (error of these about 1e-9)."""
+    stated = problem()
+    assert [len(group) for group in coupled_groups(stated.batch("field").depends[:5, :5])] == [3, 1, 1]
+    assert len(stated.batch("field").seeds([0]).starts) - 1 < 6  # inputs are perturbed together
+    random = np.random.default_rng(1)
+    system = contin.Collocation(stated, np.array([0, 0.2, 0.5, 1.0]), 4, ["target", "load", "mean"], {})
+    x, direction, row = random.standard_normal((3, system.size))
+    left = random.standard_normal(system.equations)
+    _, factors = system.linearize(x, (row,))
+    change = (system.residual(x + 1e-6 * direction) - system.residual(x - 1e-6 * direction)) / 2e-6
+    found = factors.solve(np.append(change, row @ direction))
+    assert np.allclose(found, direction, atol=1e-6)
+    product = system.transposed_product(x, left)
+    assert product @ direction == pytest.approx(left @ change, rel=1e-8)
+    assert np.allclose(factors.solve_transposed(product + 2 * row), [*left, 2], atol=1e-8)
+
+
+def test_groups_change_nothing_but_round_off():
+    """The same linearization with all states as one group, and with every input perturbed by itself."""
+    random = np.random.default_rng(2)
+    apart, together = problem(), problem()
+    together.batch("field").__dict__["depends"] = np.ones((6, 8), bool)
+    x, b = None, None
+    solutions = []
+    for stated in (apart, together):
+        system = contin.Collocation(stated, np.linspace(0, 1, 6), 5, ["target", "load", "mean"], {})
+        x = random.standard_normal(system.size) if x is None else x
+        b = random.standard_normal((5, system.size)) if b is None else b
+        _, factors = system.linearize(x, (np.ones(system.size),))
+        solutions.append((factors.solve(b), factors.solve_transposed(b)))
+    assert system._layout.offsets.tolist() == [0, 5]
+    for one, other in zip(*solutions):
+        assert np.allclose(one, other, rtol=0, atol=1e-11 * np.abs(one).max())
