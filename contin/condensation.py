@@ -346,6 +346,19 @@ def _subtract_columns(target, matrix, apart, vectors, length, rows):
         subtract_columns(target, matrix, apart, vectors, length, 1)
 
 
+@njit(inline="always", **_OPTIONS)
+def _apply_triangle(vectors, block, apart, size, kind):
+    """`apply_triangle` for any size up to that of a panel."""
+    if size == 4:
+        apply_triangle(vectors, block, apart, 4, kind)
+    elif size == 3:
+        apply_triangle(vectors, block, apart, 3, kind)
+    elif size == 2:
+        apply_triangle(vectors, block, apart, 2, kind)
+    else:
+        apply_triangle(vectors, block, apart, 1, kind)
+
+
 @njit(inline="never", **_OPTIONS)
 def _exchange_rows(X, i, k):
     exchange(_address(X, i, 0), _address(X, k, 0), LANES)
@@ -365,12 +378,7 @@ def _forward(block, top, bottom, left, right, pivots, X):
         here = _address(X, first, 0)
         _subtract_rows(here, _address(block, first, left), apart, _address(X, top, 0), start - left, size)
         triangle = _address(block, first, start)
-        if size == 4:
-            apply_triangle(here, triangle, apart, 4, LOWER)
-        elif size == 3:
-            apply_triangle(here, triangle, apart, 3, LOWER)
-        elif size == 2:
-            apply_triangle(here, triangle, apart, 2, LOWER)
+        _apply_triangle(here, triangle, apart, size, LOWER)
         start += size
     below = top + right - left
     _carry(block, below, bottom - below, left, right, X, top, X)
@@ -398,14 +406,7 @@ def _backward(block, top, left, right, tail, X, known, behind):
         here = _address(X, first, 0)
         _subtract_rows(here, _address(block, first, end), apart, _address(X, first + size, 0), right - end, size)
         triangle = _address(block, first, start)
-        if size == 4:
-            apply_triangle(here, triangle, apart, 4, UPPER)
-        elif size == 3:
-            apply_triangle(here, triangle, apart, 3, UPPER)
-        elif size == 2:
-            apply_triangle(here, triangle, apart, 2, UPPER)
-        else:
-            apply_triangle(here, triangle, apart, 1, UPPER)
+        _apply_triangle(here, triangle, apart, size, UPPER)
         end = start
 
 
@@ -525,14 +526,7 @@ def _forward_transposed(block, top, left, right, tail, X, rest, behind):
         size = min(PANEL, right - start)
         first = top + start - left
         here, triangle = _address(X, first, 0), _address(block, first, start)
-        if size == 4:
-            apply_triangle(here, triangle, apart, 4, UPPER_TRANSPOSED)
-        elif size == 3:
-            apply_triangle(here, triangle, apart, 3, UPPER_TRANSPOSED)
-        elif size == 2:
-            apply_triangle(here, triangle, apart, 2, UPPER_TRANSPOSED)
-        else:
-            apply_triangle(here, triangle, apart, 1, UPPER_TRANSPOSED)
+        _apply_triangle(here, triangle, apart, size, UPPER_TRANSPOSED)
         start += size
         _subtract_columns(_address(X, first + size, 0), _address(block, first, start), apart, here, right - start, size)
         if after > 0:
@@ -556,12 +550,7 @@ def _backward_transposed(block, top, bottom, left, right, pivots, X):
         start = left + (end - left - 1) // PANEL * PANEL
         first, size = top + start - left, end - start
         here, triangle = _address(X, first, 0), _address(block, first, start)
-        if size == 4:
-            apply_triangle(here, triangle, apart, 4, LOWER_TRANSPOSED)
-        elif size == 3:
-            apply_triangle(here, triangle, apart, 3, LOWER_TRANSPOSED)
-        elif size == 2:
-            apply_triangle(here, triangle, apart, 2, LOWER_TRANSPOSED)
+        _apply_triangle(here, triangle, apart, size, LOWER_TRANSPOSED)
         _subtract_columns(_address(X, top, 0), _address(block, first, left), apart, here, start - left, size)
         end = start
     for c in range(right - 1, left - 1, -1):
