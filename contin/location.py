@@ -24,6 +24,8 @@ from contin.switching import BranchPoint, MultiplePoint, along, inner, locate_br
 _ROUND_OFF = 1e-9
 #: An event of the first step, this close to where it began (as a part of the step), is the first point itself.
 _AT_START = 1e-6
+#: This close to a branch point tangents are round-off.
+_BLURRED = 1e-7
 #: A monitor is zero at the first point of a run where it is smaller by this factor than at the next.
 _ON_ZERO = 1e-8
 #: A change of a parameter below this, relative to 1 + its size, may be round-off.
@@ -124,7 +126,8 @@ class Segment:
 
     def _at_the_start(self, event: Event) -> bool:
         """Whether an event is the first point of the run once more."""
-        return self.state.accepted == 0 and event.stop is None and event.at < _AT_START * self.step
+        near = max(_AT_START * self.step, _BLURRED if self.state.singular else 0.0)
+        return self.state.accepted == 0 and event.stop is None and event.at < near
 
     def _at(self, at: float) -> Trial:
         """The point of the curve at this place along the state's tangent, with its exact tangent and factors."""

@@ -206,6 +206,10 @@ def crossings(values: ComplexArray) -> tuple[int, bool]:
     return int(np.count_nonzero(passed)), bool(np.all(clear))
 
 
+#: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear.
+_LINEAR = 0.1
+
+
 def locate_branch_point(
     system: Discretization, x: Array, newton: Newton = Newton(), kernel: Array | None = None, max_iterations: int = 12
 ) -> BranchPoint:
@@ -260,8 +264,8 @@ def locate_branch_point(
             size = float(np.max(np.abs(update) / (1 + np.abs(x))))
             if not np.isfinite(size) or size > 10:
                 break
-            rate = min(1.0, size / last) if np.isfinite(last) else 1.0
-            if size * min(1.0, 2 * rate) <= newton.tolerance or (size < 1e-9 and rate > 0.3):
+            rate = min(1.0, max(_LINEAR, size / last)) if np.isfinite(last) else 1.0
+            if size * rate <= newton.tolerance or (size < 1e-9 and rate > 0.3):
                 if np.max(np.abs(x - origin)) > 1e-3:  # the tangents are wanted as they are right there
                     matrix = _Bordered(system, x, phi, psi)
                     hessian = _hessian(system, x, matrix)
