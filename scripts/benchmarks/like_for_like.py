@@ -38,7 +38,7 @@ def run(quick: bool, bifpy_python: str, exact_fold: float) -> dict:
         contestants = {"contin": lambda tolerance=tolerance: second_run("half_loop", tolerance=tolerance)}
         if "AUTO-07p" not in skipped:
             contestants["AUTO-07p"] = lambda tolerance=tolerance: auto_07p.study("half", tolerance=tolerance)
-        runs = in_turn(contestants, 3 if quick else 7)
+        runs = in_turn(contestants, 3 if quick else 15)
         results[f"{tolerance:.0e}"] = {name: _summary(name, some, tolerance, exact_fold) for name, some in runs.items()}
     if (reason := bifpy_missing(bifpy_python)) is not None:
         skipped["bifpy"] = reason
