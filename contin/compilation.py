@@ -233,7 +233,7 @@ def _module(key: str, dispatchers: dict[str, Dispatcher], name: str, source: str
         spec.loader.exec_module(module)
     except BaseException as error:
         del sys.modules[spec.name]
-        if isinstance(error, numba.core.errors.NumbaError):
+        if isinstance(error, (numba.core.errors.NumbaError, AssertionError)):  # the latter are numba's own
             raise ProblemError(_explain(name, error)) from error
         raise
     return module
@@ -242,8 +242,9 @@ def _module(key: str, dispatchers: dict[str, Dispatcher], name: str, source: str
 def _explain(name: str, error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     reason = next((line for line in lines if line.startswith(("No implementation", "Untyped", "Unknown", "Invalid"))), None)
+    reason = reason or (lines[0] if lines else "numba fails (a list of whole and other numbers? write 0.0, not 0)")
     return (
-        f"function {name!r} cannot be compiled for real and complex numbers: {reason or lines[0]} "
+        f"function {name!r} cannot be compiled for real and complex numbers: {reason} "
         "(use arithmetic, comparisons, and functions of numbers from math or numpy)"
     )
 

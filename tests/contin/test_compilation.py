@@ -205,3 +205,15 @@ def test_states_and_parameters_may_have_the_names_of_globals():
     )
     values = problem.batch("field").values(np.zeros(1), np.array([[3.0, 0.0]]), np.empty((0, 2)), np.array([2.0, 0.0]))
     assert values[0].tolist() == [6.0, 2.0]
+
+
+def test_what_numba_itself_does_not_expect_is_a_sentence():
+    """numba asserts that a nested list has numbers of one kind."""
+
+    def rhs(t, u, p, out):
+        matrix = np.array([[1.0, 2], [0, 1]])
+        out[0] = matrix[0, 1] * u[1]
+        out[1] = u[0]
+
+    with pytest.raises(ProblemError, match="'rhs' cannot be compiled.*0.0, not 0"):
+        Batch([rhs], [2], ["a", "b"], ["k"])
