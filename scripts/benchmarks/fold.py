@@ -57,7 +57,7 @@ FIRST_STEPS = {"contin": (0.05, 0.5, 2.0), "AUTO-07p": (0.05, 0.2)}  # AUTO-07p 
 
 def _contin() -> dict[tuple[str, str], Callable]:
     """Intervals, degree, Newton's tolerance; the first step."""
-    settings = [(6, 4, 1e-8), (10, 4, 1e-9), (4, 6, 1e-9), (4, 8, 1e-11), (6, 8, 1e-12), (8, 7, 1e-12)]
+    settings = [(4, 5, 1e-6), (3, 6, 1e-6), (3, 8, 1e-6), (4, 8, 1e-6), (6, 8, 1e-6), (6, 8, 1e-9), (8, 7, 1e-12)]
     return {
         (CELL, f"{n} × {d}, tolerance {t:.0e}, first step {s:g}"): lambda n=n, d=d, t=t, s=s: second_run(
             "cell", intervals=n, degree=d, tolerance=t, angle=1.2, accuracy=0.3, step=s

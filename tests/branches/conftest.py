@@ -13,6 +13,10 @@ ROOT = Path(__file__).resolve().parents[2]
 TABLES = ("points", "events", "solutions/index", "solutions/t", "solutions/states")
 
 
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # tests started in the background of a shell are told to ignore Ctrl-C
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 class Silent:
     """A display that shows nothing; ``at`` maps the number of a point to what is to happen when it is shown."""
 
