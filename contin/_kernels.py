@@ -56,6 +56,9 @@ def _not_kept(folder: str, reason: str) -> None:
     )
 
 
+#: Options of the engine's kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
+KERNEL: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
+
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 

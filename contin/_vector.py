@@ -43,6 +43,12 @@ def _store(builder: Any, value: Any, address: Any) -> None:
     builder.store(value, builder.inttoptr(address, value.type.as_pointer())).align = 8
 
 
+def _fused(builder: Any, factor: Any, vector: Any, total: Any) -> Any:
+    """total + factor * vector, for a number and two vectors; the product alone without a total."""
+    product = builder.fmul(_splat(builder, factor, vector.type.count), vector, _FUSED)
+    return product if total is None else builder.fadd(total, product, _FUSED)
+
+
 def _number(word: Any, value: int) -> Any:
     return ir.Constant(word, value)
 
@@ -91,19 +97,13 @@ def subtract_products(
                 there = builder.add(address, offset)
                 total = _load(builder, there, vector)
                 for value, one in zip(upper, factor):
-                    total = builder.fadd(total, builder.fmul(_splat(builder, one, width), value, _FUSED), _FUSED)
+                    total = _fused(builder, one, value, total)
                 _store(builder, total, there)
 
         _for_tiles(builder, length, tile)
         return context.get_dummy_value()
 
     return types.void(*[types.intp] * 7, rows, count), generate
-
-
-def _fused(builder: Any, factor: Any, vector: Any, total: Any) -> Any:
-    """total + factor * vector, for a number and two vectors; the product alone without a total."""
-    product = builder.fmul(_splat(builder, factor, vector.type.count), vector, _FUSED)
-    return product if total is None else builder.fadd(total, product, _FUSED)
 
 
 @intrinsic(prefer_literal=True)
@@ -219,7 +219,7 @@ def solve_triangle(typing: Any, rows: Any, stride: Any, factors: Any, length: An
                 there = builder.add(address, offset)
                 total = _load(builder, there, vector)
                 for value, one in zip(done, factor):
-                    total = builder.fadd(total, builder.fmul(_splat(builder, one, width), value, _FUSED), _FUSED)
+                    total = _fused(builder, one, value, total)
                 done.append(total)
                 _store(builder, total, there)
 
@@ -266,13 +266,13 @@ def reduce_column(typing: Any, pivot: Any, stride: Any, count: Any, column: Any,
         right = builder.icmp_signed(">", lanes, _splat(builder, column, PANEL, word))
         right = builder.and_(right, builder.icmp_signed("<", lanes, _splat(builder, size, PANEL, word)))
         upper = builder.select(right, _load(builder, pivot, vector), ir.Constant(vector, [0.0] * PANEL))
-        at_column = builder.mul(column, ir.Constant(word, 8))
-        last = builder.icmp_signed(">=", builder.add(column, ir.Constant(word, 1)), size)
-        at_next = builder.select(last, at_column, builder.add(at_column, ir.Constant(word, 8)))
+        at_column = builder.mul(column, _number(word, 8))
+        last = builder.icmp_signed(">=", builder.add(column, _number(word, 1)), size)
+        at_next = builder.select(last, at_column, builder.add(at_column, _number(word, 8)))
         following = _load(builder, builder.add(pivot, at_next), _DOUBLE)
         absolute = builder.module.declare_intrinsic("llvm.fabs", [_DOUBLE])
         best = cgutils.alloca_once_value(builder, ir.Constant(_DOUBLE, -1.0))
-        where = cgutils.alloca_once_value(builder, ir.Constant(word, 0))
+        where = cgutils.alloca_once_value(builder, _number(word, 0))
         row = cgutils.alloca_once_value(builder, builder.add(pivot, stride))
         with cgutils.for_range(builder, count) as loop:
             address = builder.load(row)

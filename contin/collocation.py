@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contin._kernels import njit
+from contin._kernels import KERNEL, njit
 from contin._vector import scale_into
 from contin.condensation import Factorization
 from contin.errors import ProblemError
@@ -86,10 +86,7 @@ def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
     return result
 
 
-_VECTORIZED: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
-
-
-@njit("void(f8[:,::1], Array(f8, 1, 'C', readonly=True), f8[:,::1])", **_VECTORIZED)
+@njit("void(f8[:,::1], Array(f8, 1, 'C', readonly=True), f8[:,::1])", **KERNEL)
 def at_points(value: Array, x: Array, points: Array) -> None:
     """Fill ``points`` (N d, n) with the states at the Gauss points, from the nodal values in x."""
     d = value.shape[0]
@@ -105,7 +102,7 @@ def at_points(value: Array, x: Array, points: Array) -> None:
                     row[a] += factor * x[start + a]
 
 
-@njit("void(i8, f8[:,::1], f8[::1], f8[::1], Array(f8, 1, 'C', readonly=True), f8[:,::1], f8[:,::1], f8[::1])", **_VECTORIZED)
+@njit("void(i8, f8[:,::1], f8[::1], f8[::1], Array(f8, 1, 'C', readonly=True), f8[:,::1], f8[:,::1], f8[::1])", **KERNEL)
 def collocate(n: int, slope: Array, weights: Array, h: Array, x: Array, field: Array, boundary: Array, residual: Array) -> None:
     """Fill the ``residual`` from values of rhs and integrands at the Gauss points (N d, n + n_int) and boundary (1, n_bc)."""
     d, conditions, integrals = weights.size, boundary.shape[1], field.shape[1] - n
@@ -301,7 +298,7 @@ class Collocation(System):
 
     @functools.cached_property
     def _seeds(self) -> tuple[Seeds, Seeds]:
-        return self.problem.seeds(self._free)
+        return self.problem.seeds(self._free, self._layout.order)
 
     # --- vectors of unknowns -------------------------------------------------------------------------------------
 
@@ -383,7 +380,7 @@ class Collocation(System):
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
         n, p, u = self._n, self.all_parameters(x), self.states(x)
-        of_field, of_boundary = self.problem.seeds(self._indices(names))
+        of_field, of_boundary = self.problem.seeds(self._indices(names), self._layout.order)
         field = self.problem.batch("field").jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, :, n:]
         ends = self.problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0, :, 2 * n :]
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))

@@ -209,7 +209,7 @@ def find_zero(
 
 def _interpolated(known: list[tuple[float, float]]) -> float | None:
     """Where the parabola through three places, as a function of the value, has value zero; None where there is none."""
-    (x, fx), (y, fy), (z, fz) = known if len(known) == 3 else (*known, known[-1])
+    (x, fx), (y, fy), (z, fz) = known
     if fx == fy or fy == fz or fz == fx:
         return None
     return x * fy * fz / ((fx - fy) * (fx - fz)) + y * fx * fz / ((fy - fx) * (fy - fz)) + z * fx * fy / ((fz - fx) * (fz - fy))

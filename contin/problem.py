@@ -133,9 +133,9 @@ class BoundaryValueProblem:
             self._layouts[degree] = layout(self.batch("field").depends[:n, :n], degree)
         return self._layouts[degree]
 
-    def seeds(self, free: Indices) -> tuple[Seeds, Seeds]:
-        """What to perturb for the Jacobians of field (states in the layout's order) and boundary, parameters ``free`` too."""
-        return self.batch("field").seeds(free, self.layout(2).order), self.batch("boundary").seeds(free)
+    def seeds(self, free: Indices, order: Indices) -> tuple[Seeds, Seeds]:
+        """What to perturb for the Jacobians of field, by states in this ``order``, and boundary; by ``free`` parameters too."""
+        return self.batch("field").seeds(free, order), self.batch("boundary").seeds(free)
 
     def _compile(self, name: str) -> Batch:
         p, u = tuple(self.parameters), self.state_names

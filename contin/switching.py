@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contin._kernels import njit
+from contin._kernels import KERNEL, njit
 from contin.corrector import Newton
 from contin.errors import ConvergenceError
 from contin.interface import Array, ComplexArray, Discretization, Factors
@@ -125,7 +125,7 @@ def _random_block(count: int, size: int) -> Array:
     return block
 
 
-@njit("void(f8[:,::1])", cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc"})
+@njit("void(f8[:,::1])", **KERNEL)
 def _orthonormalize(rows: Array) -> None:
     """Make the rows orthonormal, in place: Gram-Schmidt, twice."""
     count, size = rows.shape
