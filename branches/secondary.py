@@ -20,8 +20,7 @@ from branches.config import DOMAINS, Config, ConfigError, dump, parse
 from branches.display import Display, complain, write_output
 from branches.files import StoreError, prepare, write_bytes
 from branches.read import StoredBranch, read_branch
-from contin import ContinError, Continuation, Stop
-from contin.switching import BranchPoint
+from contin import BranchPoint, ContinError, Continuation, Stop
 from ribbon_model.laws import LAWS
 from ribbon_model.secondary import breaking, force, secondary_branch
 

@@ -11,28 +11,34 @@
 The tutorial is docs/contin.md.
 """
 
-from contin._cache import cache_directory  # the first of all: it tells numba where to keep compiled code
-from contin.algebraic import Algebraic, AlgebraicProblem
-from contin.arclength import Continuation, follow
-from contin.branch import Branch, Point, Stop
-from contin.collocation import Collocation
-from contin.corrector import Newton, correct
-from contin.curves import curve
-from contin.diagram import Diagram, diagram
+from contin.analysis.diagram import Diagram, diagram
+from contin.analysis.sensitivity import sensitivities
+from contin.analysis.solving import solve
+from contin.analysis.two_parameter import curve
+from contin.continuation.run import Continuation, follow
+from contin.continuation.trace import trace
+from contin.detection.branch_point import BranchPoint, MultiplePoint, locate_branch_point
+from contin.discretization.algebraic import Algebraic
+from contin.discretization.basis import basis, interpolation
+from contin.discretization.collocation import Collocation
+from contin.discretization.mesh import MeshControl
 from contin.errors import ContinError, ConvergenceError, ProblemError
-from contin.events import Monitor
-from contin.mesh import MeshControl
-from contin.problem import BoundaryValueProblem
-from contin.sensitivity import sensitivities
-from contin.settings import Settings
-from contin.solving import point_of, solve, trace
-from contin.steps import State
-from contin.storage import load, save
-from contin.switching import BranchPoint, MultiplePoint, locate_branch_point
+from contin.functions.batch import Batch
+from contin.functions.cache import cache_directory  # the first of all: it tells numba where to keep compiled code
+from contin.functions.gradient import gradient
+from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.boundary_value import BoundaryValueProblem
+from contin.results.branch import Branch
+from contin.results.point import Point, point_of
+from contin.results.storage import load, save
+from contin.stepping.newton import Newton, correct
+from contin.stepping.settings import Settings
+from contin.stepping.state import State, Stop
+from contin.stepping.trial import Monitor, Trial
 
 __all__ = [
-    "Algebraic", "AlgebraicProblem", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
+    "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
-    "ProblemError", "Settings", "State", "Stop", "cache_directory", "correct", "curve", "diagram", "follow", "load",
+    "ProblemError", "Settings", "State", "Stop", "Trial", "basis", "cache_directory", "correct", "curve", "diagram", "follow", "gradient", "interpolation", "load",
     "locate_branch_point", "point_of", "save", "sensitivities", "solve", "trace",
 ]  # fmt: skip

@@ -1,5 +1,7 @@
 """The exceptions of contin: one sentence each, fit to be shown to a user as it is."""
 
+from __future__ import annotations
+
 
 class ContinError(Exception):
     """Base of all errors raised on purpose."""

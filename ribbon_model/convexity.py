@@ -10,8 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contin import Monitor
-from contin.compilation import Batch
+from contin import Batch, Monitor
 from ribbon_model.finite_width import strain_energy
 from ribbon_model.laws import FINITE_WIDTH, Law
 from ribbon_model.shape import frames

@@ -57,7 +57,7 @@ class FiniteWidthPoint:
 @functools.cache
 def _energy():
     """U and its derivatives, compiled for many strains."""
-    from contin.compilation import Batch
+    from contin import Batch
 
     def function(w, p):
         return strain_energy(w.w1, w.w3, p.kappa_n, p.nu, p.Gamma)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.collocation import basis, interpolation
+from contin import basis, interpolation
 from ribbon_model import linear
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law

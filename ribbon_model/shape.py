@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.collocation import basis, interpolation
+from contin import basis, interpolation
 from ribbon_model.equilibrium import LENGTH, directors, on_directors
 from ribbon_model.laws import Law
 

@@ -13,12 +13,13 @@ import numba
 import pytest
 from numba.core.caching import IndexDataCacheFile
 
-from contin import ContinError, _cache
-from contin._kernels import _not_kept
+from contin import ContinError
+from contin.functions import cache
+from contin.functions.compiler import _not_kept
 
 #: The functions that a kernel calls have one version for each kind of argument, in one index.
 KERNEL = """
-from contin._kernels import njit
+from contin.functions.compiler import njit
 
 @njit(cache=True)
 def helper(x):
@@ -94,20 +95,20 @@ def test_a_full_disk_costs_a_line_and_the_cache(kernel, monkeypatch, capsys):
 
 
 def test_code_finds_a_place_or_says_what_to_set(tmp_path, monkeypatch, capsys):
-    write = _cache.write_bytes
+    write = cache.write_bytes
     monkeypatch.setenv("CONTIN_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(_cache, "_temporary_directory", lambda: tmp_path)
+    monkeypatch.setattr(cache, "_temporary_directory", lambda: tmp_path)
 
     def full(path, data):
         if path.parent == tmp_path / "cache":
             raise OSError(errno.EDQUOT, "Disk quota exceeded")
         write(path, data)
 
-    monkeypatch.setattr(_cache, "write_bytes", full)
-    assert _cache.write_source("x.py", "1") == tmp_path / "x.py"
-    monkeypatch.setattr(_cache, "_temporary_directory", lambda: tmp_path / "cache")
+    monkeypatch.setattr(cache, "write_bytes", full)
+    assert cache.write_source("x.py", "1") == tmp_path / "x.py"
+    monkeypatch.setattr(cache, "_temporary_directory", lambda: tmp_path / "cache")
     with pytest.raises(ContinError, match="Disk quota exceeded; set CONTIN_CACHE_DIR to a folder that can be written"):
-        _cache.write_source("x.py", "1")
+        cache.write_source("x.py", "1")
 
 
 PROBLEM = """
@@ -134,17 +135,17 @@ def test_processes_that_compile_the_same_problem_at_once(tmp_path):
 def test_an_installation_and_a_home_that_cannot_be_used(tmp_path, monkeypatch, capsys):
     """Neither the package's folder nor a home: kernels and problems go to one temporary folder, and a line says what to set."""
     monkeypatch.setattr(os, "access", lambda path, mode: str(path).startswith(str(tmp_path)))
-    monkeypatch.setattr(_cache, "_temporary_directory", _cache.functools.cache(_cache._temporary_directory.__wrapped__))
+    monkeypatch.setattr(cache, "_temporary_directory", cache.functools.cache(cache._temporary_directory.__wrapped__))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     for name, value in {"HOME": "/proc/none", "XDG_CACHE_HOME": "", "CONTIN_CACHE_DIR": "", "NUMBA_CACHE_DIR": ""}.items():
         monkeypatch.setenv(name, value)
-    _cache._tell_numba()
-    folder = _cache.cache_directory()
+    cache._tell_numba()
+    folder = cache.cache_directory()
     assert folder.parent == tmp_path and os.environ["NUMBA_CACHE_DIR"] == numba.config.CACHE_DIR == str(folder / "engine")
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "set CONTIN_CACHE_DIR to keep it" in said
     monkeypatch.setattr(tempfile, "tempdir", "/proc/none")
-    _cache._temporary_directory.cache_clear()
+    cache._temporary_directory.cache_clear()
     with pytest.raises(ContinError, match="no place for compiled code: .*; set CONTIN_CACHE_DIR"):
-        _cache.cache_directory()
+        cache.cache_directory()

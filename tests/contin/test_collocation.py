@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contin import BoundaryValueProblem, Collocation, ProblemError, correct
-from contin.collocation import basis
+from contin.discretization.basis import basis
 
 
 def oscillator():

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from contin import BoundaryValueProblem, ProblemError
-from contin.compilation import Batch, outputs
-from contin.derivatives import gradient
-from contin.preparation import Prepared
+from contin.functions.batch import Batch
+from contin.functions.gradient import gradient
+from contin.functions.rewriting import Prepared
+from contin.functions.signature import outputs
 
 
 def helper(x):

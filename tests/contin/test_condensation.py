@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from contin.condensation import Factorization
-from contin.structure import layout
+from contin.linalg.condensation import Factorization
+from contin.linalg.layout import layout
 
 
 def random_blocks(n, degree, intervals, k, r, seed=0, depends=None):

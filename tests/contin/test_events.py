@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from bank import abc, bru, enz, opt, pp2
 
-from contin import AlgebraicProblem, BoundaryValueProblem, Monitor, Settings, curve, location, solve, trace
-from contin.events import Trial
+from contin import AlgebraicProblem, BoundaryValueProblem, Monitor, Settings, curve, solve, trace
+from contin.detection import refinement
+from contin.stepping.trial import Trial
 
 
 def labels(branch):
@@ -152,7 +153,7 @@ def test_a_point_that_runs_away_on_finer_meshes_stays_as_it_was(monkeypatch):
     def elsewhere(system, x, tangent, monitor, settings):
         return Trial(system, x + 0.5, tangent, 1.0)
 
-    monkeypatch.setattr(location, "_again", elsewhere)
+    monkeypatch.setattr(refinement, "_again", elsewhere)
     (fold,) = trace(start, settings, free=["lam"]).labelled("LP")
     assert fold["lam"] == coarse.labelled("LP")[0]["lam"] and math.isnan(fold.errors["lam"])
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import contin
-from contin.compilation import Batch
-from contin.structure import coupled_groups, layout
-from contin.tracing import dependencies
+from contin.functions.batch import Batch
+from contin.functions.sparsity import dependencies
+from contin.linalg.layout import coupled_groups, layout
 
 
 def rod(t, u, p):

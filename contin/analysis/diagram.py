@@ -1,0 +1,222 @@
+"""All branches that hang together: follow one, leave it at every branch point, and so on to a given depth."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.continuation.run import Continuation
+from contin.detection.branch_point import BranchPoint
+from contin.discretization.protocol import Discretization, inner
+from contin.errors import ConvergenceError
+from contin.results.branch import Branch
+from contin.results.point import Point, system_of
+from contin.stepping.settings import Settings, settings_with
+from contin.stepping.state import Stop
+
+Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass
+class Junction:
+    """A branch point of a diagram: the point, its depth, and which of its half-branches have been followed.
+
+    ``taken[i]`` maps +1 and -1 to the number of the branch that runs along tangent i that way. ``failed`` lists the switches
+    that did not work, as (tangent, way, reason); ``also`` the points of other branches at the same place.
+    """
+
+    point: Point
+    depth: int
+    taken: list[dict[int, int]]
+    failed: list[tuple[int, int, str]] = field(default_factory=list)
+    also: list[Point] = field(default_factory=list)
+
+
+@dataclass
+class Diagram:
+    """Branches, and the junctions where they meet."""
+
+    branches: list[Branch] = field(default_factory=list)
+    junctions: list[Junction] = field(default_factory=list)
+
+    def graph(self) -> Any:
+        """The diagram as a ``networkx.MultiGraph``.
+
+        Nodes are special points (attributes: label, name, parameters and functionals), shared where branches meet; edges are
+        the pieces of branches between them (attributes: branch, points, parameter and functional columns).
+        """
+        import networkx
+
+        graph = networkx.MultiGraph()
+        for number, junction in enumerate(self.junctions):
+            graph.add_node(f"BP{number}", label="BP", depth=junction.depth, **_values(junction.point))
+        for number, branch in enumerate(self.branches):
+            last, since = None, []
+            for place, point in enumerate(branch.points):
+                since.append(place)
+                if not point.label and place + 1 < len(branch.points):
+                    continue
+                node = self._node(point) or f"branch{number}.{place}"
+                if node not in graph:
+                    graph.add_node(node, label=point.label, name=point.name, **_values(point))
+                if last is not None:
+                    columns = {name: branch.column(name)[since] for name in _values(point)}
+                    graph.add_edge(last, node, branch=number, points=len(since), **columns)
+                last, since = node, [place]
+        return graph
+
+    def _node(self, point: Point) -> str | None:
+        for number, junction in enumerate(self.junctions):
+            if any(point is other for other in (junction.point, *junction.also)):
+                return f"BP{number}"
+        return None
+
+
+def _values(point: Point) -> dict[str, float]:
+    return {**point.parameters, **point.functionals}
+
+
+class _Explorer:
+    """The work of `diagram`."""
+
+    def __init__(self, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float) -> None:
+        self.settings, self.tolerance = settings, tolerance
+        self.symmetries = [lambda t, u: u, *symmetries]
+        self.result = Diagram()
+
+    def run(self, system: Discretization, x: Array, depth: int) -> Diagram:
+        """Follow both ways from the start, then leave every junction of less than ``depth``."""
+        for direction in (1, -1):
+            settings = dataclasses.replace(self.settings, direction=direction)
+            self._follow(Continuation(system, x, settings), 0)
+        done = 0
+        while done < len(self.result.junctions):
+            junction = self.result.junctions[done]
+            done += 1
+            if junction.depth >= depth:
+                continue
+            for which, tangent in enumerate(junction.point.details.tangents):
+                for way in (1, -1):
+                    if way not in junction.taken[which]:
+                        self._leave(junction, which, way, tangent)
+        return self.result
+
+    def _leave(self, junction: Junction, which: int, way: int, tangent: Array) -> None:
+        point, number = junction.point, len(self.result.branches)
+        for place, side in ((which, way), *self._images(point, way * tangent)):
+            junction.taken[place].setdefault(side, number)
+        try:
+            self._follow(Continuation(point.system, point.x, self.settings, way * tangent), junction.depth + 1, junction)
+        except ConvergenceError as error:
+            junction.failed.append((which, way, str(error)))
+
+    def _follow(self, run: Continuation, depth: int, origin: Junction | None = None) -> None:
+        """One run, watched: at a junction that it comes to, what it passed through counts as taken; known ground ends it."""
+        number, branch = len(self.result.branches), Branch()
+        self.result.branches.append(branch)
+        for place, point in enumerate(run):
+            branch.points.append(point)
+            if place == 0 and origin is not None:
+                origin.also.append(point)
+            elif isinstance(point.details, BranchPoint) and self._arrived(point, number, depth):
+                branch.stop = Stop("known branch", "came to a branch that was followed before")
+                break
+        branch.stop = branch.stop or run.stop
+
+    def _arrived(self, point: Point, number: int, depth: int) -> bool:
+        """Note a branch point that a run passes; True if the way ahead was followed before."""
+        for junction in self.result.junctions:
+            image = self._match(junction.point, point)
+            if image is None:
+                continue
+            which, way = image
+            junction.also.append(point)
+            junction.taken[which].setdefault(-way, number)
+            if way in junction.taken[which]:
+                return True
+            junction.taken[which][way] = number
+            return False
+        ahead = {1: number, -1: number}
+        self.result.junctions.append(Junction(point, depth, [ahead, *({} for _ in point.details.tangents[1:])]))
+        return False
+
+    def _match(self, known: Point, point: Point) -> tuple[int, int] | None:
+        """(tangent, way) of a known junction along which ``point``'s own branch goes, if they are one point up to symmetry."""
+        a, b = known.system, point.system
+        scale = 1 + np.abs(point.x[b.state_size :])
+        if np.any(np.abs(known.x[a.state_size :] - point.x[b.state_size :]) > self.tolerance * scale):
+            return None
+        carry = b.carrier(a)
+        here, ahead = carry(point.x), carry(point.details.tangents[0])
+        for symmetry in self.symmetries:
+            image = self._image(a, symmetry, here)
+            gap = image - known.x
+            if np.sqrt(inner(a, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(a, known.x, known.x))):
+                continue
+            turned = self._image(a, symmetry, ahead)
+            cosines = [inner(a, turned, tangent) for tangent in known.details.tangents]
+            which = int(np.argmax(np.abs(cosines)))
+            return which, int(np.sign(cosines[which]) or 1)
+        return None
+
+    def _images(self, point: Point, direction: Array) -> list[tuple[int, int]]:
+        """(tangent, way) of the half-branches at ``point`` that are images of the one along ``direction``."""
+        system, result = point.system, []
+        for symmetry in self.symmetries:
+            gap = self._image(system, symmetry, point.x) - point.x
+            if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, point.x, point.x))):
+                continue
+            turned = self._image(system, symmetry, direction)
+            cosines = [inner(system, turned, tangent) for tangent in point.details.tangents]
+            which = int(np.argmax(np.abs(cosines)))
+            result.append((which, int(np.sign(cosines[which]) or 1)))
+        return result
+
+    @staticmethod
+    def _image(system: Discretization, symmetry: Symmetry, x: Array) -> Array:
+        states = symmetry(system.nodes, system.states(x).copy())
+        return np.concatenate([np.asarray(states).ravel(), x[system.state_size :]])
+
+
+def diagram(
+    start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
+    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, **options: Any,
+) -> Diagram:  # fmt: skip
+    """Every branch that can be reached from a solution by leaving branch points, to a given depth.
+
+    Parameters
+    ----------
+    start : Point
+    settings : Settings, optional
+        Or any of its fields by name. Give limits: they end branches that go off.
+    free : sequence of str, optional
+        Free parameters, if they shall differ from those of ``start``.
+    depth : int
+        How many branch points lie at most between ``start``'s branch and the others: 0 follows that branch alone.
+    symmetries : sequence of callable
+        Maps ``s(t, states) -> states`` of solutions to solutions (nodes t, states (K, n), same parameters), for states whose
+        parameters they leave alone: images of a branch count as that branch.
+    tolerance : float
+        Relative distance below which two branch points are one.
+
+    Returns
+    -------
+    Diagram
+        Failed switches are recorded at their junction.
+    """
+    checks.instance("start", start, Point, "a Point")
+    checks.whole("depth", depth, 0, 1000)
+    checks.number("tolerance", tolerance, 0)
+    for symmetry in checks.sequence("symmetries", symmetries, "functions"):
+        checks.function("symmetries", symmetry)
+    settings = settings_with(settings, options)
+    system, x = (
+        (start.system, start.x) if free is None else system_of(start, "start").with_free(checks.names("free", free), start.x)
+    )
+    return _Explorer(settings, symmetries, tolerance).run(system, x, depth)

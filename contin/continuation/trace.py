@@ -1,0 +1,49 @@
+"""Follow the branch through a point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from contin import checks
+from contin.continuation.run import follow
+from contin.detection.branch_point import BranchPoint
+from contin.errors import ProblemError
+from contin.results.branch import Branch
+from contin.results.point import Point, system_of
+from contin.stepping.settings import Settings, settings_with
+
+
+def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
+          **options: Any) -> Branch:  # fmt: skip
+    """Follow the branch through a point, or away from a branch point, to its end.
+
+    Parameters
+    ----------
+    start : Point
+        Of `solve`, of another branch, or read back.
+    settings : Settings, optional
+        Or any of its fields by name.
+    free : sequence of str, optional
+        Free parameters, if they shall differ from those of ``start``; the first is the primary one.
+    branch : int, optional
+        Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
+        the opposite way.
+
+    Raises
+    ------
+    ProblemError, ConvergenceError
+    """
+    checks.instance("start", start, Point, "a Point")
+    settings = settings_with(settings, options)
+    system, x = start.system, start.x
+    if free is not None and checks.names("free", free) != system.free:
+        system, x = system_of(start, "start").with_free(free, x)
+    if branch is None:
+        return follow(system, x, settings)
+    checks.whole("branch", branch, 0, 10)
+    if not isinstance(start.details, BranchPoint):
+        raise ProblemError("branch: the start is not a branch point")
+    if not 0 <= branch < len(start.details.tangents):
+        raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
+    return follow(system, x, settings, settings.direction * start.details.tangents[branch])

@@ -1,0 +1,67 @@
+"""A zero of a scalar function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from contin.errors import ConvergenceError
+
+#: Steps up to so many tolerances may be round-off.
+_IDLE = 1e3
+
+
+def find_zero(
+    function: Callable[[float], float], a: float, fa: float, b: float, fb: float, tolerance: float, guess: float | None = None
+) -> float:
+    """A zero of ``function`` between a and b, where its values fa and fb differ in sign; a place where it was evaluated.
+
+    Inverse quadratic interpolation through the last three places, the secant method with the Anderson-Björck rule where that
+    leaves the bracket or the ``guess`` is missing. Ends when the next step would be below ``tolerance``, or when close to that
+    the values no longer fall: they are round-off.
+
+    Raises
+    ------
+    ConvergenceError
+        If 60 evaluations do not do (a jump, not a zero).
+    """
+    if fb == 0:
+        return b
+    known = [(a, fa), (b, fb)]
+    best, idle, c = (np.inf, b), 0, guess
+    for _ in range(60):
+        if c is None or not min(a, b) < c < max(a, b):
+            c = b - fb * (b - a) / (fb - fa)
+            if not min(a, b) < c < max(a, b):
+                c = (a + b) / 2
+        fc = function(c)
+        if fc == 0:
+            return c
+        if fc * fb < 0:
+            a, fa = b, fb
+        else:
+            shrink = 1 - fc / fb
+            fa *= shrink if shrink > 0 else 0.5
+        b, fb = c, fc
+        known = [*known[-2:], (c, fc)]
+        following = _interpolated(known)
+        if following is None:
+            following = b - fb * (b - a) / (fb - fa)
+        move = abs(following - c)
+        if move <= tolerance:
+            return c
+        idle = idle + 1 if move < _IDLE * tolerance and abs(fc) > best[0] / 2 else 0
+        best = min(best, (abs(fc), c))
+        if idle == 2:
+            return best[1]
+        c = following
+    raise ConvergenceError(f"no zero between the two ends (last value {fc:.1e})")
+
+
+def _interpolated(known: list[tuple[float, float]]) -> float | None:
+    """Where the parabola through three places, as a function of the value, has value zero; None where there is none."""
+    (x, fx), (y, fy), (z, fz) = known
+    if fx == fy or fy == fz or fz == fx:
+        return None
+    return x * fy * fz / ((fx - fy) * (fx - fz)) + y * fx * fz / ((fy - fx) * (fy - fz)) + z * fx * fy / ((fz - fx) * (fz - fy))

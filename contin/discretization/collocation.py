@@ -1,0 +1,251 @@
+"""Orthogonal collocation at Gauss points on a mesh: the discrete problem, its residual and its Jacobian.
+
+On each of N intervals the solution is a polynomial of degree d through d + 1 Lobatto nodes (the end nodes shared), and
+satisfies the equation at the d Gauss points: error O(h^(2 d)) at the mesh points (superconvergence, de Boor & Swartz
+1973). Integrals use the same Gauss points, so they converge as fast.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.discretization.assembly import assemble, at_points, collocate
+from contin.discretization.basis import basis, interpolation
+from contin.discretization.mesh import MeshControl, adapted_mesh
+from contin.discretization.protocol import Carrier, Discretization
+from contin.discretization.system import System
+from contin.errors import ProblemError
+from contin.functions.colouring import Seeds
+from contin.linalg.condensation import Factorization
+from contin.linalg.factors import Factors
+from contin.linalg.layout import Layout, layout
+from contin.problems.boundary_value import BoundaryValueProblem
+
+
+class Collocation(System):
+    """A problem discretized on a mesh: what the continuation loop works on.
+
+    A vector ``x`` of unknowns, shape (size,), holds the states at the mesh's nodes in order, (N d + 1, n) flattened,
+    then the free parameters. A residual, shape (size - 1,) on a curve, holds collocation (scaled by h), boundary and
+    integral conditions.
+
+    Parameters
+    ----------
+    problem : BoundaryValueProblem
+    mesh : ndarray, shape (N + 1,)
+        Mesh points, increasing, from one end of the domain to the other.
+    degree : int
+        Polynomial degree d, 2 to 8 (AUTO's NCOL; N is its NTST).
+    free : sequence of str
+        The free parameters.
+    parameters : mapping of str to float
+        Values of all parameters; those of the free ones are ignored.
+
+    Raises
+    ------
+    ProblemError
+        An unknown parameter, a bad mesh or degree.
+    """
+
+    problem: BoundaryValueProblem
+
+    def __init__(
+        self,
+        problem: BoundaryValueProblem,
+        mesh: Sequence[float] | Array,
+        degree: int,
+        free: Sequence[str],
+        parameters: Mapping[str, float],
+    ) -> None:
+        super().__init__(problem, free, parameters)
+        self.degree = degree
+        self.basis = basis(degree)
+        self.mesh = np.array(mesh, dtype=float)
+        self._h = np.diff(self.mesh)
+        a, b = problem.domain
+        if self.mesh.ndim != 1 or self.mesh.size < 2 or not np.all(self._h > 0) or self.mesh[0] != a or self.mesh[-1] != b:
+            raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
+        self._n, self._d, self.intervals = len(problem.state_names), degree, self._h.size
+        self._times = (self.mesh[:-1, None] + self._h[:, None] * self.basis.points).ravel()
+        self._h_points = np.repeat(self._h, degree)[:, None]
+        self._quadrature = np.tile(self.basis.weights, self.intervals) * self._h_points[:, 0]
+        self._by_interval = degree * np.arange(self.intervals)[:, None] + np.arange(degree + 1)
+        self.state_size = (self.intervals * degree + 1) * self._n
+        self.size = self.state_size + len(self.free)
+        self.equations = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
+        node_weights = np.zeros(self.intervals * degree + 1)
+        shares = (self._h[:, None] * self.basis.node_weights) / (b - a)
+        for node in range(degree + 1):
+            node_weights[node : node + self.intervals * degree : degree] += shares[:, node]
+        #: Weights of the inner product: the mean over the domain of u.v, plus p.q of the free parameters.
+        self.weights = np.concatenate([np.repeat(node_weights, self._n), np.ones(len(self.free))])
+
+    @functools.cached_property
+    def _layout(self) -> Layout:
+        n = self._n
+        return layout(self.problem.batch("field").depends[:n, :n], self.degree)
+
+    @functools.cached_property
+    def _seeds(self) -> tuple[Seeds, Seeds]:
+        return self.problem.seeds(self._free, self._layout.order)
+
+    # --- vectors of unknowns -------------------------------------------------------------------------------------
+
+    @property
+    def nodes(self) -> Array:
+        """All nodes, shape (N d + 1,)."""
+        inner = (self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel()
+        return np.append(inner, self.mesh[-1])
+
+    def states(self, x: Array) -> Array:
+        """States at the nodes, a view of shape (N d + 1, n)."""
+        return x[: self.state_size].reshape(-1, self._n)
+
+    def _local(self, states: Array) -> Array:
+        """States by interval, shape (N, d + 1, n)."""
+        local: Array = states[self._by_interval]
+        return local
+
+    def at_gauss_points(self, x: Array) -> Array:
+        """States at the Gauss points, shape (N d, n)."""
+        points = np.empty((self._times.size, self._n))
+        at_points(self.basis.value, x, points)
+        return points
+
+    def evaluate(self, x: Array, times: Array) -> Array:
+        """States at ``times`` (m,), shape (m, n), by the piecewise polynomial."""
+        j = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, self.intervals - 1)
+        matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
+        states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self.states(x))[j])
+        return states
+
+    # --- the discrete equations ----------------------------------------------------------------------------------
+
+    def _residual(self, x: Array, field: Array, boundary: Array) -> Array:
+        residual = np.empty(self.equations)
+        collocate(self._n, self.basis.slope, self.basis.weights, self._h, x, field, boundary, residual)
+        return residual
+
+    def residual(self, x: Array) -> Array:
+        """Residual of the discrete equations at x, shape (equations,)."""
+        p, u = self.all_parameters(x), self.states(x)
+        field = self.problem.batch("field").values(self._times, self.at_gauss_points(x), _NONE(self._n), p)
+        boundary = self.problem.batch("boundary").values(_TIME, u[:1], u[-1:], p)
+        return self._residual(x, field, boundary)
+
+    def _blocks(
+        self, x: Array, rows: Array, columns: Array, new: Callable[[tuple[int, ...]], Array] = np.empty
+    ) -> tuple[Array, tuple[Array, Array, Array, Array, Array]]:
+        """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as `Factorization` takes them."""
+        problem, n, d, k = self.problem, self._n, self._d, len(self.free)
+        p, u = self.all_parameters(x), self.states(x)
+        points = self.at_gauss_points(x)
+        of_field, of_boundary = self._seeds
+        field, jacobian = problem.batch("field").jacobian(self._times, points, _NONE(n), p, of_field)
+        boundary, ends = problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
+        c, r = len(columns), len(rows) + problem.integral_size
+        conditions, width = problem.boundary_size, n * (d + 1) + k + c
+        blocks = (
+            new((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k + c)),
+            np.empty((conditions, n)), np.empty((conditions, n + k + c)),
+        )  # fmt: skip
+        tables = (self.basis.value, self.basis.slope, self.basis.weights)
+        assemble(tuple(self._layout), *tables, self._h, jacobian, ends, columns, rows, *blocks)
+        return self._residual(x, field, boundary), blocks
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Residual at x, and the factored matrix [[F_x, columns^T], [rows]].
+
+        ``rows`` (r, size + c) and ``columns`` (c, equations) make it square: size + c = equations + r. Equations of
+        the result are ordered [residual | rows], unknowns [x | multipliers of the columns].
+        """
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        residual, blocks = self._blocks(x, rows, columns)
+        return residual, Factorization(self._layout, *blocks)
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
+        n, p, u = self._n, self.all_parameters(x), self.states(x)
+        of_field, of_boundary = self.problem.seeds(self._indices(names), self._layout.order)
+        field = self.problem.batch("field").jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, :, n:]
+        ends = self.problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0, :, 2 * n :]
+        collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
+        return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self._quadrature, field[:, n:])])
+
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """F_x^T w, shape (size,), for w (equations,)."""
+        n = self._n
+        _, (local, border, corner, first, last) = self._blocks(
+            x, np.empty((0, self.size)), np.empty((0, self.equations)), np.zeros
+        )
+        layout, collocation = self._layout, self.intervals * self._d * n
+        conditions, inner = collocation + len(first), n * (self._d - 1)
+        by_interval = w[:collocation].reshape(self.intervals, -1)[:, layout.rows]
+        inside = np.einsum("jr,jrc->jc", by_interval, local)
+        inside[:, : inner + 2 * n] += np.einsum("q,jqc->jc", w[conditions:], border[:, :, : inner + 2 * n])
+        result = np.zeros(self.size)
+        at = self._d * n * np.arange(self.intervals)[:, None]
+        np.add.at(result, at + layout.inside, inside[:, :inner])
+        np.add.at(result, at + layout.ends, inside[:, inner : inner + 2 * n])
+        result[:n] += first.T @ w[collocation:conditions]
+        result[self.state_size - n :] += last.T @ w[collocation:conditions]
+        result[self.state_size :] += inside[:, inner + 2 * n :].sum(axis=0) + corner.T @ w[conditions:]
+        return result
+
+    def functionals(self, x: Array) -> Array:
+        """Values of the problem's functionals, in their order, by the same quadrature."""
+        if not self.problem.functionals:
+            return np.empty(0)
+        batch = self.problem.batch("functionals")
+        values = batch.values(self._times, self.at_gauss_points(x), _NONE(self._n), self.all_parameters(x))
+        integrals: Array = self._quadrature @ values
+        return integrals
+
+    # --- meshes --------------------------------------------------------------------------------------------------
+
+    def carrier(self, other: Discretization) -> Carrier:
+        """The function that carries vectors of unknowns from this mesh to the mesh of another system."""
+        nodes = other.nodes
+        return lambda x: np.concatenate([self.evaluate(x, nodes).ravel(), x[self.state_size :]])
+
+    def on_mesh(self, mesh: Array) -> tuple[Collocation, Carrier]:
+        """The same problem on another mesh, and the function that carries vectors of unknowns over to it."""
+        values = dict(zip(self.problem.parameters, self.parameters))
+        other = Collocation(self.problem, mesh, self.degree, self.free, values)
+        return other, self.carrier(other)
+
+    def refined(self) -> tuple[Collocation, Carrier]:
+        """The same problem with every interval halved, and the carrier."""
+        return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
+
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
+        """The same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
+        mesh = adapted_mesh(self.basis, self.mesh, self.states(x), control) if control.every else None
+        return None if mesh is None else self.on_mesh(mesh)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Collocation:
+        """The same problem with other values of parameters that are not free."""
+        names = dict(zip(self.problem.parameters, self.parameters)) | dict(values)
+        return Collocation(self.problem, self.mesh, self.degree, self.free, names)
+
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[Collocation, Array]:
+        """The same problem with other free parameters (values from x), on the same mesh, and x for it."""
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        other = Collocation(self.problem, self.mesh, self.degree, free, values)
+        return other, other.pack(self.states(x), values)
+
+
+_TIME = np.zeros(1)
+
+
+@functools.cache
+def _NONE(n: int) -> Array:
+    """The absent second state of a function of one point."""
+    return np.empty((0, n))

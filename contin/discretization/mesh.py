@@ -1,0 +1,97 @@
+"""Where the mesh points belong: an error monitor, equidistribution, and how many intervals it takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.discretization.basis import Basis
+from contin.errors import ProblemError
+
+#: More intervals than any machine has room for.
+MOST_INTERVALS = 1_000_000
+
+
+@dataclass(frozen=True)
+class MeshControl:
+    """When and to what the mesh adapts.
+
+    Attributes
+    ----------
+    tolerance : float
+        Wanted error at the mesh points. Collocation is superconvergent there, h^(2 d), while the monitor sees the error
+        h^(d+1) between them; so that one is kept below 0.03 tolerance^((d+1)/(2 d)).
+    min_intervals, max_intervals : int
+        Bounds on the number of intervals N.
+    every : int
+        Steps between looks at the mesh; 0 keeps it as it is.
+    """
+
+    tolerance: float = 1e-12
+    min_intervals: int = 8
+    max_intervals: int = 2000
+    every: int = 3
+
+    def __post_init__(self) -> None:
+        checks.number("mesh tolerance", self.tolerance, 0, 1)
+        checks.whole("min_intervals", self.min_intervals, 1, MOST_INTERVALS)
+        checks.whole("max_intervals", self.max_intervals, 1, MOST_INTERVALS)
+        if self.min_intervals > self.max_intervals:
+            raise ProblemError(f"intervals: {self.min_intervals} to {self.max_intervals} must be in order")
+        checks.whole("every", self.every, 0, 1_000_000)
+
+
+def density(basis: Basis, mesh: Array, states: Array) -> Array:
+    """The (d+1)-th root of the size of the (d+1)-th derivative, by interval, shape (N,).
+
+    The derivative comes from differences of the d-th ones of neighbouring intervals (de Boor 1973, as in AUTO and COLSYS),
+    each component scaled by max(1, max |u|).
+
+    Parameters
+    ----------
+    basis : Basis
+    mesh : ndarray, shape (N + 1,)
+    states : ndarray, shape (N d + 1, n)
+        At the nodes.
+    """
+    d, h = basis.degree, np.diff(mesh)
+    if h.size < 2:
+        return np.ones(1)
+    local = states[d * np.arange(h.size)[:, None] + np.arange(d + 1)]
+    derivative = np.einsum("l,jla->ja", basis.highest, local) / h[:, None] ** d
+    jumps = np.abs(np.diff(derivative, axis=0)) / ((h[1:] + h[:-1]) / 2)[:, None]
+    jumps = np.max(jumps / np.maximum(1.0, np.abs(states).max(axis=0)), axis=1)
+    both = np.empty((2, h.size))
+    both[0, 1:], both[1, :-1] = jumps, jumps
+    both[0, 0], both[1, -1] = jumps[0], jumps[-1]
+    result: Array = both.max(axis=0) ** (1 / (d + 1))
+    return result
+
+
+def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl) -> Array | None:
+    """A better mesh for a solution, given by its states at the nodes, or None where the present one is good enough.
+
+    It equidistributes the monitor (smoothed, and raised to at least a tenth of its mean so that no interval grows without
+    bound) over as many intervals as ``control.tolerance`` takes, by the interpolation error of degree d.
+    """
+    h, d = np.diff(mesh), basis.degree
+    phi = density(basis, mesh, states)
+    padded = np.pad(phi, 1, mode="edge")
+    phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
+    phi = np.maximum(phi, 0.1 * (phi @ h) / h.sum())
+    total = phi @ h
+    allowed = (0.03 * control.tolerance ** ((d + 1) / (2 * d)) / basis.constant) ** (1 / (d + 1))
+    wanted = int(np.clip(np.ceil(total / allowed), control.min_intervals, control.max_intervals))
+    enough = wanted <= h.size <= max(1.6 * wanted, control.min_intervals)
+    if enough and (phi * h).max() <= 1.5 * max(total / h.size, allowed * wanted / h.size):
+        return None
+    intervals = h.size if enough else wanted
+    if not total > 0:
+        return np.linspace(mesh[0], mesh[-1], intervals + 1)
+    share = np.concatenate([[0.0], np.cumsum(phi * h)]) / total
+    new: Array = np.interp(np.linspace(0, 1, intervals + 1), share, mesh)
+    new[0], new[-1] = mesh[0], mesh[-1]
+    return new

@@ -1,0 +1,19 @@
+"""Protocol of a factored square matrix."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from contin.arrays import Array
+
+
+class Factors(Protocol):
+    """A factored square matrix J: solves with it and with its transpose, for one right-hand side or for several as rows."""
+
+    sign: float
+
+    def solve(self, b: Array) -> Array:
+        """The x with J x = b."""
+
+    def solve_transposed(self, c: Array) -> Array:
+        """The y with J^T y = c."""

@@ -1,0 +1,61 @@
+"""Singular vectors of the smallest singular values, by inverse iteration."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.functions.compiler import KERNEL, njit
+from contin.linalg.factors import Factors
+
+#: Singular directions watched between two points.
+_WATCHED = 3
+
+
+@functools.lru_cache(maxsize=8)
+def _random_block(count: int, size: int) -> Array:
+    block = np.random.default_rng(5).standard_normal((count, size))
+    block.flags.writeable = False
+    return block
+
+
+@njit("void(f8[:,::1])", **KERNEL)
+def _orthonormalize(rows: Array) -> None:
+    """Make the rows orthonormal, in place: Gram-Schmidt, twice."""
+    count, size = rows.shape
+    for i in range(count):
+        largest = 0.0
+        for k in range(size):
+            largest = max(largest, abs(rows[i, k]))
+        for k in range(size):  # near a bifurcation solutions are huge
+            rows[i, k] /= largest
+        for turn in range(2 * i + 1):
+            j = turn % i if turn < 2 * i else i
+            product = 0.0
+            for k in range(size):
+                product += rows[j, k] * rows[i, k]
+            for k in range(size):
+                rows[i, k] = rows[i, k] - product * rows[j, k] if j < i else rows[i, k] / np.sqrt(product)
+
+
+def smallest_directions(factors: Factors, size: int, rounds: int = 2) -> tuple[Array, Array, Array]:
+    """Right and left singular vectors, as rows, of the smallest singular values: inverse iteration on a block.
+
+    It starts from random vectors, not from those of the point before: a run resumed must decide as one undisturbed.
+
+    Returns
+    -------
+    right, left : ndarray, shape (count, size)
+    response : ndarray, shape (count, count)
+        right J^-1 left^T: about the reciprocals of the singular values.
+    """
+    right = _random_block(min(_WATCHED, size), size)
+    for _ in range(rounds):
+        left = factors.solve_transposed(right)
+        _orthonormalize(left)
+        solved = factors.solve(left)
+        right = solved.copy()
+        _orthonormalize(right)
+    return right, left, right @ solved.T

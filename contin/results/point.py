@@ -1,0 +1,80 @@
+"""Point: one solution on a branch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.discretization.protocol import Discretization
+from contin.discretization.system import System
+from contin.errors import ProblemError
+from contin.stepping.trial import Trial
+
+
+def system_of(point: Point, what: str) -> System:
+    """The system of a point, where other parameters of its problem may become free.
+
+    Raises
+    ------
+    ProblemError
+        A point of a curve in two parameters; ``what`` names the argument.
+    """
+    if not isinstance(point.system, System):
+        raise ProblemError(f"{what}: must not be a point of a curve in two parameters")
+    return point.system
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One solution on a branch.
+
+    Attributes
+    ----------
+    label : str
+        AUTO's two letters: EP end, LP fold (limit point), BP branch point, UZ user zero, MX failed; "" for a regular point.
+    name : str
+        What the label refers to (the monitor's name), "" for a regular point.
+    parameters, functionals : mapping of str to float
+        All parameters; the problem's functionals.
+    x, tangent : ndarray, shape (size,)
+        Unknowns of ``system``, and the unit tangent (``nan`` at a branch point, which has several).
+    system : Discretization
+        The discretized problem of this point.
+    arclength : float
+        Distance travelled from the branch's first point, in the weighted norm.
+    iterations, newton_error : int, float
+        Newton iterations taken, and the estimated error that they left (the largest, relative to 1 + |x|).
+    errors : mapping of str to float
+        Estimated error of the free parameters, where it was asked for: of the discretization or, without a mesh, of the
+        location alone. NaN where the point was not found again, and at points of higher codimension.
+    details : object
+        What the location found besides: the `contin.switching.BranchPoint` of a BP.
+    """
+
+    label: str
+    name: str
+    parameters: Mapping[str, float]
+    functionals: Mapping[str, float]
+    x: Array
+    tangent: Array
+    system: Discretization
+    arclength: float
+    iterations: int
+    newton_error: float
+    errors: Mapping[str, float] = field(default_factory=dict)
+    details: Any = None
+
+    def __getitem__(self, name: str) -> float:
+        """A parameter or functional by name."""
+        return self.parameters[name] if name in self.parameters else self.functionals[name]
+
+
+def point_of(system: Discretization, x: Array, iterations: int = 0, error: float = 0.0) -> Point:
+    """A Point of any solution x of a system."""
+    trial = Trial(system, x, np.full_like(x, np.nan), np.nan)
+    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+    return Point("", "", parameters, trial.functionals, x, trial.tangent, system, 0.0, iterations, error)

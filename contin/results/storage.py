@@ -1,0 +1,126 @@
+"""Branches in files: one ``.npz`` without pickles, from which every point can start another run."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.detection.branch_point import BranchPoint
+from contin.discretization.algebraic import Algebraic
+from contin.discretization.collocation import Collocation
+from contin.errors import ProblemError
+from contin.functions.cache import write_bytes
+from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.boundary_value import BoundaryValueProblem
+from contin.results.branch import Branch
+from contin.results.point import Point
+from contin.stepping.state import Stop
+
+_FORMAT = "contin branch 1"
+_OF_BRANCH_POINT = ("kernel", "left", "hessian")
+
+
+def save(branch: Branch, path: str | Path) -> None:
+    """Write a branch: all its points, with their solutions.
+
+    The problem itself is code and is not stored: `load` takes it again. Details of branch points are kept, those of other
+    events are not.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; the one that was there is left as it was.
+    ProblemError
+        Points of an extended system (`contin.curve`), which cannot start other runs.
+    """
+    checks.instance("branch", branch, Branch, "a Branch")
+    if not branch.points:
+        raise ProblemError("branch: has no points")
+    systems: list[Collocation | Algebraic] = []
+    rows: list[dict[str, Any]] = []
+    arrays: dict[str, Any] = {}
+    for number, point in enumerate(branch.points):
+        if not isinstance(point.system, (Collocation, Algebraic)):
+            raise ProblemError("points of a curve in two parameters are not stored; keep their columns")
+        at = next((i for i, system in enumerate(systems) if system is point.system), len(systems))
+        if at == len(systems):
+            systems.append(point.system)
+            arrays[f"parameters{at}"] = point.system.parameters
+            if isinstance(point.system, Collocation):
+                arrays[f"mesh{at}"] = point.system.mesh
+        arrays[f"x{number}"], arrays[f"tangent{number}"] = point.x, point.tangent
+        if isinstance(point.details, BranchPoint):
+            for name in _OF_BRANCH_POINT:
+                arrays[f"{name}{number}"] = getattr(point.details, name)
+            arrays[f"tangents{number}"] = np.array(point.details.tangents)
+        rows.append({
+            "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
+            "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
+            "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
+        })  # fmt: skip
+    first = branch.points[0].system
+    stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
+    head = {
+        "format": _FORMAT, "points": rows, "stop": stop, "free": first.free, "degrees": [s.degree for s in systems],
+        "states": first.problem.states, "names": list(first.problem.parameters),
+    }  # fmt: skip
+    image = io.BytesIO()
+    np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
+    write_bytes(Path(path), image.getvalue())
+
+
+def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> Branch:
+    """Read a branch back, as points of ``problem``.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    ProblemError
+        It is no branch, or one of a problem with other states or parameters.
+    """
+    checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
+    with open(path, "rb"):
+        pass  # a file that cannot be read is an OSError; whatever goes wrong below is in what it holds
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            head = json.loads(file["head"].tobytes())
+            if head["format"] != _FORMAT:
+                raise KeyError("format")
+            arrays = {name: file[name] for name in file.files}
+        if tuple(head["states"]) != problem.state_names or head["names"] != list(problem.parameters):
+            raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
+        systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
+        points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
+        return Branch(points, Stop(*head["stop"]) if head["stop"] else None)
+    except ProblemError:
+        raise
+    except Exception as error:  # zip, zlib, json, numpy, and memory have many ways to say that a file is damaged
+        raise ProblemError(f"{str(path)!r} is no branch stored by contin, or damaged") from error
+
+
+def _system(
+    problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, Any], arrays: dict[str, Array], i: int
+) -> Collocation | Algebraic:
+    values = dict(zip(head["names"], arrays[f"parameters{i}"]))
+    if isinstance(problem, AlgebraicProblem):
+        return Algebraic(problem, head["free"], values)
+    return Collocation(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values)
+
+
+def _point(row: dict[str, Any], system: Collocation | Algebraic, arrays: dict[str, Array], number: int) -> Point:
+    x, details = arrays[f"x{number}"], None
+    if row["imperfection"] is not None:
+        kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}
+        details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)
+    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+    return Point(
+        row["label"], row["name"], parameters, row["functionals"], x, arrays[f"tangent{number}"], system, row["arclength"],
+        row["iterations"], row["newton_error"], row["errors"], details,
+    )  # fmt: skip

@@ -1,0 +1,114 @@
+"""What to follow, how carefully, and where to stop."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from contin import checks
+from contin.discretization.mesh import MeshControl
+from contin.errors import ProblemError
+from contin.stepping.newton import Newton
+from contin.stepping.trial import Monitor
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What to follow, how carefully, and where to stop. Frozen, checked when made.
+
+    Attributes
+    ----------
+    primary : str, optional
+        The parameter of folds and of the printed columns; the first free one by default.
+    direction : int
+        +1 or -1: the way to go from the first point, by the sign of the primary parameter's change.
+    step, min_step, max_step : float
+        First, smallest and largest step of arclength.
+    max_points : int
+        Regular points after which the run ends.
+    limits : mapping of str to pair of float
+        The run ends where a parameter or functional leaves its interval.
+    zeros : mapping of str to sequence of float
+        Values of parameters or functionals to label (UZ).
+    trivial : str, optional
+        A parameter or functional that vanishes on a known trivial branch only: the run ends where it changes sign.
+    monitors : sequence of Monitor
+        Events of one's own.
+    folds, branch_points, errors : bool
+        Whether to look for folds, for branch points, and to solve labelled points again on the mesh halved, until that
+        changes them by less than the mesh tolerance: the last change is their error estimate.
+    angle : float
+        Largest angle between the tangents of consecutive points, radians.
+    change : float
+        Largest change of any free parameter p in one step, as a fraction of 1 + |p|.
+    accuracy : float
+        Distance between predicted and corrected point that the step aims at, as a fraction of the step.
+    newton, mesh :
+        See `Newton`, `MeshControl`.
+    """
+
+    primary: str | None = None
+    direction: int = 1
+    step: float = 0.05
+    min_step: float = 1e-6
+    max_step: float = 1e6
+    max_points: int = 2000
+    limits: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    zeros: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    trivial: str | None = None
+    monitors: Sequence[Monitor] = ()
+    folds: bool = True
+    branch_points: bool = True
+    errors: bool = True
+    angle: float = 0.35
+    change: float = 0.4
+    accuracy: float = 0.02
+    newton: Newton = field(default_factory=Newton)
+    mesh: MeshControl = field(default_factory=MeshControl)
+
+    def __post_init__(self) -> None:
+        for name in ("primary", "trivial"):
+            if getattr(self, name) is not None:
+                checks.instance(name, getattr(self, name), str, "a name")
+        for name in ("folds", "branch_points", "errors"):
+            checks.truth(name, getattr(self, name))
+        if not checks.is_number(self.direction) or self.direction not in (1, -1):
+            raise ProblemError(f"direction: {checks.shown(self.direction)} must be +1 or -1")
+        for name in ("step", "min_step"):
+            checks.number(name, getattr(self, name), 0)
+        if not checks.is_number(self.max_step) or not self.min_step <= self.step <= self.max_step:
+            bounds = f"min_step = {self.min_step:g} and max_step = {checks.shown(self.max_step)}"
+            raise ProblemError(f"step: {self.step:g} must lie between {bounds}")
+        checks.whole("max_points", self.max_points, 1, 10**9)
+        for name in ("angle", "accuracy", "change"):
+            checks.number(name, getattr(self, name), 0, 1.5)
+        for name, ends in checks.mapping("limits", self.limits, "pairs of numbers").items():
+            what, allowed = f"limits: {checks.plain(name)}", "two numbers, the first the smaller"
+            pair = tuple(checks.sequence(what, ends, allowed))
+            if len(pair) != 2 or not all(map(checks.is_number, pair)) or not pair[0] < pair[1]:
+                raise ProblemError(f"{what}: {checks.shown(ends)} must be {allowed}")
+        for name, values in checks.mapping("zeros", self.zeros, "lists of numbers").items():
+            for value in checks.sequence(f"zeros: {checks.plain(name)}", values, "numbers"):
+                checks.number(f"zeros: {checks.plain(name)}", value)
+        for monitor in checks.sequence("monitors", self.monitors, "Monitor"):
+            checks.instance("monitors", monitor, Monitor, "a Monitor")
+        checks.instance("newton", self.newton, Newton, "a Newton")
+        checks.instance("mesh", self.mesh, MeshControl, "a MeshControl")
+
+
+def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:
+    """The settings with some fields changed.
+
+    Raises
+    ------
+    ProblemError
+        A field that there is not, or a value that it cannot have.
+    """
+    checks.instance("settings", settings, (Settings, type(None)), "a Settings")
+    known = [entry.name for entry in dataclasses.fields(Settings)]
+    for name in options:
+        if name not in known:
+            raise ProblemError(f"there is no setting {name!r}; known are {', '.join(known)}")
+    return dataclasses.replace(settings or Settings(), **options)
