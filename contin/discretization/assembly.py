@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.functions.compiler import KERNEL, njit
+from contin.functions.compiler import Matrix, ReadOnlyVector, Vector, kernel, njit
 from contin.linalg.vector import scale_into
 
 
-@njit("void(f8[:,::1], Array(f8, 1, 'C', readonly=True), f8[:,::1])", **KERNEL)
-def at_points(value: Array, x: Array, points: Array) -> None:
+@kernel
+def at_points(value: Matrix, x: ReadOnlyVector, points: Matrix) -> None:
     """Fill ``points`` (N d, n) with the states at the Gauss points, from the nodal values in x."""
     d = value.shape[0]
     count, n = points.shape
@@ -27,8 +27,10 @@ def at_points(value: Array, x: Array, points: Array) -> None:
                     row[a] += factor * x[start + a]
 
 
-@njit("void(i8, f8[:,::1], f8[::1], f8[::1], Array(f8, 1, 'C', readonly=True), f8[:,::1], f8[:,::1], f8[::1])", **KERNEL)
-def collocate(n: int, slope: Array, weights: Array, h: Array, x: Array, field: Array, boundary: Array, residual: Array) -> None:
+@kernel
+def collocate(
+    n: int, slope: Matrix, weights: Vector, h: Vector, x: ReadOnlyVector, field: Matrix, boundary: Matrix, residual: Vector
+) -> None:
     """Fill the ``residual`` from values of rhs and integrands at the Gauss points (N d, n + n_int) and boundary (1, n_bc)."""
     d, conditions, integrals = weights.size, boundary.shape[1], field.shape[1] - n
     last = residual[residual.size - integrals :]

@@ -1,4 +1,4 @@
-"""Where compiled code is kept; nothing here imports numba, so that it can be told in time."""
+"""The folder for compiled problems and generated code."""
 
 from __future__ import annotations
 
@@ -78,22 +78,3 @@ def write_source(name: str, text: str) -> Path:
     except OSError as error:
         raise ContinError(f"no place for compiled code: {folder} and {path.parent}: {error.strerror}; {_ADVICE}") from error
     return path
-
-
-def _tell_numba() -> None:
-    """Give numba a place for the engine's kernels where neither the package's folder nor the user's cache can be written."""
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return
-    package = Path(__file__).resolve().parent
-    beside = package / "__pycache__"
-    if os.access(beside if beside.exists() else package, os.W_OK):
-        return
-    try:
-        os.environ["NUMBA_CACHE_DIR"] = str(cache_directory() / "engine")
-    except ContinError:
-        return  # nothing is kept then; what needs a place says so
-    if "numba" in sys.modules:
-        sys.modules["numba"].config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]
-
-
-_tell_numba()

@@ -1,65 +1,103 @@
-"""numba's ``njit`` with a cache on disk that can only help: what it cannot read is compiled anew."""
+"""The gate to the compiler: kernels of the engine, compiled by numba and kept on disk.
+
+Nothing outside contin/functions imports numba. A kernel is a Python function whose annotations are its signature:
+
+    @kernel
+    def scale(factor: float, x: Vector) -> None:
+        for i in range(x.size):
+            x[i] *= factor
+
+It is compiled where it is defined, or read from the cache. A `helper` is compiled when the first kernel that calls it is.
+The cache can only help: a file that cannot be read, written or trusted costs time, never an answer.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, overload
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints, overload
 
 import numba
 from numba.core import sigutils
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from contin.arrays import Array, Indices
+from contin.errors import ContinError
+from contin.functions.cache import cache_directory
 
-class _ForgivingCache(FunctionCache):
-    """Machine code of one function on disk.
+# Arrays as kernels see them: contiguous, of one kind of number, with so many dimensions.
+Vector = Annotated[Array, "f8[::1]"]
+Matrix = Annotated[Array, "f8[:,::1]"]
+Stack = Annotated[Array, "f8[:,:,::1]"]
+IndexVector = Annotated[Indices, "i8[::1]"]
+IndexMatrix = Annotated[Indices, "i8[:,::1]"]
+ReadOnlyVector = Annotated[Array, "Array(f8, 1, 'C', readonly=True)"]
+ReadOnlyMatrix = Annotated[Array, "Array(f8, 2, 'C', readonly=True)"]
 
-    A power cut may leave half a file, a quota may be used up. And processes that compile at the same time may take the same
-    name for the code of two signatures (numba writes its index without a lock), so what was loaded is looked at.
-
-    The engine's kernels consist of `contin._vector` too: numba looks at the file of a function only, so that a change there
-    would go unnoticed.
-    """
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
-        if function.__module__.startswith("contin."):
-            vector = (Path(__file__).parent.parent / "linalg" / "vector.py").stat()
-            stamp = (*self._impl.locator.get_source_stamp(), vector.st_mtime, vector.st_size)
-            self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        try:
-            found = super().load_overload(sig, target_context)
-        except Exception:  # whatever unpickling garbage raises
-            with contextlib.suppress(OSError):
-                self.flush()
-            return None
-        args, _ = sigutils.normalize_signature(sig)
-        return found if found is not None and tuple(found.signature.args) == tuple(args) else None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        try:
-            super().save_overload(sig, data)
-        except OSError as error:
-            _not_kept(str(self.cache_path), error.strerror or str(error))
-
-
-@functools.cache
-def _not_kept(folder: str, reason: str) -> None:
-    """Say, once, why compiled code is not kept."""
-    print(
-        f"contin: compiled code is not kept in {folder} ({reason}); set CONTIN_CACHE_DIR and NUMBA_CACHE_DIR", file=sys.stderr
-    )
-
-
-#: Options of the engine's kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
-KERNEL: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
+#: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+@overload
+def kernel(function: _Function) -> _Function: ...
+
+
+@overload
+def kernel(*, reorder: bool = True) -> Callable[[_Function], _Function]: ...
+
+
+def kernel(function: Any = None, *, reorder: bool = True) -> Any:
+    """Compile a function for the types in its annotations.
+
+    These are ``int``, ``float``, ``None``, the arrays above, and named tuples of them. Without ``reorder`` sums and products
+    are evaluated one by one as they stand.
+
+    Raises
+    ------
+    TypeError
+        An annotation of another kind.
+    """
+    if function is None:
+        return functools.partial(kernel, reorder=reorder)
+    hints = get_type_hints(function, include_extras=True)
+    result = _compiler_type(hints.pop("return"))
+    options = _OPTIONS if reorder else {**_OPTIONS, "fastmath": False}
+    return njit(result(*map(_compiler_type, hints.values())), cache=True, **options)(function)
+
+
+@overload
+def helper(function: _Function) -> _Function: ...
+
+
+@overload
+def helper(*, inline: bool = False) -> Callable[[_Function], _Function]: ...
+
+
+def helper(function: Any = None, *, inline: bool = False) -> Any:
+    """Let kernels call a function; with ``inline`` its statements are put in place of every call."""
+    if function is None:
+        return functools.partial(helper, inline=inline)
+    return njit(cache=True, inline="always" if inline else "never", **_OPTIONS)(function)
+
+
+def _compiler_type(hint: Any) -> Any:
+    """Return numba's type for an annotation."""
+    if get_origin(hint) is Annotated:
+        return eval(get_args(hint)[1], dict(vars(numba.types)))
+    if isinstance(hint, type) and hasattr(hint, "_fields"):
+        fields = get_type_hints(hint, include_extras=True)
+        return numba.types.BaseTuple.from_types([_compiler_type(field) for field in fields.values()], hint)
+    try:
+        return {int: numba.types.int64, float: numba.types.float64, type(None): numba.types.void}[hint]
+    except (KeyError, TypeError):
+        raise TypeError(f"{hint!r} is no type of a kernel's argument") from None
 
 
 @overload
@@ -67,24 +105,92 @@ def njit(signature: _Function, **options: Any) -> _Function: ...
 
 
 @overload
-def njit(signature: str | None = None, *, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]: ...
+def njit(signature: Any = None, *, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]: ...
 
 
-def njit(signature: str | Callable[..., Any] | None = None, *, cache: bool = False, **options: Any) -> Any:
-    """``numba.njit``, with that cache where ``cache`` is asked for."""
-    if callable(signature):
+def njit(signature: Any = None, *, cache: bool = False, **options: Any) -> Any:
+    """``numba.njit`` with the cache on disk described above where ``cache`` is asked for."""
+    if callable(signature) and not isinstance(signature, numba.core.typing.templates.Signature):
         return numba.njit(signature, **options)
 
     def compiled(function: Callable[..., Any]) -> Any:
         dispatcher = numba.njit(function, **options)
         if cache:
             try:
-                dispatcher._cache = _ForgivingCache(function)
+                dispatcher._cache = _DiskCache(function)
             except RuntimeError as error:  # numba found no folder that it may write to
-                _not_kept("any folder", str(error).splitlines()[0])
+                _warn_not_kept("any folder", str(error).splitlines()[0])
         if signature is not None:
             dispatcher.compile(signature)
             dispatcher.disable_compile()
         return dispatcher
 
     return compiled
+
+
+class _DiskCache(FunctionCache):
+    """Machine code of one function on disk.
+
+    Numba's own cache raises where a power cut left half a file or a quota is used up. Processes that compile at the same
+    time may take the same name for the code of two signatures (its index has no lock), so the signature of loaded code is
+    checked. And numba looks at the modification time of the function's own file only, while a kernel also consists of the
+    functions that it calls: here the contents of all files that kernels are made of count.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        stamp = _contents(Path(function.__code__.co_filename)), _engine()
+        self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function, or None where there is none that can be used."""
+        try:
+            found = super().load_overload(sig, target_context)
+        except Exception:  # unpickling a damaged file can raise anything
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+        args, _ = sigutils.normalize_signature(sig)
+        return found if found is not None and tuple(found.signature.args) == tuple(args) else None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled function; a line on stderr says so where that fails."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _warn_not_kept(str(self.cache_path), error.strerror or str(error))
+
+
+@functools.cache
+def _contents(*files: Path) -> str:
+    """Return a fingerprint of what files hold."""
+    return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
+
+
+@functools.cache
+def _engine() -> str:
+    """Return a fingerprint of the files that hold what kernels call: the room linalg, and this file."""
+    return _contents(Path(__file__), *sorted((Path(__file__).parent.parent / "linalg").glob("*.py")))
+
+
+@functools.cache
+def _warn_not_kept(folder: str, reason: str) -> None:
+    """Say once why compiled code is not kept."""
+    print(
+        f"contin: compiled code is not kept in {folder} ({reason}); set CONTIN_CACHE_DIR and NUMBA_CACHE_DIR", file=sys.stderr
+    )
+
+
+def _place_cache() -> None:
+    """Choose a folder for the engine's kernels where the package's own cannot be written."""
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return
+    package = Path(__file__).resolve().parent
+    beside = package / "__pycache__"
+    if os.access(beside if beside.exists() else package, os.W_OK):
+        return
+    with contextlib.suppress(ContinError):  # without any folder nothing is kept; what needs one says so
+        os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = str(cache_directory() / "engine")
+
+
+_place_cache()

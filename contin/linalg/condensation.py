@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.functions.compiler import KERNEL, njit
+from contin.functions.compiler import _OPTIONS, helper, njit
 from contin.linalg.layout import Layout
 from contin.linalg.vector import (
     LANES,
@@ -52,7 +52,7 @@ from contin.linalg.vector import (
 # Loops instead of numpy assignments: numba compiles them ten times faster, and they run as fast.
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _copy(target, source):
     """target[...] = source for two matrices."""
     for i in range(target.shape[0]):
@@ -60,7 +60,7 @@ def _copy(target, source):
             target[i, j] = source[i, j]
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _copy_columns(target, first, source, columns):
     """target[:, first + b] = source[:, columns[b]]."""
     for i in range(source.shape[0]):
@@ -68,12 +68,12 @@ def _copy_columns(target, first, source, columns):
             target[i, first + b] = source[i, columns[b]]
 
 
-@njit(inline="always", **KERNEL)
+@helper(inline=True)
 def _address(matrix, i, j):
     return matrix.ctypes.data + i * matrix.strides[0] + 8 * j
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _subtract(target, stride, rows, factors, step, pivots, apart, length, count):
     """`subtract_products` for any number of rows, four at a time, and up to four pivots."""
     while rows >= 4:
@@ -98,7 +98,7 @@ def _subtract(target, stride, rows, factors, step, pivots, apart, length, count)
         target, factors, rows = target + stride, factors + step, rows - 1
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _finish_pivots(rows, stride, factors, length, count):
     """`solve_triangle` for up to four rows."""
     if count == 4:
@@ -109,7 +109,7 @@ def _finish_pivots(rows, stride, factors, length, count):
         solve_triangle(rows, stride, factors, length, 2)
 
 
-@njit(inline="always", **KERNEL)
+@helper(inline=True)
 def _subtract_panel(rows, i, count, block, pivot, start, size, right, tail):
     """Subtract multiples of ``size`` rows of ``block`` from ``count`` rows from i on, up to ``right`` and from ``tail`` on.
 
@@ -123,7 +123,7 @@ def _subtract_panel(rows, i, count, block, pivot, start, size, right, tail):
         _subtract(target + 8 * tail, stride, count, factors, stride, pivots + 8 * tail, apart, rows.shape[1] - tail, size)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _eliminate(block, top, bottom, left, right, tail, pivots):
     """Eliminate columns left ... right of ``block`` (rows, width) by partial pivoting among the rows top ... bottom, in place.
 
@@ -172,7 +172,7 @@ def _eliminate(block, top, bottom, left, right, tail, pivots):
     return sign
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _invert_triangles(block, apart, size):
     """`invert_triangles` for any size up to that of a panel."""
     if size == 4:
@@ -185,7 +185,7 @@ def _invert_triangles(block, apart, size):
         invert_triangles(block, apart, 1)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _multiply_rows(rows, i, count, start, block, first, size):
     """rows[i : i + count, start : start + size] times the upper triangle of ``block`` at row ``first`` and the same columns."""
     if start + PANEL > rows.shape[1]:
@@ -208,7 +208,7 @@ def _multiply_rows(rows, i, count, start, block, first, size):
         multiply_rows(there, stride, count, triangle, apart, 1)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _reduce(rows, i, count, block, top, left, right, tail):
     """Take the same columns out of ``count`` rows from i on, never pivots, by the pivot rows of ``block`` from ``top`` on."""
     finish = right
@@ -223,7 +223,7 @@ def _reduce(rows, i, count, block, top, left, right, tail):
         start = end
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _largest(block, first, last, column):
     """Which of the rows first ... last has the largest entry in a column."""
     best, at = -1.0, first
@@ -237,7 +237,8 @@ def _largest(block, first, last, column):
 @njit(
     "f8(UniTuple(i8[::1], 9), f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1],"
     "i8[:,::1], i8[:,::1], i8[::1])",
-    **KERNEL,
+    cache=True,
+    **_OPTIONS,
 )
 def factorize(layout, local, border, border_corner, chain, chain_border, first, last, dense, piv_local, piv_chain, piv_dense):
     """Factor in place; the arrays are described in `Factorization`. Returns the sign of the determinant."""
@@ -315,7 +316,7 @@ def factorize(layout, local, border, border_corner, chain, chain_border, first, 
 # Solves: right-hand sides stand side by side, LANES of them, so that vectors X have the shape (rows, LANES).
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _subtract_rows(target, matrix, apart, vectors, length, rows):
     """`subtract_rows` for any number of rows."""
     while rows >= 4:
@@ -329,7 +330,7 @@ def _subtract_rows(target, matrix, apart, vectors, length, rows):
         subtract_rows(target, matrix, apart, vectors, length, 1)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _subtract_columns(target, matrix, apart, vectors, length, rows):
     """`subtract_columns` for any number of rows."""
     while rows >= 4:
@@ -343,7 +344,7 @@ def _subtract_columns(target, matrix, apart, vectors, length, rows):
         subtract_columns(target, matrix, apart, vectors, length, 1)
 
 
-@njit(inline="always", **KERNEL)
+@helper(inline=True)
 def _apply_triangle(vectors, block, apart, size, kind):
     """`apply_triangle` for any size up to that of a panel."""
     if size == 4:
@@ -356,7 +357,7 @@ def _apply_triangle(vectors, block, apart, size, kind):
         apply_triangle(vectors, block, apart, 1, kind)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _forward(block, top, bottom, left, right, pivots, X):
     """Apply the elimination of columns left ... right by the rows top ... bottom to right-hand sides X."""
     apart = block.strides[0]
@@ -376,13 +377,13 @@ def _forward(block, top, bottom, left, right, pivots, X):
     _carry(block, below, bottom - below, left, right, X, top, X)
 
 
-@njit(inline="always", **KERNEL)
+@helper(inline=True)
 def _carry(rows, i, number, left, right, X, top, Y):
     """The same for ``number`` rows from i on, reduced by those from ``top`` on, with right-hand sides in Y."""
     _subtract_rows(_address(Y, i, 0), _address(rows, i, left), rows.strides[0], _address(X, top, 0), right - left, number)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _backward(block, top, left, right, tail, X, known, behind):
     """Solve for X, from ``top`` on, the upper triangle of the columns left ... right.
 
@@ -402,7 +403,7 @@ def _backward(block, top, left, right, tail, X, known, behind):
         end = start
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _move(target, source):
     """target[...] = source."""
     there, here = _address(target, 0, 0), _address(source, 0, 0)
@@ -410,7 +411,7 @@ def _move(target, source):
         move(there + 8 * LANES * k, here + 8 * LANES * k)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _take(target, i, source, rows):
     """target[i + k] = source[rows[k]]."""
     there, here = _address(target, i, 0), _address(source, 0, 0)
@@ -418,7 +419,7 @@ def _take(target, i, source, rows):
         move(there + 8 * LANES * k, here + 8 * LANES * rows[k])
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _put(target, rows, source, i):
     """target[rows[k]] = source[i + k]."""
     there, here = _address(target, 0, 0), _address(source, i, 0)
@@ -426,7 +427,7 @@ def _put(target, rows, source, i):
         move(there + 8 * LANES * rows[k], here + 8 * LANES * k)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _side_by_side(target, source, first):
     """Up to LANES rows of ``source``, from ``first`` on, as columns; the last one again beside them."""
     stride, last = source.strides[0], source.shape[0] - 1 - first
@@ -436,7 +437,7 @@ def _side_by_side(target, source, first):
         gather(there + 8 * LANES * i, here + 8 * i, distances)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _rows_again(target, first, source):
     """The same the other way round."""
     for lane in range(min(LANES, target.shape[0] - first)):
@@ -448,7 +449,8 @@ def _rows_again(target, first, source):
 @njit(
     "void(UniTuple(i8[::1], 9), f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], i8[:,::1], i8[:,::1], i8[::1],"
     "Array(f8, 2, 'C', readonly=True), f8[:,::1])",
-    **KERNEL,
+    cache=True,
+    **_OPTIONS,
 )
 def solve(layout, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, b, x):
     """Solve J x = b with the factors for rows of b (m, equations) and of x (m, unknowns)."""
@@ -506,7 +508,7 @@ def solve(layout, local, border, chain, chain_border, dense, piv_local, piv_chai
         _rows_again(x, chunk, X)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _forward_transposed(block, top, left, right, tail, X, rest, behind):
     """Solve U^T z = x for the eliminated columns, in place.
 
@@ -525,13 +527,13 @@ def _forward_transposed(block, top, left, right, tail, X, rest, behind):
             _subtract_columns(_address(rest, behind, 0), _address(block, first, tail), apart, here, after, size)
 
 
-@njit(inline="always", **KERNEL)
+@helper(inline=True)
 def _carry_transposed(rows, i, number, left, right, Y, top, X):
     """The transpose of `_carry`: what multipliers Y of rows from i on contribute to those, X, of the rows from ``top`` on."""
     _subtract_columns(_address(X, top, 0), _address(rows, i, left), rows.strides[0], _address(Y, i, 0), right - left, number)
 
 
-@njit(inline="never", **KERNEL)
+@helper
 def _backward_transposed(block, top, bottom, left, right, pivots, X):
     """Apply the transpose of the elimination by the rows top ... bottom to the multipliers X of these rows."""
     apart = block.strides[0]
@@ -553,7 +555,8 @@ def _backward_transposed(block, top, bottom, left, right, pivots, X):
 @njit(
     "void(UniTuple(i8[::1], 9), f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], i8[:,::1], i8[:,::1], i8[::1],"
     "Array(f8, 2, 'C', readonly=True), f8[:,::1])",
-    **KERNEL,
+    cache=True,
+    **_OPTIONS,
 )
 def solve_transposed(layout, local, border, chain, chain_border, dense, piv_local, piv_chain, piv_dense, c, y):
     """Solve J^T y = c with the factors for rows of c (m, unknowns) and of y (m, equations)."""

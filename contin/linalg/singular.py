@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 from contin.arrays import Array
-from contin.functions.compiler import KERNEL, njit
+from contin.functions.compiler import Matrix, kernel
 from contin.linalg.factors import Factors
 
 #: Singular directions watched between two points.
@@ -21,8 +21,8 @@ def _random_block(count: int, size: int) -> Array:
     return block
 
 
-@njit("void(f8[:,::1])", **KERNEL)
-def _orthonormalize(rows: Array) -> None:
+@kernel
+def _orthonormalize(rows: Matrix) -> None:
     """Make the rows orthonormal, in place: Gram-Schmidt, twice."""
     count, size = rows.shape
     for i in range(count):

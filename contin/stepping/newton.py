@@ -13,7 +13,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.discretization.protocol import Equations
 from contin.errors import ConvergenceError
-from contin.functions.compiler import njit
+from contin.functions.compiler import Vector, kernel
 from contin.linalg.factors import Factors
 
 
@@ -142,8 +142,8 @@ def _chords(
     raise _failure(history)
 
 
-@njit("f8(f8[::1], f8[::1])", cache=True, error_model="numpy", nogil=True)
-def _move(x: Array, update: Array) -> float:
+@kernel(reorder=False)
+def _move(x: Vector, update: Vector) -> float:
     """x -= update, in place; the largest component of the update relative to 1 + |x|, NaN if one is."""
     largest = 0.0
     for i in range(x.size):

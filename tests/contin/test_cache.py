@@ -14,8 +14,8 @@ import pytest
 from numba.core.caching import IndexDataCacheFile
 
 from contin import ContinError
-from contin.functions import cache
-from contin.functions.compiler import _not_kept
+from contin.functions import cache, compiler
+from contin.functions.compiler import _warn_not_kept
 
 #: The functions that a kernel calls have one version for each kind of argument, in one index.
 KERNEL = """
@@ -88,7 +88,7 @@ def test_a_full_disk_costs_a_line_and_the_cache(kernel, monkeypatch, capsys):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(IndexDataCacheFile, "save", full)
-    _not_kept.cache_clear()
+    _warn_not_kept.cache_clear()
     assert kernel()(3.0) == 10.0
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "No space left on device" in said and "CONTIN_CACHE_DIR" in said
@@ -140,7 +140,7 @@ def test_an_installation_and_a_home_that_cannot_be_used(tmp_path, monkeypatch, c
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     for name, value in {"HOME": "/proc/none", "XDG_CACHE_HOME": "", "CONTIN_CACHE_DIR": "", "NUMBA_CACHE_DIR": ""}.items():
         monkeypatch.setenv(name, value)
-    cache._tell_numba()
+    compiler._place_cache()
     folder = cache.cache_directory()
     assert folder.parent == tmp_path and os.environ["NUMBA_CACHE_DIR"] == numba.config.CACHE_DIR == str(folder / "engine")
     said = capsys.readouterr().err
