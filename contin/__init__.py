@@ -8,7 +8,7 @@
     )
     branch = contin.trace(contin.solve(problem, [0, 0]), free=["lam"], limits={"lam": (0, 4)})
 
-The tutorial is docs/contin.md.
+The tutorial is docs/contin.md; docs/architecture.md says which folder does what.
 """
 
 from contin.analysis.diagram import Diagram, diagram
@@ -24,7 +24,7 @@ from contin.discretization.collocation import Collocation
 from contin.discretization.mesh import MeshControl
 from contin.errors import ContinError, ConvergenceError, ProblemError
 from contin.functions.batch import Batch
-from contin.functions.cache import cache_directory  # the first of all: it tells numba where to keep compiled code
+from contin.functions.cache import cache_directory
 from contin.functions.gradient import gradient
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
@@ -39,6 +39,6 @@ from contin.stepping.trial import Monitor, Trial
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
-    "ProblemError", "Settings", "State", "Stop", "Trial", "basis", "cache_directory", "correct", "curve", "diagram", "follow", "gradient", "interpolation", "load",
-    "locate_branch_point", "point_of", "save", "sensitivities", "solve", "trace",
+    "ProblemError", "Settings", "State", "Stop", "Trial", "basis", "cache_directory", "correct", "curve", "diagram", "follow",
+    "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save", "sensitivities", "solve", "trace",
 ]  # fmt: skip

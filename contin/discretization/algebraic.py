@@ -56,7 +56,7 @@ class Algebraic(System):
     def _jacobian(self, x: Array) -> tuple[Array, Array]:
         u, p = self.states(x), self.all_parameters(x)
         batch = self.problem.batch("residual")
-        values, jacobian = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.seeds(self._free))
+        values, jacobian = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.colouring(self._free))
         return values[0], jacobian[0]
 
     def linearize(
@@ -73,7 +73,7 @@ class Algebraic(System):
         which = self._indices(names)
         u, p, n = self.states(x), self.all_parameters(x), self.state_size
         batch = self.problem.batch("residual")
-        return batch.jacobian(_NO_TIME, u, _none(n), p, batch.seeds(which))[1][0, :, n:]
+        return batch.jacobian(_NO_TIME, u, _none(n), p, batch.colouring(which))[1][0, :, n:]
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """F_x^T w, shape (size,)."""

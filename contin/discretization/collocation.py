@@ -12,14 +12,14 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Indices
 from contin.discretization.assembly import assemble, at_points, collocate
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
-from contin.functions.colouring import Seeds
+from contin.functions.colouring import Colouring
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Layout, layout
@@ -90,8 +90,13 @@ class Collocation(System):
         return layout(self.problem.batch("field").depends[:n, :n], self.degree)
 
     @functools.cached_property
-    def _seeds(self) -> tuple[Seeds, Seeds]:
-        return self.problem.seeds(self._free, self._layout.order)
+    def _colourings(self) -> tuple[Colouring, Colouring]:
+        return self._colourings_for(self._free)
+
+    def _colourings_for(self, parameters: Indices) -> tuple[Colouring, Colouring]:
+        """Colourings of field, by states in the layout's order, and of boundary; each by these parameters, too."""
+        problem = self.problem
+        return problem.batch("field").colouring(parameters, self._layout.order), problem.batch("boundary").colouring(parameters)
 
     # --- vectors of unknowns -------------------------------------------------------------------------------------
 
@@ -144,7 +149,7 @@ class Collocation(System):
         problem, n, d, k = self.problem, self._n, self._d, len(self.free)
         p, u = self.all_parameters(x), self.states(x)
         points = self.at_gauss_points(x)
-        of_field, of_boundary = self._seeds
+        of_field, of_boundary = self._colourings
         field, jacobian = problem.batch("field").jacobian(self._times, points, _NONE(n), p, of_field)
         boundary, ends = problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
         c, r = len(columns), len(rows) + problem.integral_size
@@ -173,7 +178,7 @@ class Collocation(System):
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
         n, p, u = self._n, self.all_parameters(x), self.states(x)
-        of_field, of_boundary = self.problem.seeds(self._indices(names), self._layout.order)
+        of_field, of_boundary = self._colourings_for(self._indices(names))
         field = self.problem.batch("field").jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, :, n:]
         ends = self.problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0, :, 2 * n :]
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))

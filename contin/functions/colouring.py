@@ -8,28 +8,34 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Indices, Pattern
+from contin.functions.compiler import IndexMatrix, IndexVector
 
-#: With more columns than this each is perturbed alone: the search for common ones takes their number squared.
-_MOST = 500
+#: With more columns each input has a colour of its own: the search takes the number of columns squared times the values.
+_MOST_COLUMNS = 500
 
 
-class Seeds(NamedTuple):
-    """Which inputs the complex step perturbs at the same time, and where the derivatives go.
+class Colouring(NamedTuple):
+    """Inputs by colour, and where their derivatives go.
 
-    Perturbation c is of the inputs ``slots[starts[c]:starts[c + 1]]``; what it does to value a is the derivative in column
-    ``owner[c, a]`` of the Jacobian, none where that is -1. ``width`` columns in all.
+    Colour c has the inputs ``slots[starts[c]:starts[c + 1]]``. When they are perturbed together, the change of value a is the
+    derivative in column ``owner[c, a]`` of the Jacobian; there is none where that is -1. The Jacobian has ``width`` columns.
     """
 
-    slots: Indices
-    starts: Indices
-    owner: Indices
+    slots: IndexVector
+    starts: IndexVector
+    owner: IndexMatrix
     width: int
 
 
-def seeds(depends: Pattern, columns: Sequence[int] | Indices) -> Seeds:
-    """Perturbations for derivatives by the inputs ``columns``, where ``depends`` (values, inputs) says which matter for what.
+def colouring(depends: Pattern, columns: Sequence[int] | Indices) -> Colouring:
+    """Return a colouring for derivatives by the inputs ``columns``, by first fit.
 
-    Inputs that no value has in common are perturbed together (Curtis, Powell & Reid 1974).
+    Parameters
+    ----------
+    depends : ndarray of bool, shape (values, inputs)
+        Sparsity pattern.
+    columns : sequence of int
+        The inputs to differentiate by, one for each column of the Jacobian.
     """
     together: list[list[int]] = []
     taken: list[Any] = []
@@ -38,7 +44,7 @@ def seeds(depends: Pattern, columns: Sequence[int] | Indices) -> Seeds:
         if not mine.any():
             continue
         at = len(taken)
-        if len(columns) <= _MOST:
+        if len(columns) <= _MOST_COLUMNS:
             at = next((c for c, others in enumerate(taken) if not (others & mine).any()), at)
         if at == len(taken):
             together.append([])
@@ -51,4 +57,4 @@ def seeds(depends: Pattern, columns: Sequence[int] | Indices) -> Seeds:
             owner[c, depends[:, columns[column]]] = column
     slots = np.array([columns[column] for group in together for column in group], dtype=np.int64)
     starts = np.cumsum([0, *map(len, together)], dtype=np.int64)
-    return Seeds(slots, starts, owner, len(columns))
+    return Colouring(slots, starts, owner, len(columns))

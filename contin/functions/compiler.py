@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
 import os
 import sys
 from collections.abc import Callable
@@ -29,6 +28,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from contin.arrays import Array, Indices
 from contin.errors import ContinError
 from contin.functions.cache import cache_directory
+from contin.functions.fingerprint import contents
 
 # Arrays as kernels see them: contiguous, of one kind of number, with so many dimensions.
 Vector = Annotated[Array, "f8[::1]"]
@@ -139,7 +139,7 @@ class _DiskCache(FunctionCache):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        stamp = _contents(Path(function.__code__.co_filename)), _engine()
+        stamp = contents(Path(function.__code__.co_filename)), _engine()
         self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -162,15 +162,9 @@ class _DiskCache(FunctionCache):
 
 
 @functools.cache
-def _contents(*files: Path) -> str:
-    """Return a fingerprint of what files hold."""
-    return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
-
-
-@functools.cache
 def _engine() -> str:
     """Return a fingerprint of the files that hold what kernels call: the room linalg, and this file."""
-    return _contents(Path(__file__), *sorted((Path(__file__).parent.parent / "linalg").glob("*.py")))
+    return contents(Path(__file__), *sorted((Path(__file__).parent.parent / "linalg").glob("*.py")))
 
 
 @functools.cache

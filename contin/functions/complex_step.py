@@ -1,14 +1,25 @@
-"""What makes a user's function fit for the complex step: powers and comparisons that numba or Python define otherwise.
+"""Functions made fit for the complex step: with h tiny, the imaginary part of f(x + i h) / h is f'(x) to round-off.
 
-Integer powers become products (the polar form of a complex power loses the tiny imaginary part of a negative base), and
-comparisons decide on real parts. Both are put in place by a compiler pass that applies to users' functions only.
+Python and numpy define some operations for complex numbers in a way that spoils this. They are replaced, in users' functions
+only, by ones that are analytic in the real part's branch:
+
+- comparisons, ``abs``, ``sign``, ``max`` and ``min`` decide on real parts;
+- integer powers become products (the polar form of a complex power loses the tiny imaginary part of a negative base);
+- ``atan2`` is turned by its real angle;
+- functions of ``math``, which exist for real numbers only, become those of numpy.
+
+Functions are replaced where a `Rewriter` meets them (`ComplexStep`), operators by a pass of the compiler.
 """
 
 from __future__ import annotations
 
+import math
 import operator
+import types as python_types
 from typing import Any
 
+import numba
+import numpy as np
 from numba import types
 from numba.core import ir
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -16,6 +27,73 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.ir_utils import build_definitions
 from numba.core.untyped_passes import IRProcessing
 from numba.extending import overload
+
+from contin.arrays import Function
+from contin.functions.rewriting import Rewriter
+
+
+def _analytic_abs(z: Any) -> Any:
+    return z if z.real >= 0 else -z
+
+
+def _analytic_sign(z: Any) -> Any:
+    return 1.0 if z.real > 0 else (-1.0 if z.real < 0 else 0.0)
+
+
+def _analytic_max(a: Any, b: Any) -> Any:
+    return a + 0 * b if a.real >= b.real else b + 0 * a
+
+
+def _analytic_min(a: Any, b: Any) -> Any:
+    return a + 0 * b if a.real <= b.real else b + 0 * a
+
+
+def _analytic_atan2(y: Any, x: Any) -> Any:
+    a, b = x.real, y.real  # turned by the real angle, what is left is analytic
+    return np.arctan2(b, a) + np.arctan((y * a - x * b) / (x * a + y * b))
+
+
+#: Functions that are not analytic, and what replaces them.
+_REPLACED: dict[Any, Function] = {
+    abs: _analytic_abs, math.fabs: _analytic_abs, np.absolute: _analytic_abs, np.fabs: _analytic_abs, np.sign: _analytic_sign,
+    max: _analytic_max, np.maximum: _analytic_max, np.fmax: _analytic_max,
+    min: _analytic_min, np.minimum: _analytic_min, np.fmin: _analytic_min,
+    math.atan2: _analytic_atan2, np.arctan2: _analytic_atan2,
+}  # fmt: skip
+#: Functions of ``math`` that numpy has under the same name, ...
+_SAME_NAMES = ("sqrt", "exp", "expm1", "log", "log1p", "log10", "sin", "cos", "tan", "sinh", "cosh", "tanh")
+#: ... and under another one.
+_OTHER_NAMES = {
+    "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "asinh": np.arcsinh, "acosh": np.arccosh,
+    "atanh": np.arctanh, "pow": np.power,
+}  # fmt: skip
+_OF_NUMPY: dict[Any, Function] = {getattr(math, name): getattr(np, name) for name in _SAME_NAMES}
+_OF_NUMPY |= {getattr(math, name): function for name, function in _OTHER_NAMES.items()}
+
+
+class ComplexStep(Rewriter):
+    """Rewrite functions for the complex step, and let numba compile them."""
+
+    def finished(self, copy: python_types.FunctionType) -> Any:
+        """Return the function compiled, with operators replaced."""
+        return numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler)
+
+    def stand_in(self, value: Any) -> Any:
+        """Return the analytic function for one that is not; None for all other values."""
+        return analytic(value)
+
+
+def analytic(value: Any) -> Any:
+    """Return what stands for a function that is not analytic, or exists for real numbers only; None for all others."""
+    try:
+        if value in _OF_NUMPY:
+            return _OF_NUMPY[value]
+        if value in _REPLACED:
+            return numba.njit(_REPLACED[value])
+    except TypeError:  # unhashable: an array or a list, never one of these functions
+        pass
+    return None
+
 
 # Every implementation has a name of its own: numba tells compiled functions apart by name and types, and machine code of
 # several cached modules shares one space of names.

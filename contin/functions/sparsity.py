@@ -1,7 +1,8 @@
-"""Which outputs of a user's function depend on which inputs: it is called with numbers that remember where they come from.
+"""Sparsity pattern: the inputs that each value of a user's function depends on, found by calling it with tracing numbers.
 
-What it finds holds for all values, or nothing is claimed: a number that remembers cannot be compared, nor made an index or an
-ordinary number, so that a function which decides by its arguments cannot be called, and counts as depending on everything.
+A tracing number has no value; it knows the inputs that it was made from. The pattern holds for all values of the inputs: a
+tracing number cannot be compared, nor become an index or an ordinary number, so a function that decides by its arguments
+fails and counts as depending on everything.
 """
 
 from __future__ import annotations
@@ -16,14 +17,16 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Function, Pattern
-from contin.functions.rewriting import Prepared
+from contin.functions.complex_step import analytic
+from contin.functions.rewriting import Rewriter
+from contin.functions.signature import Signature
 
-#: With more inputs than this it is not worth the time.
-_MOST = 500
+#: With more inputs the pattern is not looked for: the sets of inputs, kept as bits, would take longer than they save.
+_MOST_INPUTS = 500
 
 
-class _Trace:
-    """A number of unknown value that remembers which inputs it was made from, as the bits of ``sources``."""
+class _TracingNumber:
+    """A number of unknown value; ``sources`` has a bit for each input that it was made from."""
 
     __slots__ = ("sources",)
 
@@ -31,15 +34,15 @@ class _Trace:
         self.sources = sources
 
     def _with(self, other: Any) -> Any:
-        if isinstance(other, _Trace):
-            return _Trace(self.sources | other.sources)
+        if isinstance(other, _TracingNumber):
+            return _TracingNumber(self.sources | other.sources)
         return self if isinstance(other, numbers.Number) else NotImplemented
 
-    def _alone(self) -> _Trace:
+    def _alone(self) -> _TracingNumber:
         return self
 
     def _refuse(self, *_: object) -> Any:
-        raise TypeError("a number of unknown value")
+        raise TypeError("a tracing number has no value")
 
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __pow__ = __rpow__ = _with
     arctan2 = hypot = _with
@@ -49,63 +52,63 @@ class _Trace:
     __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __hash__ = _refuse
 
 
-class _Plain(Prepared):
-    """Functions left as they are, for a call in Python."""
+class _Traceable(Rewriter):
+    """Functions for a call in Python: with numpy's functions in place of those of ``math``, which want ordinary numbers."""
 
-    def _made(self, copy: types.FunctionType) -> Any:
+    def finished(self, copy: types.FunctionType) -> Any:
+        """Return the function, unless it could catch what a tracing number raises and go on."""
         if getattr(copy.__code__, "co_exceptiontable", b""):
-            raise TypeError("a function that catches exceptions may go on after one of ours")
+            raise TypeError("a function that catches exceptions cannot be traced")
         return copy
 
+    def stand_in(self, value: Any) -> Any:
+        """Return the stand-in that compiled code has, too."""
+        return analytic(value)
 
-def dependencies(
-    functions: Sequence[Function],
-    counts: Sequence[int],
-    states: Sequence[str],
-    parameters: Sequence[str],
-    ends: bool,
-    times: bool,
-) -> Pattern:
-    """Which values depend on which inputs, shape (sum of counts, states [twice with ``ends``] + parameters).
 
-    The arguments are those of `contin.compilation.Batch`. All true where a function cannot be traced.
+def sparsity_pattern(functions: Sequence[Function], counts: Sequence[int], signature: Signature) -> Pattern:
+    """Return which values depend on which inputs, shape (sum of counts, inputs); all true where a function cannot be traced.
+
+    ``counts`` are the numbers of values of the functions, 0 for a bare number, as in `contin.functions.batch.Batch`.
     """
-    n, k = len(states), len(parameters)
-    inputs = n * (2 if ends else 1) + k
-    total = sum(max(count, 1) for count in counts)
+    inputs, total = signature.inputs, sum(max(count, 1) for count in counts)
     everything = np.ones((total, inputs), dtype=bool)
-    if inputs > _MOST:
+    if inputs > _MOST_INPUTS:
         return everything
-    marks = [_Trace(1 << slot) for slot in range(inputs)]
-    given: list[tuple[Any, list[_Trace]]] = [
-        (namedtuple("U", states), marks[:n]),
-        (namedtuple("P", parameters), marks[inputs - k :]),
-    ]  # noqa: PYI024
-    if ends:
-        given.insert(1, (given[0][0], marks[n : 2 * n]))
     rows: list[int] = []
     try:
         for function, count in zip(functions, counts):
-            plain = _Plain().function(function)
-            filled = plain.__code__.co_argcount == len(given) + times + 1
-            arguments: list[Any] = [_Trace(0)] if times else []
-            arguments += [np.array(values, dtype=object) if filled else kind(*values) for kind, values in given]
-            if filled:
-                result = np.zeros(count, dtype=object)
-                plain(*arguments, result)
-            else:
-                result = plain(*arguments)
-            values = list(result) if count else [result]
+            values = _traced(function, count, signature)
             if len(values) != max(count, 1):
                 return everything
             rows += [_sources(value) for value in values]
-    except Exception:  # whatever a function does that needs to know its arguments
+    except Exception:  # the function needed to know a value; it may have raised anything
         return everything
     return np.array([[bool(row >> slot & 1) for slot in range(inputs)] for row in rows]).reshape(total, inputs)
 
 
+def _traced(function: Function, count: int, signature: Signature) -> list[Any]:
+    """Return the values of a function called with tracing numbers."""
+    marks = iter([_TracingNumber(1 << slot) for slot in range(signature.inputs)])
+    fills = signature.fills(function)
+    arguments: list[Any] = []
+    for names in signature.arguments:
+        if names is None:
+            arguments.append(_TracingNumber(0))
+            continue
+        values = [next(marks) for _ in names]
+        arguments.append(np.array(values, dtype=object) if fills else namedtuple("Values", names)(*values))
+    traceable = _Traceable().function(function)
+    if fills:
+        result = np.zeros(count, dtype=object)
+        traceable(*arguments, result)
+        return list(result)
+    result = traceable(*arguments)
+    return list(result) if count else [result]
+
+
 def _sources(value: Any) -> int:
-    if isinstance(value, _Trace):
+    if isinstance(value, _TracingNumber):
         return value.sources
     if isinstance(value, numbers.Number) and math.isfinite(abs(value)):  # type: ignore[arg-type]
         return 0

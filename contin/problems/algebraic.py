@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
@@ -10,8 +11,8 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import argument_count, outputs
-from contin.problems.statement import check_statement
+from contin.functions.signature import Signature, argument_count, result_count
+from contin.problems.statement import MOST_CONDITIONS, check_statement
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,23 +45,18 @@ class AlgebraicProblem:
     functionals: Mapping[str, Function] = field(default_factory=dict)
     dynamics: bool = True
     count: int | None = None
-    _shape: int = field(init=False, repr=False)
-    _batches: dict[str, Batch] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
         checks.truth("dynamics", self.dynamics)
         if self.count is not None:
-            checks.whole("count", self.count, 1, 100_000)
+            checks.whole("count", self.count, 1, MOST_CONDITIONS)
         checks.function("residual", self.residual)
         arguments = argument_count(self.residual)
         if arguments not in (2, 3):
             raise ProblemError(f"residual takes {arguments} arguments, must take 2 (or 3, to fill the last)")
-        shape = (self.count or len(self.state_names)) if arguments == 3 else outputs(self.residual, self._arguments, "residual")
-        object.__setattr__(self, "_shape", shape)
         if self.dynamics and self.equation_size != len(self.state_names):
             object.__setattr__(self, "dynamics", False)
-        object.__setattr__(self, "_batches", {})
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -68,8 +64,19 @@ class AlgebraicProblem:
         return cast(tuple[str, ...], self.states)
 
     @property
-    def _arguments(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        return (self.state_names, tuple(self.parameters))
+    def _signature(self) -> Signature:
+        return Signature(self.state_names, tuple(self.parameters), times=False)
+
+    @functools.cached_property
+    def _shape(self) -> int:
+        """Number of values of the residual; 0 for a bare number."""
+        if self._signature.fills(self.residual):
+            return self.count or len(self.state_names)
+        return result_count(self.residual, self._signature.arguments, "residual")
+
+    @functools.cached_property
+    def _batches(self) -> dict[str, Batch]:
+        return {}
 
     @property
     def equation_size(self) -> int:
@@ -82,11 +89,16 @@ class AlgebraicProblem:
         return self.equation_size - len(self.state_names) + 1
 
     def batch(self, name: str) -> Batch:
-        """The compiled ``"residual"`` or ``"functionals"``; made when first asked."""
+        """Return the compiled ``"residual"`` or ``"functionals"``; made when first asked."""
         if name not in self._batches:
-            functions = [self.residual] if name == "residual" else list(self.functionals.values())
-            if name != "residual" and any(outputs(f, self._arguments, "a functional") for f in functions):
-                raise ProblemError("functionals: each must be f(u, p) and return one number")
-            counts = [self._shape] if name == "residual" else [0] * len(functions)
-            self._batches[name] = Batch(functions, counts, *self._arguments, times=False)
+            self._batches[name] = self._compiled(name)
         return self._batches[name]
+
+    def _compiled(self, name: str) -> Batch:
+        u, p = self.state_names, tuple(self.parameters)
+        if name == "residual":
+            return Batch([self.residual], [self._shape], u, p, times=False)
+        functions = list(self.functionals.values())
+        if any(result_count(f, self._signature.arguments, "a functional") for f in functions):
+            raise ProblemError("functionals: each must be f(u, p) and return one number")
+        return Batch(functions, [0] * len(functions), u, p, times=False)

@@ -1,23 +1,19 @@
-"""What the user states: a boundary value problem in plain functions and names; no numerics here."""
+"""A boundary value problem as the user states it: plain functions and names, no numerics."""
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
 from contin import checks
-from contin.arrays import Function, Indices
+from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.colouring import Seeds
-from contin.functions.signature import argument_count, outputs
-from contin.problems.statement import check_statement
-
-#: Names of the arguments of a function that are named tuples; None for one that is a number.
-_Arguments = Sequence[tuple[str, ...] | None]
-_MOST_CONDITIONS = 100_000
+from contin.functions.signature import Signature, argument_count, result_count
+from contin.problems.statement import MOST_CONDITIONS, check_statement
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +41,8 @@ class BoundaryValueProblem:
         Ends of the independent variable, finite and increasing.
     functionals : mapping of str to callable, optional
         ``f(t, u, p)``: integrands whose integrals over the domain are columns of every point.
+    boundary_count, integral_count : int, optional
+        Numbers of values of ``boundary`` and ``integrals`` where these fill an array.
 
     Raises
     ------
@@ -54,6 +52,18 @@ class BoundaryValueProblem:
     Notes
     -----
     A curve needs n_bc + n_int - n + 1 free parameters, an isolated solution one fewer.
+
+    Examples
+    --------
+    Bratu's problem u'' + lam exp(u) = 0, u(0) = u(1) = 0:
+
+    >>> import math
+    >>> problem = BoundaryValueProblem(
+    ...     rhs=lambda t, u, p: (u.v, -p.lam * math.exp(u.u)), boundary=lambda a, b, p: (a.u, b.u),
+    ...     states=["u", "v"], parameters={"lam": 0.0},
+    ... )
+    >>> problem.free_size
+    1
     """
 
     rhs: Function
@@ -65,8 +75,6 @@ class BoundaryValueProblem:
     functionals: Mapping[str, Function] = field(default_factory=dict)
     boundary_count: int | None = None
     integral_count: int | None = None
-    _counts: dict[str, int] = field(init=False, repr=False)
-    _batches: dict[str, Batch] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
@@ -74,31 +82,9 @@ class BoundaryValueProblem:
         numbers = len(ends) == 2 and all(checks.is_number(end) and math.isfinite(end) for end in ends)
         if not (numbers and ends[0] < ends[1]):
             raise ProblemError(f"domain: {checks.shown(self.domain)} must be two finite numbers, the first the smaller")
-        p, u = tuple(self.parameters), self.state_names
-        counts = {
-            "rhs": self._count("rhs", self.rhs, (None, u, p), len(u)),
-            "boundary": self._count("boundary", self.boundary, (u, u, p), self.boundary_count),
-            "integrals": self._count("integrals", self.integrals, (None, u, p), self.integral_count),
-        }
-        if counts["rhs"] != len(u):
-            raise ProblemError(f"rhs returns {counts['rhs']} values for the {len(u)} states {', '.join(u[:8])}")
-        object.__setattr__(self, "_counts", counts)
-        object.__setattr__(self, "_batches", {})
-
-    @staticmethod
-    def _count(name: str, function: Function | None, arguments: _Arguments, given: int | None) -> int:
-        if function is None and name == "integrals":
-            return 0
-        function = checks.function(name, function)
-        expected = len(arguments)
-        if (found := argument_count(function)) not in (expected, expected + 1):
-            raise ProblemError(f"{name} takes {found} arguments, must take {expected} (or {expected + 1}, to fill the last)")
-        if found == expected + 1:
-            if given is None:
-                raise ProblemError(f"{name} fills an array: say how many values with {name.rstrip('s')}_count")
-            checks.whole(f"{name.rstrip('s')}_count", given, 1, _MOST_CONDITIONS)
-            return given
-        return max(outputs(function, arguments, name), 1)
+        if self._counts["rhs"] != len(self.state_names):
+            given = ", ".join(self.state_names[:8])
+            raise ProblemError(f"rhs returns {self._counts['rhs']} values for the {len(self.state_names)} states {given}")
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -121,31 +107,72 @@ class BoundaryValueProblem:
         return self.boundary_size + self.integral_size - len(self.state_names) + 1
 
     def batch(self, name: str) -> Batch:
-        """The compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked."""
+        """Return the compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked."""
         if name not in self._batches:
-            self._batches[name] = self._compile(name)
+            self._batches[name] = self._compiled(name)
         return self._batches[name]
 
-    def seeds(self, free: Indices, order: Indices) -> tuple[Seeds, Seeds]:
-        """What to perturb for the Jacobians of field, by states in this ``order``, and boundary; by ``free`` parameters too."""
-        return self.batch("field").seeds(free, order), self.batch("boundary").seeds(free)
+    @property
+    def _of_point(self) -> Signature:
+        """Arguments of rhs, integrals and functionals."""
+        return Signature(self.state_names, tuple(self.parameters))
 
-    def _compile(self, name: str) -> Batch:
-        p, u = tuple(self.parameters), self.state_names
+    @property
+    def _of_ends(self) -> Signature:
+        """Arguments of boundary."""
+        return Signature(self.state_names, tuple(self.parameters), times=False, ends=True)
+
+    @functools.cached_property
+    def _counts(self) -> dict[str, int]:
+        """Numbers of values of the functions."""
+        return {
+            "rhs": _value_count("rhs", self.rhs, self._of_point, len(self.state_names)),
+            "boundary": _value_count("boundary", self.boundary, self._of_ends, self.boundary_count),
+            "integrals": _value_count("integrals", self.integrals, self._of_point, self.integral_count),
+        }
+
+    @functools.cached_property
+    def _batches(self) -> dict[str, Batch]:
+        return {}
+
+    def _compiled(self, name: str) -> Batch:
+        u, p = self.state_names, tuple(self.parameters)
         if name == "boundary":
-            return Batch([self.boundary], [self._shape(self.boundary, (u, u, p), self.boundary_size)], u, p, ends=True)
+            return Batch([self.boundary], [_shape(self.boundary, self._of_ends, self.boundary_size)], u, p, ends=True)
         if name == "functionals":
             functions = list(self.functionals.values())
-            if any(argument_count(f) != 3 or outputs(f, (None, u, p), "a functional") for f in functions):
+            if any(argument_count(f) != 3 or result_count(f, self._of_point.arguments, "a functional") for f in functions):
                 raise ProblemError("functionals: each must be f(t, u, p) and return one number")
             return Batch(functions, [0] * len(functions), u, p)
         functions = [f for f in (self.rhs, self.integrals) if f is not None]
         sizes = (len(u), self.integral_size)
-        return Batch(functions, [self._shape(f, (None, u, p), size) for f, size in zip(functions, sizes)], u, p)
+        return Batch(functions, [_shape(f, self._of_point, size) for f, size in zip(functions, sizes)], u, p)
 
-    @staticmethod
-    def _shape(function: Function, arguments: _Arguments, size: int) -> int:
-        """The size as a Batch wants it: 0 for a function that returns a bare number."""
-        if size > 1 or argument_count(function) == len(arguments) + 1:
-            return size
-        return outputs(function, arguments, function.__name__)
+
+def _value_count(name: str, function: Function | None, signature: Signature, given: int | None) -> int:
+    """Return how many values a function has; ``given`` is that number for one that fills an array.
+
+    Raises
+    ------
+    ProblemError
+        It does not take these arguments, or fills an array of unknown size.
+    """
+    if function is None and name == "integrals":
+        return 0
+    function = checks.function(name, function)
+    expected, found = len(signature.arguments), argument_count(function)
+    if found not in (expected, expected + 1):
+        raise ProblemError(f"{name} takes {found} arguments, must take {expected} (or {expected + 1}, to fill the last)")
+    if found == expected:
+        return max(result_count(function, signature.arguments, name), 1)
+    if given is None:
+        raise ProblemError(f"{name} fills an array: say how many values with {name.rstrip('s')}_count")
+    checks.whole(f"{name.rstrip('s')}_count", given, 1, MOST_CONDITIONS)
+    return given
+
+
+def _shape(function: Function, signature: Signature, size: int) -> int:
+    """Return the number of values as a Batch wants it: 0 for a function that returns a bare number."""
+    if size > 1 or signature.fills(function):
+        return size
+    return result_count(function, signature.arguments, function.__name__)

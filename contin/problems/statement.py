@@ -1,4 +1,4 @@
-"""Statement of a problem: the protocol that every kind of problem follows, and checks of names and values."""
+"""The statement of a problem: the protocol that every kind of problem follows, and checks of names and values."""
 
 from __future__ import annotations
 
@@ -14,41 +14,9 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 
-#: More states than any mesh has room for.
+#: Bounds on numbers that a user gives, so that a slip of the keyboard is a sentence and not a full memory.
 _MOST_STATES = 10_000
-
-
-def check_names(kind: str, names: Sequence[str]) -> tuple[str, ...]:
-    """``names`` as a tuple, or a `ProblemError` that says which one cannot be used."""
-    names = tuple(checks.sequence(kind, names, "names"))
-    for name in names:
-        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
-            raise ProblemError(
-                f"{kind}: {checks.shown(name)} is not usable as a name (a Python identifier, no keyword, no leading _)"
-            )
-        if names.count(name) > 1:
-            raise ProblemError(f"{kind}: the name {name!r} stands twice")
-    return names
-
-
-def check_statement(
-    states: Sequence[str] | int, parameters: Mapping[str, float], functionals: Mapping[str, Function]
-) -> tuple[str, ...]:
-    """The names of states (u0, u1, ... for a number), after names and values of a problem were checked."""
-    if isinstance(states, (int, np.integer)):
-        checks.whole("states", states, 1, _MOST_STATES)
-        states = [f"u{i}" for i in range(states)]
-    names = check_names("states", states)
-    if not 1 <= len(names) <= _MOST_STATES:
-        raise ProblemError(f"states: there must be at least one, and at most {_MOST_STATES}")
-    check_names("parameters", tuple(checks.mapping("parameters", parameters, "numbers")))
-    check_names("functionals", [*checks.mapping("functionals", functionals, "functions"), *parameters])
-    for name, value in parameters.items():
-        if not checks.is_number(value) or not math.isfinite(value):
-            raise ProblemError(f"parameters: {name} = {checks.shown(value)} must be a finite number")
-    for name, function in functionals.items():
-        checks.function(f"functionals: {name}", function)
-    return names
+MOST_CONDITIONS = 100_000
 
 
 class Statement(Protocol):
@@ -71,4 +39,48 @@ class Statement(Protocol):
         """Number of free parameters on a curve of solutions."""
 
     def batch(self, name: str) -> Batch:
-        """Some of the functions, compiled."""
+        """Return some of the functions, compiled."""
+
+
+def check_statement(
+    states: Sequence[str] | int, parameters: Mapping[str, float], functionals: Mapping[str, Function]
+) -> tuple[str, ...]:
+    """Check names and values of a problem, and return the names of its states (u0, u1, ... for a number of states).
+
+    Raises
+    ------
+    ProblemError
+    """
+    if isinstance(states, (int, np.integer)):
+        checks.whole("states", states, 1, _MOST_STATES)
+        states = [f"u{i}" for i in range(states)]
+    names = _usable("states", states)
+    if not 1 <= len(names) <= _MOST_STATES:
+        raise ProblemError(f"states: there must be at least one, and at most {_MOST_STATES}")
+    _usable("parameters", tuple(checks.mapping("parameters", parameters, "numbers")))
+    _usable("functionals", [*checks.mapping("functionals", functionals, "functions"), *parameters])
+    for name, value in parameters.items():
+        if not checks.is_number(value) or not math.isfinite(value):
+            raise ProblemError(f"parameters: {name} = {checks.shown(value)} must be a finite number")
+    for name, function in functionals.items():
+        checks.function(f"functionals: {name}", function)
+    return names
+
+
+def _usable(kind: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Return names as a tuple.
+
+    Raises
+    ------
+    ProblemError
+        One cannot be a field of a named tuple, or stands twice.
+    """
+    names = tuple(checks.sequence(kind, names, "names"))
+    for name in names:
+        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
+            raise ProblemError(
+                f"{kind}: {checks.shown(name)} is not usable as a name (a Python identifier, no keyword, no leading _)"
+            )
+        if names.count(name) > 1:
+            raise ProblemError(f"{kind}: the name {name!r} stands twice")
+    return names

@@ -11,8 +11,8 @@ import pytest
 from contin import BoundaryValueProblem, ProblemError
 from contin.functions.batch import Batch
 from contin.functions.gradient import gradient
-from contin.functions.rewriting import Prepared
-from contin.functions.signature import outputs
+from contin.functions.rewriting import Rewriter
+from contin.functions.signature import result_count
 
 
 def helper(x):
@@ -33,7 +33,7 @@ def test_jacobian_is_exact_to_round_off():
     batch = Batch([every_function], [3], ("a", "b"), ("k", "unused"))
     u, p, t = np.array([[0.7, 1.3]]), np.array([0.4, 9.0]), np.array([0.25])
     none = np.empty((0, 2))
-    values, jacobian = batch.jacobian(t, u, none, p, batch.seeds([1, 0]))
+    values, jacobian = batch.jacobian(t, u, none, p, batch.colouring([1, 0]))
     assert np.allclose(values, batch.values(t, u, none, p), rtol=1e-15)
 
     def at(du, dp):
@@ -55,19 +55,21 @@ def test_functions_of_both_ends_and_filled_arrays():
             out[i] = p[0] * u[i] ** 2
 
     batch = Batch([ends], [2], ("x", "y"), ("k",), ends=True)
-    _, jacobian = batch.jacobian(np.zeros(1), np.array([[1.0, 2.0]]), np.array([[3.0, 4.0]]), np.array([5.0]), batch.seeds([0]))
+    _, jacobian = batch.jacobian(
+        np.zeros(1), np.array([[1.0, 2.0]]), np.array([[3.0, 4.0]]), np.array([5.0]), batch.colouring([0])
+    )
     assert np.allclose(jacobian[0], [[1, 0, 0, -5, -4], [0, 0, 6, 0, 0]])
     batch = Batch([filled], [3], ("a", "b", "c"), ("k",))
     u, p = np.array([[1.0, 2.0, 3.0]]), np.array([2.0])
-    values, jacobian = batch.jacobian(np.zeros(1), u, np.empty((0, 3)), p, batch.seeds([0]))
+    values, jacobian = batch.jacobian(np.zeros(1), u, np.empty((0, 3)), p, batch.colouring([0]))
     assert np.allclose(values, [[2, 8, 18]])
     assert np.allclose(jacobian[0], [[4, 0, 0, 1], [0, 8, 0, 4], [0, 0, 12, 9]])
 
 
 def _fingerprint(function):
-    prepared = Prepared()
-    prepared.function(function)
-    return prepared.fingerprint()
+    rewriter = Rewriter()
+    rewriter.function(function)
+    return rewriter.fingerprint()
 
 
 def test_fingerprint_follows_what_a_function_refers_to():
@@ -129,7 +131,7 @@ def test_powers_of_negative_numbers_and_comparisons():
         return x**3, x**2, x**-2, x**5, x**p.whole, (x * x if x > 0 else -3 * x), (1 - x) ** 0.5, x**0
 
     batch = Batch([powers], [8], ("x",), ("whole",))
-    values, jacobian = batch.jacobian(np.zeros(1), np.array([[-1.5]]), np.empty((0, 1)), np.array([3.0]), batch.seeds([]))
+    values, jacobian = batch.jacobian(np.zeros(1), np.array([[-1.5]]), np.empty((0, 1)), np.array([3.0]), batch.colouring([]))
     x = -1.5
     assert np.allclose(values[0], [x**3, x**2, x**-2, x**5, x**3, -3 * x, (1 - x) ** 0.5, 1], rtol=1e-15)
     expected = [3 * x**2, 2 * x, -2 * x**-3, 5 * x**4, 3 * x**2, -3, -0.5 * (1 - x) ** -0.5, 0]
@@ -142,9 +144,9 @@ def test_what_cannot_be_compiled_says_so():
         problem.batch("field")
 
 
-def test_outputs_counts_without_compiling():
-    assert outputs(lambda t, u, p: (u.a, u.b, 1), (None, ("a", "b"), ()), "f") == 3
-    assert outputs(lambda t, u, p: u.a, (None, ("a", "b"), ()), "f") == 0
+def test_result_count_is_found_without_compiling():
+    assert result_count(lambda t, u, p: (u.a, u.b, 1), (None, ("a", "b"), ()), "f") == 3
+    assert result_count(lambda t, u, p: u.a, (None, ("a", "b"), ()), "f") == 0
 
 
 SAME_NAMES = """

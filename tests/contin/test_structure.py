@@ -7,7 +7,8 @@ import pytest
 
 import contin
 from contin.functions.batch import Batch
-from contin.functions.sparsity import dependencies
+from contin.functions.signature import Signature
+from contin.functions.sparsity import sparsity_pattern
 from contin.linalg.layout import coupled_groups, layout
 
 
@@ -54,7 +55,7 @@ def test_functions_of_functions_and_arrays_are_followed():
 )
 def test_nothing_is_claimed_of_a_function_that_decides(function):
     """A comparison could send it another way for other numbers: everything counts as depending on everything."""
-    assert np.all(dependencies([function], [3], ("a", "b", "c"), ("k",), ends=False, times=True))
+    assert np.all(sparsity_pattern([function], [3], Signature(("a", "b", "c"), ("k",))))
 
 
 def test_groups_come_after_those_that_they_depend_on():
@@ -92,7 +93,7 @@ def test_jacobian_of_a_problem_in_groups_against_differences():
     """Solves with the factored matrix undo central differences of the residual (error of these about 1e-9)."""
     stated = problem()
     assert [len(group) for group in coupled_groups(stated.batch("field").depends[:5, :5])] == [3, 1, 1]
-    assert len(stated.batch("field").seeds([0]).starts) - 1 < 6  # inputs are perturbed together
+    assert len(stated.batch("field").colouring([0]).starts) - 1 < 6  # inputs are perturbed together
     random = np.random.default_rng(1)
     system = contin.Collocation(stated, np.array([0, 0.2, 0.5, 1.0]), 4, ["target", "load", "mean"], {})
     x, direction, row = random.standard_normal((3, system.size))
