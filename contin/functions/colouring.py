@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Indices, Pattern
-from contin.functions.compiler import IndexMatrix, IndexVector
 
 #: With more columns each input has a colour of its own: the search takes the number of columns squared times the values.
 _MOST_COLUMNS = 500
@@ -17,13 +16,13 @@ _MOST_COLUMNS = 500
 class Colouring(NamedTuple):
     """Inputs by colour, and where their derivatives go.
 
-    Colour c has the inputs ``slots[starts[c]:starts[c + 1]]``. When they are perturbed together, the change of value a is the
-    derivative in column ``owner[c, a]`` of the Jacobian; there is none where that is -1. The Jacobian has ``width`` columns.
+    Colour c has the inputs ``inputs[inputs[c]:inputs[c + 1]]``: the vector begins with the places of its own parts. When they
+    are perturbed together, the change of value a is the derivative in column ``owner[c, a]`` of the Jacobian; there is none
+    where that is -1. The Jacobian has ``width`` columns.
     """
 
-    slots: IndexVector
-    starts: IndexVector
-    owner: IndexMatrix
+    inputs: Indices
+    owner: Indices
     width: int
 
 
@@ -55,6 +54,6 @@ def colouring(depends: Pattern, columns: Sequence[int] | Indices) -> Colouring:
     for c, group in enumerate(together):
         for column in group:
             owner[c, depends[:, columns[column]]] = column
-    slots = np.array([columns[column] for group in together for column in group], dtype=np.int64)
-    starts = np.cumsum([0, *map(len, together)], dtype=np.int64)
-    return Colouring(slots, starts, owner, len(columns))
+    starts = len(together) + 1 + np.cumsum([0, *map(len, together)])
+    inputs = np.array([*starts, *(columns[column] for group in together for column in group)], dtype=np.int64)
+    return Colouring(inputs, owner, len(columns))
