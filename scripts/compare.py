@@ -365,9 +365,10 @@ def difference(a: np.ndarray, b: np.ndarray) -> str:
         label = f"{name}: " if name else ""
         if left.dtype.kind in "biufc":
             absolute, relative = gaps(left, right)
-            parts.append((relative, f"{label}differs by {absolute:.1e}, relative {relative:.1e}"))
+            by = f"by {absolute:.1e}, relative {relative:.1e}" if absolute else "in the sign of a zero or the bits of a NaN"
+            parts.append((relative, f"{label}differs {by}"))
         else:
-            parts.append((np.inf, f"{label}{changed_line(left, right)}"))
+            parts.append((-1.0, f"{label}{changed_line(left, right)}"))
     others = f" ({len(parts) - 1} more columns differ)" if len(parts) > 1 else ""
     return f"{shapes}: {max(parts)[1]}{others}"
 
@@ -385,8 +386,8 @@ def compare(first: Path, second: Path) -> int:
     print("\n".join(lines[:MOST_LINES]))
     if len(lines) > MOST_LINES:
         print(f"... and {len(lines) - MOST_LINES} more")
-    alone = f"{len(a.keys() - b.keys())} only in {first}, {len(b.keys() - a.keys())} only in {second}"
-    print(f"{count(a.values())} in {first}: {changed} arrays differ, {alone}")
+    alone = f"only in {first}: {len(a.keys() - b.keys())}, only in {second}: {len(b.keys() - a.keys())}"
+    print(f"{count(a.values())}; arrays that differ: {changed}, {alone}")
     return 1
 
 
