@@ -34,11 +34,14 @@ from contin.results.storage import load, save
 from contin.stepping.newton import Newton, correct
 from contin.stepping.settings import Settings
 from contin.stepping.state import State, Stop
-from contin.stepping.trial import Monitor, Trial
+from contin.stepping.trial import TestFunction, Trial
+
+Monitor = TestFunction  # the first name of the class
 
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
-    "ProblemError", "Settings", "State", "Stop", "Trial", "basis", "cache_directory", "correct", "curve", "diagram", "follow",
-    "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save", "sensitivities", "solve", "trace",
+    "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "basis", "cache_directory", "correct", "curve",
+    "diagram", "follow", "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save", "sensitivities",
+    "solve", "trace",
 ]  # fmt: skip

@@ -9,11 +9,12 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.detection.branch_point import BranchPoint, _Bordered, _hessian
+from contin.detection.bordered import BorderedMatrix
+from contin.detection.branch_point import BranchPoint
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.results.point import Point, system_of
-from contin.stepping.trial import Trial
+from contin.stepping.trial import Linearization, Trial
 
 
 def sensitivities(
@@ -99,7 +100,7 @@ def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) 
     response = _response(point, name)
 
     def measured(x: Array, change: float = 0.0) -> float:
-        return measure(Trial(system.with_parameters({name: value + change}), x, point.tangent, np.nan))
+        return measure(Trial(system.with_parameters({name: value + change}), x, Linearization(point.tangent, np.nan)))
 
     across = _slope(lambda s: measured(point.x + s * response, s))
     along = _slope(lambda s: measured(point.x + s * point.tangent))
@@ -110,15 +111,15 @@ def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) 
 def _of_branch_point(point: Point, name: str) -> dict[str, float]:
     """Both g of the locating equations stay zero: the particular response, corrected along the kernel by the Hessian."""
     system, found = system_of(point, "point"), point.details
-    matrix = _Bordered(system, point.x, found.kernel, found.left)
+    matrix = BorderedMatrix(system, point.x, found.kernel, found.left)
     column = system.parameter_columns(point.x, (name,))[:, 0]
     response = matrix.factors.solve(np.concatenate([-column, [0.0, 0.0]]))[:-1]
     value = system.parameter(point.x, name)
 
     def gradient(s: float) -> Array:
         changed = system.with_parameters({name: value + s})
-        return _Bordered(changed, point.x + s * response, found.kernel, found.left).g
+        return BorderedMatrix(changed, point.x + s * response, found.kernel, found.left).g
 
-    hessian = _hessian(system, point.x, matrix)
+    hessian = matrix.hessian(point.x)
     moved = response - np.linalg.solve(hessian, _slope(gradient)) @ matrix.kernel
     return dict(zip(system.free, map(float, moved[system.state_size :])))

@@ -5,8 +5,9 @@
         ...
     print(run.stop)
 
-One step is: predict, correct, judge (accept or halve), look for events between the two ends and locate them, accept,
-refine the mesh. The loop knows of a system only its interface (residual, linearize, weights, adapt), not what it is.
+One step is: adapt the mesh if due; predict; correct; halve the step until the corrected point can be believed; locate the
+special points between the two ends; accept. The loop knows of a system only its protocol (`contin.discretization.protocol`),
+not its kind.
 """
 
 from __future__ import annotations
@@ -17,32 +18,39 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from contin.arrays import Array
-from contin.detection.passages import calm, crossings, quotients
+from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
-from contin.detection.segment import Segment, Start
-from contin.detection.test_functions import fold, kind_monitors, limit, user_zero
+from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.detection.test_functions import fold, limit, own_test_functions, user_zero
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.newton import correct
 from contin.stepping.settings import Settings
-from contin.stepping.state import State, Stop
-from contin.stepping.step import corrected, hidden_turn, located, predict, sharpened, tangent_error, turn, unit_tangent
-from contin.stepping.trial import Monitor, Trial, sign_changed
+from contin.stepping.state import State, Stop, standing_at
+from contin.stepping.step import corrected, hidden_turn, located, predict, sharpened, tangent_error, trial_of, turn
+from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
 
-#: A step is cut down to this fraction of itself to take several branch points one by one, before they count as one.
+#: A step is cut down to this fraction of itself to take several branch points one by one, before they count as one. At 1e-2
+#: close branch points are reported as one of higher dimension.
 _FINEST = 1e-3
-#: A corrected point this many times further from its prediction than aimed at is not believed.
+#: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
 _ASTRAY = 2.5
 #: A tangent's component with a larger estimated error than this, relative to itself, may have the wrong sign.
 _DOUBT = 0.2
-#: A component above this is never in doubt.
+#: A component above this is never in doubt: tangents are better known than that.
 _STEEP = 0.3
-#: Beside a branch point, events are looked for from this fraction of the first step on.
+#: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
 _ASIDE = 0.01
-#: A start this far outside a limit (relative to 1 + its size) still lies on it.
+#: A start this far outside a limit (relative to 1 + its size) still lies on it: it was located there, to round-off.
 _SLACK = 1e-9
+#: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
+_SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
+#: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
+_ROUNDS = 3
+#: Smallest angle and rate, in place of zero where they are divided by.
+_NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
 
 class Continuation:
@@ -67,6 +75,14 @@ class Continuation:
         Names or numbers that do not fit the problem.
     ConvergenceError
         The first point cannot be corrected.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> run = Continuation(Algebraic(parabola, ["a"]), np.array([1.0, 1.0]), Settings(direction=-1, limits={"a": (-1, 4)}))
+    >>> print([point.label for point in run if point.label], run.stop)
+    ['EP', 'LP', 'EP'] reached a = 4
     """
 
     def __init__(
@@ -85,9 +101,10 @@ class Continuation:
         self.primary = settings.primary or system.free[0]
         self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
         self._fold = fold(self.primary) if settings.folds else None
-        self._monitors = self._all_monitors()
-        own = len(kind_monitors(self.state.system))  # of the system itself: their signs may differ between meshes
-        self._comparable = [*self._monitors[: len(self._monitors) - own], *([self._fold] if self._fold else [])]
+        own = own_test_functions(self.state.system)
+        general = self._general_test_functions()
+        self._tests = [*general, *own]
+        self._comparable = [*general, *([self._fold] if self._fold else [])]  # have the same sign on every mesh
         self._resumed = state is not None
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
@@ -106,20 +123,21 @@ class Continuation:
             if name not in known:
                 raise ProblemError(f"{name!r} is neither a parameter nor a functional ({', '.join(known)})")
 
-    def _all_monitors(self) -> list[Monitor]:
+    def _general_test_functions(self) -> list[TestFunction]:
+        """Return those of the settings."""
         settings = self.settings
-        monitors = [user_zero(name, value) for name, values in settings.zeros.items() for value in values]
-        monitors += [limit(name, end, side) for name, ends in settings.limits.items() for end, side in zip(ends, (-1, 1))]
-        return [*monitors, *settings.monitors, *kind_monitors(self.state.system)]
+        tests = [user_zero(name, value) for name, values in settings.zeros.items() for value in values]
+        tests += [limit(name, end, side) for name, ends in settings.limits.items() for end, side in zip(ends, (-1, 1))]
+        return [*tests, *settings.monitors, *settings.test_functions]
 
     # --- the first point -----------------------------------------------------------------------------------------
 
     def _first(self, system: Discretization, x: Array, tangent: Array | None) -> State:
         settings = self.settings
         if tangent is not None:
-            tangent = tangent / np.sqrt(inner(system, tangent, tangent))
-            return State(system, x, tangent, None, 1.0, settings.step, np.nan, 0.0, 0, True)
-        for _ in range(3):
+            unit = tangent / np.sqrt(inner(system, tangent, tangent))
+            return dataclasses.replace(standing_at(system, x, unit, settings.step), singular=True)
+        for _ in range(_ROUNDS):
             x, row = self._first_correction(system, x)
             adapted = system.adapted(x, settings.mesh)
             if adapted is None:
@@ -128,13 +146,16 @@ class Continuation:
             x = carry(x)
         else:
             x, row = self._first_correction(system, x)
-        tangent = self._tangent(system, x, row)
-        tangent *= settings.direction * (np.sign(tangent[system.parameter_index(self.primary)]) or 1.0)
-        sign = system.linearize(x, (system.weights * tangent,))[1].sign
-        return State(system, x, tangent, None, 1.0, settings.step, sign, 0.0, 0, False)
+        unit = linearization(system, x, row).tangent
+        unit *= settings.direction * (np.sign(unit[system.parameter_index(self.primary)]) or 1.0)
+        state = standing_at(system, x, unit, settings.step)
+        return dataclasses.replace(state, sign=system.linearize(x, (state.row,))[1].sign)
 
     def _first_correction(self, system: Discretization, x: Array) -> tuple[Array, Array]:
-        """x corrected at fixed primary parameter or, where that is singular (at a fold), across a random direction."""
+        """Correct x at fixed primary parameter or, where that is singular (at a fold), across a random direction.
+
+        Returns x and the row that was held.
+        """
         fixed = np.zeros(system.size)
         fixed[system.parameter_index(self.primary)] = 1.0
         across = np.random.default_rng(3).standard_normal(system.size) * np.sqrt(system.weights)
@@ -146,24 +167,22 @@ class Continuation:
             except ConvergenceError:
                 raise error from None
 
-    @staticmethod
-    def _tangent(system: Discretization, x: Array, row: Array) -> Array:
-        """The unit vector along the curve at x with row.tangent > 0."""
-        return unit_tangent(system, system.linearize(x, (row,))[1])
-
     # --- the loop ------------------------------------------------------------------------------------------------
 
     def __iter__(self) -> Iterator[Point]:
         if not self._resumed:
-            state = self.state
-            label = "BP" if state.singular else "EP"
-            trial = Trial(state.system, state.x, state.tangent, state.sign)
-            yield self._point(label, "start", trial, 0.0)
+            trial = self._state_trial()
+            yield self._point(SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial), self.state)
             if (stop := self._out_of_limits(trial)) is not None:
                 self.stop = stop
                 return
         while self.stop is None:
             yield from self._advance()
+
+    def _state_trial(self) -> Trial:
+        """Return the state's point as a trial."""
+        state = self.state
+        return Trial(state.system, state.x, Linearization(state.tangent, state.sign))
 
     def _out_of_limits(self, trial: Trial) -> Stop | None:
         for name, (low, high) in self.settings.limits.items():
@@ -172,33 +191,32 @@ class Continuation:
         return None
 
     def _advance(self) -> Iterator[Point]:
-        """One step: the mesh refined if due, the labelled points inside the step, then the point at its end."""
-        self._refine()
-        state = self.state
+        """Make one step: yield the labelled points inside it, then the point at its end."""
+        self._adapt_mesh()
         try:
-            segment, distance = self._step(state)
+            segment, inspection, distance = self._step(self.state)
         except ConvergenceError as error:
             self.stop = Stop(
                 "no convergence", f"the step became smaller than min_step = {self.settings.min_step:g} ({error})",
                 "more intervals, a smaller min_step, or a start elsewhere may help",
             )  # fmt: skip
-            yield self._point("MX", "no convergence", Trial(state.system, state.x, state.tangent, state.sign), 0.0)
+            yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
-        state, trial, step = segment.state, segment.trial, segment.step
-        for event in segment.events(self._monitors):
-            yield self._point(event.label, event.name, event.trial, event.at, state, event.details, event.monitor)
-            if event.stop is not None:
-                self.stop = event.stop
+        for point in inspection.special_points(self._tests):
+            yield self._point(point, segment.state)
+            if point.stop is not None:
+                self.stop = point.stop
                 return
-        self.state = self._accept(state, trial, step, distance)
-        self._end = trial
+        self.state = self._accept(segment, distance)
+        self._end = segment.trial
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
-        yield self._point("EP" if self.stop else "", "max points" if self.stop else "", trial, step, state)
+        label, name = ("EP", "max points") if self.stop else ("", "")
+        yield self._point(SpecialPoint(segment.step, label, name, segment.trial), segment.state)
 
     # --- one step ------------------------------------------------------------------------------------------------
 
-    def _step(self, state: State) -> tuple[Segment, float]:
+    def _step(self, state: State) -> tuple[Segment, Inspection, float]:
         """Predict and correct, halving the step until the corrected point can be believed.
 
         Returns the step and the distance from prediction to corrected point. At the first failure the state's tangent is taken
@@ -209,8 +227,9 @@ class Continuation:
         while True:
             try:
                 segment, distance = self._attempt(state, step)
-                if self._simple(segment) or step < 2 * finest:
-                    return segment, distance
+                inspection = Inspection(segment, settings, self.start, self._fold)
+                if inspection.is_simple() or step < 2 * finest:
+                    return segment, inspection, distance
                 problem = ConvergenceError("several branch points in one step, or another branch at its end")
             except ConvergenceError as error:
                 problem = error
@@ -221,7 +240,12 @@ class Continuation:
                 raise problem
 
     def _attempt(self, state: State, step: float) -> tuple[Segment, float]:
-        """One step of a given length, as far as it can be believed by itself."""
+        """Make one step of a given length, as far as it can be believed by itself.
+
+        Raises
+        ------
+        ConvergenceError
+        """
         settings = self.settings
         guess = predict(state, step)
         trial = corrected(state, guess, step, settings.newton)
@@ -239,18 +263,17 @@ class Continuation:
             raise ConvergenceError("the corrected point does not lie where the tangents at both ends lead")
         if self._fold is not None and self._may_turn(trial, residual):
             trial = sharpened(state, trial)
-        low, before = self._before(state, step)
-        return Segment(state, before, low, trial, step, settings, self.start, self._fold), distance
+        return Segment(state, self._before(state, step), trial, step, settings.newton), distance
 
-    def _before(self, state: State, step: float) -> tuple[float, Trial]:
-        """Where a step's monitors start from: its place, and the point.
+    def _before(self, state: State, step: float) -> Place:
+        """Return where a step's test functions start from.
 
         That is the state's point, as the step before left it, so that both decide from the same values. At a branch point
         tangent and determinant say nothing: a point close to it stands in.
         """
         if not state.singular:
             if self._end is None:
-                self._end = Trial(state.system, state.x, state.tangent, state.sign)
+                self._end = Trial(state.system, state.x, Linearization(state.tangent, state.sign))
             return 0.0, self._end
         low = _ASIDE * step
         aside = located(state, state.x + low * state.tangent, low, self.settings.newton)
@@ -259,68 +282,36 @@ class Continuation:
         return low, aside
 
     def _may_turn(self, trial: Trial, residual: Array) -> bool:
-        """Whether the primary parameter is so near to turning that an approximate tangent may have the wrong sign."""
+        """Return whether the primary parameter is so near to a fold that an approximate tangent may have the wrong sign."""
         at = trial.system.parameter_index(self.primary)
         component = abs(trial.tangent[at])
         return component < _STEEP and not abs(tangent_error(trial, residual)[at]) < _DOUBT * component
 
     def _exact_tangent(self, state: State) -> Array:
-        """The tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""
-        row = state.system.weights * state.tangent
-        tangent = self._tangent(state.system, state.x, row)
+        """Return the tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""
+        tangent = linearization(state.system, state.x, state.row).tangent
         return tangent if np.all(np.isfinite(tangent)) else state.tangent
 
-    def _simple(self, segment: Segment) -> bool:
-        """Whether a step stays on its branch, and passes one branch point at most, which can be located; notes how many.
-
-        Without one, a change of the determinant's sign means that Newton left the branch.
-        """
-        if not self.settings.branch_points:
-            return segment.steady()
-        trial = segment.trial
-        trial.passed, clear = self._passed(segment)
-        if trial.passed > 1 or not clear or not segment.steady():
-            return False
-        return not sign_changed(segment.before.sign, trial.sign) or segment.crossing().name != "possible"
-
-    def _passed(self, segment: Segment) -> tuple[int, bool]:
-        """How many branch points the step passes, by `crossings` (the determinant sees the parity only).
-
-        Factors from Newton's last iterates do where nothing happens; the rest is decided by those right at both ends.
-        """
-        state, before, trial = segment.state, segment.before, segment.trial
-        system, rows = state.system, (state.system.weights * state.tangent,)
-        if before.factors is None:
-            before.factors = system.linearize(before.x, rows)[1]
-        if before.sign == trial.sign and calm(quotients(before, trial, 1)):
-            return 0, True
-        before.factors = system.linearize(before.x, rows)[1]
-        if not trial.exact:
-            trial.factors, trial.exact = system.linearize(trial.x, rows)[1], True
-            trial.sign = trial.factors.sign
-        values = quotients(before, trial)
-        passing = np.abs(values[values.real < 0])
-        if len(passing) == 1:  # the singular value changes about evenly
-            segment.share = float(passing[0] / (1 + passing[0]))
-        return crossings(values)
-
-    def _accept(self, state: State, trial: Trial, step: float, distance: float) -> State:
-        """The next state, its step chosen so that the predictor's error is ``accuracy`` of it."""
-        settings = self.settings
+    def _accept(self, segment: Segment, distance: float) -> State:
+        """Return the next state, its step chosen so that the predictor's error is ``accuracy`` of it."""
+        settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
         order = 2 if state.previous_tangent is None else 3
         aim = settings.accuracy * step
-        factor = 2.0 if distance == 0 else (aim / distance) ** (1 / order)
-        factor = min(factor, 0.8 * settings.angle / max(turn(state, trial), 1e-12))
+        factor = _LONGER if distance == 0 else (aim / distance) ** (1 / order)
+        factor = min(factor, _AIM * settings.angle / max(turn(state, trial), _NO_ANGLE))
         p, rate = trial.x[state.system.state_size :], trial.tangent[state.system.state_size :]
-        longest = min(settings.max_step, settings.change * float(np.min((1 + np.abs(p)) / (np.abs(rate) + 1e-300))))
-        following = float(np.clip(step * np.clip(factor, 0.3, 2.0), settings.min_step, max(longest, settings.min_step)))
+        longest = min(settings.max_step, settings.change * float(np.min((1 + np.abs(p)) / (np.abs(rate) + _NO_RATE))))
+        longer = step * np.clip(factor, _SHORTER, _LONGER)
+        following = float(np.clip(longer, settings.min_step, max(longest, settings.min_step)))
         gone = trial.x - state.x
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
         )  # fmt: skip
 
-    def _refine(self) -> None:
+    # --- the mesh ------------------------------------------------------------------------------------------------
+
+    def _adapt_mesh(self) -> None:
         """Adapt the mesh now and then, and correct the point on it."""
         control, state = self.settings.mesh, self.state
         due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
@@ -338,37 +329,30 @@ class Continuation:
             done = correct(system, x, row, row @ x, self.settings.newton)
         except ConvergenceError:
             return  # the old mesh still serves; the step control will notice if it does not
-        along = unit_tangent(system, done.factors, done.along)
-        end = Trial(system, done.x, along, done.factors.sign, factors=done.factors)
+        end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0))
         before = self._before(state, state.step)[1]
-        if any(np.sign(before.value(monitor)) != np.sign(end.value(monitor)) for monitor in self._comparable):
-            return  # an event would fall between the meshes; the next point will do as well
+        if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):
+            return  # a special point would fall between the meshes; the next point will do as well
         self._end = end
         self.state = dataclasses.replace(
             state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, sign=end.sign
         )
 
-    # --- what comes out ------------------------------------------------------------------------------------------
+    # --- results -------------------------------------------------------------------------------------------------
 
-    def _point(
-        self,
-        label: str,
-        name: str,
-        trial: Trial,
-        gone: float,
-        state: State | None = None,
-        details: object = None,
-        monitor: Monitor | None = None,
-    ) -> Point:
-        arclength = (state or self.state).arclength + gone
+    def _point(self, found: SpecialPoint, state: State) -> Point:
+        """Return the point of a branch; a labelled one is located again on finer meshes, if errors are wanted."""
+        trial, details = found.trial, found.details
         errors: Mapping[str, float] = {}
-        if label and label != "MX" and name != "closed" and self.settings.errors:  # closed: the first point once more
-            trial, errors, details = refined(label, trial, details, monitor, self.settings)
+        labelled = found.label not in ("", "MX") and found.name != "closed"  # closed: the first point once more
+        if labelled and self.settings.errors:
+            again = refined(found, self.settings)
+            trial, errors, details = again.trial, again.errors, again.details
         system = trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
         return Point(
-            label, name, parameters, trial.functionals, trial.x, trial.tangent, system, arclength, trial.iterations,
-            trial.newton_error, errors, details,
+            found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
+            state.arclength + found.at, trial.iterations, trial.newton_error, errors, details,
         )  # fmt: skip
 
 

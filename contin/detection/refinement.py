@@ -1,62 +1,73 @@
-"""Special points located again on finer meshes: their error estimates."""
+"""Error estimates of special points: each is located again on finer meshes, until it no longer moves."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.detection.branch_point import BranchPoint, MultiplePoint, along, locate_branch_point
+from contin.detection.branch_point import BranchPoint, MultiplePoint, locate_branch_point
+from contin.detection.segment import SpecialPoint
 from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
+from contin.stepping.newton import Newton
 from contin.stepping.settings import Settings
-from contin.stepping.state import State
+from contin.stepping.state import standing_at
 from contin.stepping.step import located
-from contin.stepping.trial import Monitor, Trial
+from contin.stepping.trial import Linearization, TestFunction, Trial
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
 _FAR = 0.05
 #: Cosine between the kernels of a branch point on two meshes, below which they are two points.
 _SAME_KERNEL = 0.9
+#: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
+_HALVINGS = 4
+#: An error is given as no less than so many units in the last place of the largest parameter.
+_UNITS = 16
+#: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
+_FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
 
 
-# --- how well the mesh resolves a point -----------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A special point on the finest mesh that it was located on.
 
-
-def refined(
-    label: str, trial: Trial, details: Any, monitor: Monitor | None, settings: Settings
-) -> tuple[Trial, dict[str, float], Any]:
-    """The same special point on a mesh halved until its free parameters agree to the mesh tolerance.
-
-    Without a mesh the point is found once more from where it is: what then changes is the error of its location. A point that
-    is not the coarse one again (far from it, another kernel, or further off than the mesh before) is dropped.
-
-    Returns
-    -------
-    trial, errors, details
-        The last solution, by how much its free parameters differ from the one before (NaN where it could not be found again),
-        and its details.
+    Attributes
+    ----------
+    trial : Trial
+    errors : dict
+        By how much its free parameters differ from those on the mesh before; NaN where it could not be located again.
+    details : object
     """
+
+    trial: Trial
+    errors: dict[str, float]
+    details: Any
+
+
+def refined(point: SpecialPoint, settings: Settings) -> Refined:
+    """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
+
+    Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
+    is not the coarse one again (far from it, another kernel, or further off than the mesh before) is dropped.
+    """
+    trial, details, last = point.trial, point.details, np.inf
     errors = dict.fromkeys(trial.system.free, np.nan)
     if isinstance(details, MultiplePoint):
-        return trial, errors, details
-    singular = isinstance(details, BranchPoint) or (label == "BP" and monitor is None)
-    last = np.inf
-    for _ in range(4):
+        return Refined(trial, errors, details)
+    for _ in range(_HALVINGS):
         coarse = trial.system
         finer = coarse.refined()
         system, carry = finer or (coarse, np.array)
         try:
-            if singular:
-                better, found = _branch_point_again(system, carry, trial, details, settings)
-            else:
-                better, found = _again(system, carry(trial.x), carry(trial.tangent), monitor, settings), details
+            better, found = _again(point, trial, details, (system, carry), settings.newton)
         except ConvergenceError:
             break
         steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
         size = 1 + np.abs(better.x[system.state_size :])
-        steps = np.maximum(steps, 16 * np.finfo(float).eps * size.max())
+        steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
         if np.any(steps > _FAR * size) or np.max(steps / size) > last:
             break
         errors, last = dict(zip(system.free, map(float, steps))), np.max(steps / size)
@@ -65,44 +76,57 @@ def refined(
         trial, details = better, found
         if np.all(steps <= settings.mesh.tolerance * size):
             break
-    return trial, errors, details
+    return Refined(trial, errors, details)
+
+
+def _again(
+    point: SpecialPoint, trial: Trial, details: Any, finer: tuple[Discretization, Carrier], newton: Newton
+) -> tuple[Trial, Any]:
+    """Return the special point and its details on another mesh.
+
+    Raises
+    ------
+    ConvergenceError
+        It was not found, or another one was.
+    """
+    system, carry = finer
+    if isinstance(details, BranchPoint) or (point.label == "BP" and point.test is None):
+        found = _branch_point_again(system, carry, trial.x, details, newton)
+        return Trial(system, found.x, Linearization(carry(trial.tangent), np.nan)), found
+    return _zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton), details
 
 
 def _branch_point_again(
-    system: Discretization, carry: Carrier, trial: Trial, details: BranchPoint | None, settings: Settings
-) -> tuple[Trial, BranchPoint]:
-    """The branch point with the same kernel on another mesh, and its details; the nearest one where none are known."""
+    system: Discretization, carry: Carrier, x: Array, details: BranchPoint | None, newton: Newton
+) -> BranchPoint:
+    """Return the branch point with the same kernel on another mesh; the nearest one where no kernel is known."""
     if details is None:
-        found = locate_branch_point(system, carry(trial.x), settings.newton)
-        return Trial(system, found.x, carry(trial.tangent), np.nan), found
+        return locate_branch_point(system, carry(x), newton)
     kernel = np.array([carry(vector) for vector in details.kernel])
-    found = locate_branch_point(system, carry(trial.x), settings.newton, kernel)
+    found = locate_branch_point(system, carry(x), newton, kernel)
     overlap = found.kernel @ (system.weights * kernel[:, : system.size]).T
     if np.linalg.svd(overlap, compute_uv=False)[-1] < _SAME_KERNEL:
         raise ConvergenceError("another branch point was found on the finer mesh")
-    if details.tangents:
-        found = along(system, found, carry(details.tangents[0]))
-    return Trial(system, found.x, carry(trial.tangent), np.nan), found
+    return found.along(system, carry(details.tangents[0])) if details.tangents else found
 
 
-def _again(system: Discretization, x: Array, tangent: Array, monitor: Monitor | None, settings: Settings) -> Trial:
-    """The zero of a monitor near x on another mesh, by the secant method along the tangent; without one, x corrected."""
-    tangent = tangent / np.sqrt(inner(system, tangent, tangent))
-    state = State(system, x, tangent, None, 1.0, 1.0, 1.0, 0.0, 0, False)
+def _zero_again(system: Discretization, x: Array, tangent: Array, test: TestFunction | None, newton: Newton) -> Trial:
+    """Return the zero of a test function near x, by the secant method along the tangent; without one, x corrected."""
+    state = standing_at(system, x, tangent / np.sqrt(inner(system, tangent, tangent)), 1.0)
 
     def at(s: float) -> Trial:
-        return located(state, x + s * tangent, s, settings.newton)
+        return located(state, x + s * state.tangent, s, newton)
 
     trial = at(0.0)
-    if monitor is None:
+    if test is None:
         return trial
-    s, last, value = 1e-3, 0.0, monitor.function(trial)
-    for _ in range(12):
+    s, last, value = _FIRST, 0.0, test.function(trial)
+    for _ in range(_SECANTS):
         if value == 0:
             return trial
         trial, before = at(s), value
-        value = monitor.function(trial)
-        if abs(s - last) < 1e-9 or value == before:
+        value = test.function(trial)
+        if abs(s - last) < _LAST or value == before:
             return trial
         s, last = s - value * (s - last) / (value - before), s
     raise ConvergenceError("the point was not found again on the finer mesh")

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from contin.arrays import Array
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
@@ -75,6 +73,6 @@ class Point:
 
 def point_of(system: Discretization, x: Array, iterations: int = 0, error: float = 0.0) -> Point:
     """A Point of any solution x of a system."""
-    trial = Trial(system, x, np.full_like(x, np.nan), np.nan)
+    trial = Trial.without_tangent(system, x)
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point("", "", parameters, trial.functionals, x, trial.tangent, system, 0.0, iterations, error)

@@ -1,4 +1,8 @@
-"""Newton's method, then chord steps, on F(x) = 0 together with linear conditions on x."""
+"""Newton's method, then chord steps, on F(x) = 0 together with a linear condition on x.
+
+One iteration: linearize at x where a new Jacobian is due, else take the residual only; solve for the update; apply it;
+estimate the error that is left; stop when that is below the tolerance or round-off, give up when updates grow.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,19 @@ from contin.discretization.protocol import Equations
 from contin.errors import ConvergenceError
 from contin.functions.compiler import Vector, kernel
 from contin.linalg.factors import Factors
+
+#: After a larger update the Jacobian is taken anew, and a first update is trusted no further than this: chord steps from
+#: there would converge slowly. At 1 Newton's method would run on stale Jacobians.
+_FAR = 0.1
+#: Chord steps that take as long as one factorization, about (a solve takes a fifth to a third of it for 4 to 13 states).
+_CHORDS = 4
+#: Updates that small and no longer shrinking are round-off. At 1e-8 slow convergence could pass for round-off.
+_ROUND_OFF = 1e-9
+#: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: two
+#: to three such steps reach round-off. At 0.3 they would take longer than a factorization.
+_CLOSE = 0.03
+#: An update of a few units in the last place: with it x solves the equations as well as any number can.
+_EXACT = 1e-15
 
 
 @dataclass(frozen=True)
@@ -34,9 +51,18 @@ class Newton:
 
 @dataclass(frozen=True)
 class Corrected:
-    """A corrected x, the last factorization (taken at an iterate before x), and the estimated error left.
+    """A corrected point.
 
-    ``along`` is what this factorization gives for the vector t with F_x t = 0 and row.t = 1; None where it is not at hand.
+    Attributes
+    ----------
+    x : ndarray, shape (size,)
+    factors : Factors
+        The last factorization, taken at an iterate before x.
+    iterations : int
+    error : float
+        Estimated error left, the largest component relative to 1 + |x|.
+    along : ndarray, shape (size,), or None
+        The vector t with F_x t = 0 and row.t = 1 that this factorization gives, where it is at hand.
     """
 
     x: Array
@@ -44,18 +70,6 @@ class Corrected:
     iterations: int
     error: float
     along: Array | None = None
-
-
-#: After a larger update the next iteration takes the Jacobian anew.
-_FAR = 0.1
-#: Chord steps with an old factorization that are worth a new one.
-_CHORDS = 4
-#: Updates that small and no longer shrinking are round-off.
-_ROUND_OFF = 1e-9
-#: With factors from elsewhere the first update is below this, and each of the next below this part of the one before.
-_CLOSE = 0.03
-#: An update that is nothing.
-_EXACT = 1e-15
 
 
 def correct(
@@ -82,69 +96,132 @@ def correct(
     ------
     ConvergenceError
         Not converged, or not finite; the message holds the last updates.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1,), ["x"], {"a": 0.6})
+    >>> print(round(correct(Algebraic(circle, []), [1.0]).x[0], 12))
+    0.8
     """
     if factors is not None:
         with contextlib.suppress(ConvergenceError):
             return _chords(system, guess, row, target, newton, factors)
+    return _newton(system, guess, row, target, newton)
+
+
+def _newton(system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton) -> Corrected:
+    """Newton's method with a new Jacobian where chord steps are not expected to do."""
     rows = () if row is None else (row,)
-    x, history, moved = np.array(guess, dtype=float), [], 1.0
-    factors, along = None, None
+    x, progress = np.array(guess, dtype=float), _Progress(newton.tolerance)
+    factors: Factors | None = None
+    along: Array | None = None
     with np.errstate(all="ignore"):
         for _ in range(newton.max_iterations):
+            fresh = factors is None
             if factors is None:
                 residual, factors = system.linearize(x, rows)
-                fresh = True
             else:
-                residual, fresh = system.residual(x), False
+                residual = system.residual(x)
             if row is None:
                 update = factors.solve(residual)
-            elif not fresh:
-                update = factors.solve(np.append(residual, row @ x - target))
-            else:  # the direction along the curve comes with it, at next to no cost
+            elif fresh:  # the direction along the curve comes with the update, at next to no cost
                 both = np.zeros((2, residual.size + 1))
                 both[0, :-1], both[0, -1], both[1, -1] = residual, row @ x - target, 1.0
                 update, along = factors.solve(both)
+            else:
+                update = factors.solve(np.append(residual, row @ x - target))
             size = _move(x, update)
             if not np.isfinite(size):
                 break
-            history.append(size)
-            moved = size if fresh else moved + size
-            rate = _rate(history, fresh, moved)
-            confirmed = len(history) > 1 or size <= newton.tolerance
-            if (confirmed and size * rate <= newton.tolerance) or (size < _ROUND_OFF and len(history) > 1 and rate >= 0.5):
-                return Corrected(x, factors, len(history), size * rate, along)
-            if len(history) > 2 and size > 2 * history[-2] > _ROUND_OFF:
+            progress.record(size, fresh)
+            if progress.converged:
+                return Corrected(x, factors, len(progress.sizes), progress.error, along)
+            if progress.diverges:
                 break
-            if size > _FAR or not rate < 0.5 or np.log(newton.tolerance / size) < _CHORDS * np.log(rate):
+            if progress.wants_jacobian:
                 factors = None
-    raise _failure(history)
+    raise _failure(progress.sizes)
+
+
+class _Progress:
+    """The sizes of the updates so far, and what they say of the error that is left."""
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance = tolerance
+        self.sizes: list[float] = []
+        self._moved = 1.0  # distance from where the Jacobian was taken
+        self._rate = 1.0  # estimated ratio of the error after the last update to its size
+
+    def record(self, size: float, fresh: bool) -> None:
+        """Note an update, made with a ``fresh`` Jacobian or with an old one."""
+        self.sizes.append(size)
+        self._moved = size if fresh else self._moved + size
+        self._rate = self._estimated_rate(fresh)
+
+    def _estimated_rate(self, fresh: bool) -> float:
+        if len(self.sizes) < 2:  # nothing is known of how nonlinear the equations are
+            return min(self._moved, _FAR) if fresh else 1.0
+        ratio = self.sizes[-1] / self.sizes[-2]
+        if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
+            return min(1.0, max(self.sizes[-1], ratio * min(1.0, ratio)))
+        return max(min(self._moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
+
+    @property
+    def error(self) -> float:
+        """Estimated error after the last update."""
+        return self.sizes[-1] * self._rate
+
+    @property
+    def converged(self) -> bool:
+        """The error is below the tolerance, or the updates are round-off."""
+        size, repeated = self.sizes[-1], len(self.sizes) > 1
+        confirmed = repeated or size <= self.tolerance
+        return (confirmed and self.error <= self.tolerance) or (size < _ROUND_OFF and repeated and self._rate >= 0.5)
+
+    @property
+    def diverges(self) -> bool:
+        """The last update is more than twice the one before."""
+        return len(self.sizes) > 2 and self.sizes[-1] > 2 * self.sizes[-2] > _ROUND_OFF
+
+    @property
+    def wants_jacobian(self) -> bool:
+        """The next update is better made with a new Jacobian: chord steps would take longer."""
+        size = self.sizes[-1]
+        return bool(size > _FAR or not self._rate < 0.5 or np.log(self.tolerance / size) < _CHORDS * np.log(self._rate))
 
 
 def _chords(
     system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, factors: Factors
 ) -> Corrected:
-    """The same with factors from elsewhere only, for a guess that is close; fails where they converge slowly."""
+    """Chord steps with factors from elsewhere, for a guess that is close.
+
+    Raises
+    ------
+    ConvergenceError
+        They converge slowly.
+    """
     x = np.array(guess, dtype=float)
-    history: list[float] = []
+    sizes: list[float] = []
     with np.errstate(all="ignore"):
-        while len(history) < _CHORDS:
+        while len(sizes) < _CHORDS:
             residual = system.residual(x)
             update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
-            history.append(_move(x, update))
-            if history[-1] <= _EXACT:
-                return Corrected(x, factors, len(history), history[-1])
-            if not history[-1] < _CLOSE * (history[-2] if len(history) > 1 else 1.0):
+            sizes.append(_move(x, update))
+            if sizes[-1] <= _EXACT:
+                return Corrected(x, factors, len(sizes), sizes[-1])
+            if not sizes[-1] < _CLOSE * (sizes[-2] if len(sizes) > 1 else 1.0):
                 break
-            if len(history) > 1:
-                ratio = history[-1] / history[-2]
-                if history[-1] * ratio / (1 - ratio) <= newton.tolerance:
-                    return Corrected(x, factors, len(history), history[-1] * ratio / (1 - ratio))
-    raise _failure(history)
+            if len(sizes) > 1:
+                ratio = sizes[-1] / sizes[-2]
+                if sizes[-1] * ratio / (1 - ratio) <= newton.tolerance:
+                    return Corrected(x, factors, len(sizes), sizes[-1] * ratio / (1 - ratio))
+    raise _failure(sizes)
 
 
 @kernel(reorder=False)
 def _move(x: Vector, update: Vector) -> float:
-    """x -= update, in place; the largest component of the update relative to 1 + |x|, NaN if one is."""
+    """Subtract the update from x, in place; return its largest component relative to 1 + |x|, NaN if one is NaN."""
     largest = 0.0
     for i in range(x.size):
         size = abs(update[i]) / (1 + abs(x[i]))
@@ -154,16 +231,6 @@ def _move(x: Vector, update: Vector) -> float:
     return largest
 
 
-def _failure(history: list[float]) -> ConvergenceError:
-    updates = ", ".join(f"{size:.1e}" for size in history) or "not finite"
+def _failure(sizes: list[float]) -> ConvergenceError:
+    updates = ", ".join(f"{size:.1e}" for size in sizes) or "not finite"
     return ConvergenceError(f"Newton did not converge (updates {updates})")
-
-
-def _rate(history: list[float], fresh: bool, moved: float) -> float:
-    """Estimated ratio of the error after the last update to its size; ``moved``: distance from where the Jacobian was taken."""
-    if len(history) < 2:  # nothing is known of how nonlinear the equations are
-        return min(moved, _FAR) if fresh else 1.0
-    ratio = history[-1] / history[-2]
-    if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
-        return min(1.0, max(history[-1], ratio * min(1.0, ratio)))
-    return max(min(moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0

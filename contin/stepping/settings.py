@@ -1,4 +1,4 @@
-"""What to follow, how carefully, and where to stop."""
+"""Settings of a run: what to follow, how carefully, and where to stop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contin import checks
 from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
 from contin.stepping.newton import Newton
-from contin.stepping.trial import Monitor
+from contin.stepping.trial import TestFunction
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,18 @@ class Settings:
     limits : mapping of str to pair of float
         The run ends where a parameter or functional leaves its interval.
     zeros : mapping of str to sequence of float
-        Values of parameters or functionals to label (UZ).
+        Points where a parameter or functional reaches one of these values are labelled (UZ).
     trivial : str, optional
         A parameter or functional that vanishes on a known trivial branch only: the run ends where it changes sign.
-    monitors : sequence of Monitor
-        Events of one's own.
-    folds, branch_points, errors : bool
-        Whether to look for folds, for branch points, and to solve labelled points again on the mesh halved, until that
-        changes them by less than the mesh tolerance: the last change is their error estimate.
+    test_functions : sequence of TestFunction
+        Further functions of a point whose zeros are labelled.
+    monitors : sequence of TestFunction
+        The same, by its first name.
+    folds, branch_points : bool
+        Look for folds, for branch points.
+    errors : bool
+        Solve labelled points again on the mesh halved, until that changes them by less than the mesh tolerance: the last change
+        is their error estimate.
     angle : float
         Largest angle between the tangents of consecutive points, radians.
     change : float
@@ -47,6 +51,16 @@ class Settings:
         Distance between predicted and corrected point that the step aims at, as a fraction of the step.
     newton, mesh :
         See `Newton`, `MeshControl`.
+
+    Raises
+    ------
+    ProblemError
+        A value that is not allowed; the message names the field, the value and what is allowed.
+
+    Examples
+    --------
+    >>> Settings(limits={"lam": (0, 4)}, zeros={"lam": [1.0]}).step
+    0.05
     """
 
     primary: str | None = None
@@ -58,7 +72,7 @@ class Settings:
     limits: Mapping[str, Sequence[float]] = field(default_factory=dict)
     zeros: Mapping[str, Sequence[float]] = field(default_factory=dict)
     trivial: str | None = None
-    monitors: Sequence[Monitor] = ()
+    monitors: Sequence[TestFunction] = ()
     folds: bool = True
     branch_points: bool = True
     errors: bool = True
@@ -67,13 +81,26 @@ class Settings:
     accuracy: float = 0.02
     newton: Newton = field(default_factory=Newton)
     mesh: MeshControl = field(default_factory=MeshControl)
+    test_functions: Sequence[TestFunction] = ()
 
     def __post_init__(self) -> None:
+        self._check_kinds()
+        self._check_numbers()
+        self._check_columns()
+
+    def _check_kinds(self) -> None:
         for name in ("primary", "trivial"):
             if getattr(self, name) is not None:
                 checks.instance(name, getattr(self, name), str, "a name")
         for name in ("folds", "branch_points", "errors"):
             checks.truth(name, getattr(self, name))
+        for name in ("test_functions", "monitors"):
+            for test in checks.sequence(name, getattr(self, name), "TestFunction"):
+                checks.instance(name, test, TestFunction, "a TestFunction")
+        checks.instance("newton", self.newton, Newton, "a Newton")
+        checks.instance("mesh", self.mesh, MeshControl, "a MeshControl")
+
+    def _check_numbers(self) -> None:
         if not checks.is_number(self.direction) or self.direction not in (1, -1):
             raise ProblemError(f"direction: {checks.shown(self.direction)} must be +1 or -1")
         for name in ("step", "min_step"):
@@ -84,6 +111,8 @@ class Settings:
         checks.whole("max_points", self.max_points, 1, 10**9)
         for name in ("angle", "accuracy", "change"):
             checks.number(name, getattr(self, name), 0, 1.5)
+
+    def _check_columns(self) -> None:
         for name, ends in checks.mapping("limits", self.limits, "pairs of numbers").items():
             what, allowed = f"limits: {checks.plain(name)}", "two numbers, the first the smaller"
             pair = tuple(checks.sequence(what, ends, allowed))
@@ -92,19 +121,15 @@ class Settings:
         for name, values in checks.mapping("zeros", self.zeros, "lists of numbers").items():
             for value in checks.sequence(f"zeros: {checks.plain(name)}", values, "numbers"):
                 checks.number(f"zeros: {checks.plain(name)}", value)
-        for monitor in checks.sequence("monitors", self.monitors, "Monitor"):
-            checks.instance("monitors", monitor, Monitor, "a Monitor")
-        checks.instance("newton", self.newton, Newton, "a Newton")
-        checks.instance("mesh", self.mesh, MeshControl, "a MeshControl")
 
 
 def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:
-    """The settings with some fields changed.
+    """Return the settings with some fields changed.
 
     Raises
     ------
     ProblemError
-        A field that there is not, or a value that it cannot have.
+        An unknown field, or a value that it cannot have.
     """
     checks.instance("settings", settings, (Settings, type(None)), "a Settings")
     known = [entry.name for entry in dataclasses.fields(Settings)]

@@ -1,8 +1,10 @@
-"""State of a run between two steps, and why a run stopped."""
+"""The state of a run between two steps, and the reason why a run stopped."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+import numpy as np
 
 from contin.arrays import Array
 from contin.discretization.protocol import Discretization
@@ -12,8 +14,23 @@ from contin.discretization.protocol import Discretization
 class State:
     """Everything that the next step depends on; with it a run continues as if never interrupted.
 
-    ``x``, ``tangent`` and ``previous_tangent`` live on ``system``; ``sign`` is that of the determinant on this mesh;
-    ``accepted`` counts the regular points; ``singular`` says that x is a branch point.
+    Attributes
+    ----------
+    system : Discretization
+    x, tangent : ndarray, shape (size,)
+        The last point and its unit tangent.
+    previous_tangent : ndarray, shape (size,), or None
+        That of the point before, on the same system.
+    previous_step, step : float
+        The last step and the next one to try.
+    sign : float
+        Sign of the determinant of [F_x; row] at x.
+    arclength : float
+        Distance from the first point of the branch.
+    accepted : int
+        Number of regular points.
+    singular : bool
+        x is a branch point.
     """
 
     system: Discretization
@@ -26,6 +43,16 @@ class State:
     arclength: float
     accepted: int
     singular: bool
+
+    @property
+    def row(self) -> Array:
+        """The row that borders F_x: its product with a vector is the inner product with the tangent."""
+        return self.system.weights * self.tangent
+
+
+def standing_at(system: Discretization, x: Array, tangent: Array, step: float) -> State:
+    """Return the state of a run that stands at x and has not made a step yet."""
+    return State(system, x, tangent, None, 1.0, step, np.nan, 0.0, 0, False)
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,12 @@
-"""The parts of one step: the state of a run, predicting, correcting, judging."""
+"""The parts of one step of pseudo-arclength continuation: predictor, corrector, and how far a corrected point is believed.
+
+With the tangent t of the last point x the corrector solves F(z) = 0 together with t.(z - x) = step, in the weighted inner
+product. The bordered matrix [F_x; row], row.v = t.v, is regular along the curve, folds included, and gives the next tangent.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -12,108 +15,78 @@ from contin.discretization.protocol import Discretization, inner
 from contin.linalg.factors import Factors
 from contin.stepping.newton import Corrected, Newton, correct
 from contin.stepping.state import State
-from contin.stepping.trial import Trial
+from contin.stepping.trial import Linearization, Trial, linearization, unit_tangent
 
-#: Share of the states in a tangent below which their direction says nothing.
+#: Share of the states in a unit tangent below which their direction is not compared: there it is round-off of the parameters'
+#: direction. At 0.1 a turn of the states would go unseen where a parameter dominates the norm.
 _STILL = 0.01
-#: Distance over which a difference of residuals stands for the product of Jacobian and tangent.
+#: Length over which a difference of residuals stands for the product of Jacobian and tangent: the square root of round-off,
+#: times a hundred for large states. At 1e-5 the curvature would begin to count.
 _NEAR = 1e-6
 
 
-def unit_tangent(system: Discretization, factors: Factors, along: Array | None = None) -> Array:
-    """The unit vector along the curve, from factors of [F_x; row], with row.tangent > 0; ``along``: the solution for it."""
-    tangent = factors.solve(np.append(np.zeros(system.equations), 1.0)) if along is None else along
-    unit: Array = tangent / np.sqrt(inner(system, tangent, tangent))
-    return unit
-
-
 def predict(state: State, step: float) -> Array:
-    """Along the tangent, with the curvature known from the last step."""
+    """Return the guess at a distance ``step``: along the tangent, with the curvature known from the last step."""
     guess = state.x + step * state.tangent
     if state.previous_tangent is not None:
         guess += (step**2 / (2 * state.previous_step)) * (state.tangent - state.previous_tangent)
     return guess
 
 
-class Located(Trial):
-    """A point of the curve inside a step: tangent, sign and factors are taken right there, when first asked for."""
-
-    def __init__(self, state: State, done: Corrected) -> None:
-        super().__init__(state.system, done.x, done.x, np.nan, done.iterations, done.error, exact=True)
-        self._row = state.system.weights * state.tangent
-        del self.tangent, self.sign, self.factors
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in ("tangent", "sign", "factors"):
-            raise AttributeError(name)
-        self.factors = self.system.linearize(self.x, (self._row,))[1]
-        self.sign, self.tangent = self.factors.sign, unit_tangent(self.system, self.factors)
-        return self.__dict__[name]
-
-    @property
-    def sharp(self) -> bool:
-        """Whether they were asked for."""
-        return "factors" in self.__dict__
-
-
 def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
-    """The point of the curve at ``step`` along the state's tangent, its tangent from Newton's last factors.
+    """Return the point of the curve at ``step`` along the state's tangent; its tangent comes from Newton's last factors.
 
     Raises
     ------
     ConvergenceError
     """
-    done = _corrected(state, guess, step, newton)
-    tangent = unit_tangent(state.system, done.factors, done.along)
-    return Trial(state.system, done.x, tangent, done.factors.sign, done.iterations, done.error, done.factors)
+    return trial_of(state.system, _corrected(state, guess, step, newton))
 
 
-def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Located:
-    """The same point with its own tangent; ``factors`` from near by save Newton's method its own.
+def trial_of(system: Discretization, done: Corrected) -> Trial:
+    """Return the trial of a corrected point, with Newton's last factors."""
+    tangent = unit_tangent(system, done.factors, done.along)
+    return Trial(system, done.x, Linearization(tangent, done.factors.sign, done.factors), done.iterations, done.error)
+
+
+def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Trial:
+    """Return the point of the curve at ``step``, linearized right there when its tangent is first asked for.
+
+    ``factors`` from near by save Newton's method its own.
 
     Raises
     ------
     ConvergenceError
     """
-    return Located(state, _corrected(state, guess, step, newton, factors))
+    done, system, row = _corrected(state, guess, step, newton, factors), state.system, state.row
+    return Trial(system, done.x, lambda: linearization(system, done.x, row), done.iterations, done.error)
 
 
 def _corrected(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Corrected:
-    row = state.system.weights * state.tangent
+    row = state.row
     return correct(state.system, guess, row, row @ state.x + step, newton, factors)
 
 
 def sharpened(state: State, trial: Trial) -> Trial:
-    """The same point with factors and tangent taken right there (Newton leaves those of an iterate before)."""
-    system = state.system
-    factors = system.linearize(trial.x, (system.weights * state.tangent,))[1]
-    tangent = unit_tangent(system, factors)
-    return Trial(system, trial.x, tangent, factors.sign, trial.iterations, trial.newton_error, factors, exact=True)
+    """Return the same point linearized right there (Newton leaves the factors of the iterate before)."""
+    linear = linearization(state.system, trial.x, state.row)
+    return Trial(state.system, trial.x, linear, trial.iterations, trial.newton_error)
 
 
 def tangent_error(trial: Trial, residual: Array) -> Array:
-    """About by how much a trial's tangent misses the one right at its x, where the residual is this: shape (size,).
+    """Return an estimate of the error of a trial's tangent, shape (size,); ``residual`` is that at its x.
 
     One step of iterative refinement, with the product of Jacobian and tangent by a difference.
     """
-    system = trial.system
-    bent = (system.residual(trial.x + _NEAR * trial.tangent) - residual) / _NEAR
+    bent = (trial.system.residual(trial.x + _NEAR * trial.tangent) - residual) / _NEAR
     error: Array = trial.factors.solve(np.append(bent, 0.0))
     return error
 
 
-def hidden_turn(state: State, trial: Trial) -> float:
-    """The angle by which the cubic through both ends of a step, along their tangents, turns away from them in its middle."""
-    system = state.system
-    chord, mean = trial.x - state.x, state.tangent + trial.tangent
-    across = chord - (inner(system, chord, mean) / inner(system, mean, mean)) * mean
-    return float(1.5 * np.sqrt(inner(system, across, across) / inner(system, chord, chord)))
-
-
 def turn(state: State, trial: Trial) -> float:
-    """The angle between the tangents at both ends: of the whole and, at half weight, of the states alone.
+    """Return the angle between the tangents at both ends: the larger of the whole one and half that of the states alone.
 
-    Where parameters are large they dominate the norm, and two branches can look parallel that are not.
+    Where parameters are large they dominate the norm, and tangents of different branches can look parallel.
     """
     system = state.system
     whole = inner(system, trial.tangent, state.tangent)
@@ -122,6 +95,14 @@ def turn(state: State, trial: Trial) -> float:
     sizes = math.sqrt((weights * a) @ a), math.sqrt((weights * b) @ b)
     part = float((weights * a) @ b) / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
     return max(_angle(whole), _angle(part) / 2)
+
+
+def hidden_turn(state: State, trial: Trial) -> float:
+    """Return the angle by which the cubic through both ends, along their tangents, turns away from them in its middle."""
+    system = state.system
+    chord, mean = trial.x - state.x, state.tangent + trial.tangent
+    across = chord - (inner(system, chord, mean) / inner(system, mean, mean)) * mean
+    return float(1.5 * np.sqrt(inner(system, across, across) / inner(system, chord, chord)))
 
 
 def _angle(cosine: float) -> float:

@@ -1,4 +1,4 @@
-"""A corrected point, and test functions of it."""
+"""A corrected point of a curve, and test functions of it."""
 
 from __future__ import annotations
 
@@ -9,34 +9,175 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.discretization.protocol import Discretization
+from contin.discretization.protocol import Discretization, inner
 from contin.linalg.factors import Factors
 
 
 @dataclass(frozen=True, eq=False)
-class Monitor:
-    """A function of a trial point whose sign changes are events.
+class Linearization:
+    """The tangent of a curve at a point, and the factored matrix [F_x; row] that it came from.
+
+    Attributes
+    ----------
+    tangent : ndarray, shape (size,)
+        Unit tangent.
+    sign : float
+        Sign of the determinant of [F_x; row].
+    factors : Factors or None
+    exact : bool
+        The matrix was taken right at the point, and not at the iterate before it.
+    """
+
+    tangent: Array
+    sign: float
+    factors: Factors | None = None
+    exact: bool = False
+
+
+def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
+    """Return the linearization right at x, its tangent with row.tangent > 0."""
+    factors = system.linearize(x, (row,))[1]
+    return Linearization(unit_tangent(system, factors), factors.sign, factors, exact=True)
+
+
+def unit_tangent(system: Discretization, factors: Factors, along: Array | None = None) -> Array:
+    """Return the unit tangent from factors of [F_x; row], with row.tangent > 0.
+
+    ``along`` is the solution of [F_x; row] t = [0; 1], where it is known already.
+    """
+    tangent = factors.solve(np.append(np.zeros(system.equations), 1.0)) if along is None else along
+    unit: Array = tangent / np.sqrt(inner(system, tangent, tangent))
+    return unit
+
+
+class Trial:
+    """A corrected point as test functions see it: ``trial["mu"]``, ``trial.x``, ``trial.tangent``, ``trial.functionals``.
+
+    Parameters
+    ----------
+    system : Discretization
+    x : ndarray, shape (size,)
+    linear : Linearization, or a function that returns it
+        A function is called when tangent, sign or factors are first asked for.
+    iterations, newton_error : int, float
+        Newton iterations taken, and the estimated error that they left.
+    """
+
+    def __init__(
+        self,
+        system: Discretization,
+        x: Array,
+        linear: Linearization | Callable[[], Linearization],
+        iterations: int = 0,
+        newton_error: float = 0.0,
+    ) -> None:
+        self.system, self.x = system, x
+        self.iterations, self.newton_error = iterations, newton_error
+        self._linear = linear
+        self._functionals: dict[str, float] | None = None
+        self._values: dict[TestFunction, float] = {}
+
+    @classmethod
+    def without_tangent(cls, system: Discretization, x: Array) -> Trial:
+        """Return the trial of a point whose tangent is not known or, at a branch point, not unique: it is NaN."""
+        return cls(system, x, Linearization(np.full_like(x, np.nan), np.nan))
+
+    @property
+    def linear(self) -> Linearization:
+        """Tangent, sign of the determinant, and factors."""
+        if callable(self._linear):
+            self._linear = self._linear()
+        return self._linear
+
+    @property
+    def is_linearized(self) -> bool:
+        """The linearization is at hand."""
+        return not callable(self._linear)
+
+    @property
+    def tangent(self) -> Array:
+        """Unit tangent, shape (size,)."""
+        return self.linear.tangent
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant of [F_x; row]."""
+        return self.linear.sign
+
+    @property
+    def factors(self) -> Any:
+        """Factors of [F_x; row]; None where they were not kept."""
+        return self.linear.factors
+
+    def refactor(self, row: Array) -> None:
+        """Take the factors anew, right at x, bordered by ``row``; tangent and sign stay."""
+        self._linear = Linearization(self.tangent, self.sign, self._at_x(row), self.linear.exact)
+
+    def sharpen_factors(self, row: Array) -> None:
+        """Take the factors right at x unless they are from there, and the sign with them; the tangent stays."""
+        if not self.linear.exact:
+            factors = self._at_x(row)
+            self._linear = Linearization(self.tangent, factors.sign, factors, exact=True)
+
+    def _at_x(self, row: Array) -> Factors:
+        return self.system.linearize(self.x, (row,))[1]
+
+    def value(self, test: TestFunction) -> float:
+        """Return the value of a test function, computed once: a point that two steps share has one value for both."""
+        if test not in self._values:
+            self._values[test] = float(test.function(self))
+        return self._values[test]
+
+    @property
+    def functionals(self) -> dict[str, float]:
+        """The problem's functionals, computed when first asked for."""
+        if self._functionals is None:
+            values = self.system.functionals(self.x)
+            self._functionals = dict(zip(self.system.problem.functionals, map(float, values)))
+        return self._functionals
+
+    def __getitem__(self, name: str) -> float:
+        """Return a parameter or functional by name."""
+        if name in self.system.free:
+            return float(self.x[self.system.parameter_index(name)])
+        if name in self.system.problem.functionals:
+            return self.functionals[name]
+        return self.system.parameter(self.x, name)
+
+
+@dataclass(frozen=True, eq=False)
+class TestFunction:
+    """A function of a trial point whose zeros are special points.
 
     Attributes
     ----------
     label : str
-        AUTO's two letters for the event.
+        AUTO's two letters for the special point.
     name : str
-        What the event is about.
+        What the special point is about.
     function : callable
         ``function(trial) -> float``; a `Trial` looks up parameters and functionals by name.
     terminal : bool
-        Whether the run stops there.
+        The run stops there.
     confirm : callable, optional
-        ``confirm(trial) -> bool`` at the located point: False drops the event (a sign change of another cause).
+        ``confirm(trial) -> bool`` at the located point: False drops it (a sign change of another cause).
     describe : callable, optional
-        ``describe(trial)`` at the located point gives the ``details`` of the event.
+        ``describe(trial)`` at the located point gives its ``details``.
     limit : bool
-        Whether the run must not go where the function is positive: a start on the limit, too, is left inwards only.
+        The run must not go where the function is positive: a start on the limit, too, is left inwards only.
     several : callable, optional
-        ``several(before, after) -> bool`` of two neighbouring trials: whether more than one event must lie between them. Such
-        steps are cut, and the function's sign is also looked at inside every step.
+        ``several(before, after) -> bool`` of two neighbouring trials: more than one zero must lie between them. Such steps are
+        cut, and the function's sign is also looked at inside every step.
+
+    Examples
+    --------
+    A label where the middle of the solution reaches 2:
+
+    >>> import numpy as np
+    >>> hot = TestFunction("UZ", "hot", lambda trial: trial.system.evaluate(trial.x, np.array([0.5]))[0, 0] - 2.0)
     """
+
+    __test__ = False  # for pytest: not a class of tests
 
     label: str
     name: str
@@ -48,59 +189,10 @@ class Monitor:
     several: Callable[[Trial, Trial], bool] | None = None
 
     def passed(self, before: float, after: float) -> bool:
-        """Whether there is an event between two neighbouring points where the function has these values."""
+        """Return whether there is a zero between two neighbouring points where the function has these values."""
         return after >= 0 if self.limit else sign_changed(before, after)
 
 
-class Trial:
-    """A corrected point as monitors see it: ``trial["mu"]``, ``trial.tangent``, ``trial.sign`` (of the determinant).
-
-    ``factors`` is the factorization that the tangent came from, ``exact`` says that it was taken right at x and not at the
-    iterate before; ``passed`` is the number of branch points since the last point, ``crossing`` the one that was located on
-    the way here.
-    """
-
-    def __init__(
-        self,
-        system: Discretization,
-        x: Array,
-        tangent: Array,
-        sign: float,
-        iterations: int = 0,
-        newton_error: float = 0.0,
-        factors: Factors | None = None,
-        exact: bool = False,
-    ) -> None:
-        self.factors: Any = factors
-        self.exact, self.passed = exact, 0
-        self.crossing: Any = None
-        self.system, self.x, self.tangent, self.sign = system, x, tangent, sign
-        self.iterations, self.newton_error = iterations, newton_error
-        self._functionals: dict[str, float] | None = None
-        self._values: dict[Monitor, float] = {}
-
-    def value(self, monitor: Monitor) -> float:
-        """The monitor's value here, computed once: a point that two steps share has one value for both."""
-        if monitor not in self._values:
-            self._values[monitor] = float(monitor.function(self))
-        return self._values[monitor]
-
-    @property
-    def functionals(self) -> dict[str, float]:
-        """The problem's functionals, computed when first asked."""
-        if self._functionals is None:
-            values = self.system.functionals(self.x)
-            self._functionals = dict(zip(self.system.problem.functionals, map(float, values)))
-        return self._functionals
-
-    def __getitem__(self, name: str) -> float:
-        if name in self.system.free:
-            return float(self.x[self.system.parameter_index(name)])
-        if name in self.system.problem.functionals:
-            return self.functionals[name]
-        return self.system.parameter(self.x, name)
-
-
 def sign_changed(before: float, after: float) -> bool:
-    """Whether a monitor's value passed zero; a point exactly on zero counts with the step that leaves it not."""
+    """Return whether a value passed zero. A zero at the start of a step is not counted again."""
     return bool(np.isfinite(before) and np.isfinite(after) and before != 0 and before * after <= 0)

@@ -173,7 +173,7 @@ def _kappa_star(reference, x, intervals, degree, adapted) -> float:
     row = np.zeros(system.size)
     row[system.parameter_index("kappa_n")] = 1.0
     done = contin.correct(system, guess, row, row @ guess)
-    return Trial(system, done.x, np.full(system.size, np.nan), np.nan)["kappa_star"]
+    return Trial.without_tangent(system, done.x)["kappa_star"]
 
 
 def slope(x, y) -> float:

@@ -9,7 +9,7 @@ from bank import abc, bru, enz, opt, pp2
 
 from contin import AlgebraicProblem, BoundaryValueProblem, Monitor, Settings, curve, solve, trace
 from contin.detection import refinement
-from contin.stepping.trial import Trial
+from contin.stepping.trial import Linearization, Trial
 
 
 def labels(branch):
@@ -150,10 +150,10 @@ def test_a_point_that_runs_away_on_finer_meshes_stays_as_it_was(monkeypatch):
     settings = Settings(limits={"lam": (0, 4), "mean": (-1, 1)})
     coarse = trace(start, settings, free=["lam"], errors=False)
 
-    def elsewhere(system, x, tangent, monitor, settings):
-        return Trial(system, x + 0.5, tangent, 1.0)
+    def elsewhere(system, x, tangent, test, newton):
+        return Trial(system, x + 0.5, Linearization(tangent, 1.0))
 
-    monkeypatch.setattr(refinement, "_again", elsewhere)
+    monkeypatch.setattr(refinement, "_zero_again", elsewhere)
     (fold,) = trace(start, settings, free=["lam"]).labelled("LP")
     assert fold["lam"] == coarse.labelled("LP")[0]["lam"] and math.isnan(fold.errors["lam"])
 

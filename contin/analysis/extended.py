@@ -1,0 +1,132 @@
+"""Extended systems: a discretized problem with one more condition, that its solution is singular.
+
+They follow the same protocol as the system that they extend, so the same loop continues them in two parameters.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, Function
+from contin.discretization.mesh import MeshControl
+from contin.discretization.protocol import Carrier, Discretization
+from contin.discretization.system import System
+from contin.functions.batch import Batch
+from contin.problems.statement import Statement
+
+#: Cosine between a border and the null vector that it stands for, below which it is renewed: the bordered matrix is then still
+#: far from singular. At .07 its condition would be a hundred times that of the best borders.
+FITS = 0.7
+
+#: The vectors that border the singular matrix: about its null vectors.
+Borders = tuple[Array, Array]
+
+
+class Extended(Discretization):
+    """An extended system: unknowns, names and columns are those of the underlying system ``base``.
+
+    Parameters
+    ----------
+    base : System
+    borders : pair of ndarray, optional
+        Made when they are first needed where they are not given.
+    """
+
+    def __init__(self, base: System, borders: Borders | None) -> None:
+        self.base = base
+        self.borders: Any = borders
+        self.problem, self.free = _ExtendedStatement(base.problem, len(base.free)), base.free
+        self.weights, self.size, self.state_size = base.weights, base.size, base.state_size
+        self.intervals, self.degree = base.intervals, base.degree
+
+    @abstractmethod
+    def borders_fit(self, x: Array) -> bool:
+        """Return whether the borders are still close to the null vectors at x."""
+
+    @abstractmethod
+    def on(self, base: System) -> Extended:
+        """Return the extended system of another underlying one, with borders of its own."""
+
+    @property
+    def nodes(self) -> Array:
+        """Nodes of the underlying system."""
+        return self.base.nodes
+
+    def states(self, x: Array) -> Array:
+        """Return the states of the underlying system."""
+        return self.base.states(x[: self.base.size])
+
+    def all_parameters(self, x: Array) -> Array:
+        """Return the values of all parameters."""
+        return self.base.all_parameters(x[: self.base.size])
+
+    def parameter(self, x: Array, name: str) -> float:
+        """Return the value of one parameter."""
+        return self.base.parameter(x[: self.base.size], name)
+
+    def parameter_index(self, name: str) -> int:
+        """Return the place of the free parameter ``name`` in x."""
+        return self.base.parameter_index(name)
+
+    def functionals(self, x: Array) -> Array:
+        """Return the functionals of the underlying problem."""
+        return self.base.functionals(x[: self.base.size])
+
+    def carrier(self, other: Any) -> Carrier:
+        """Return the carrier of the underlying system's unknowns; it leaves the others as they are."""
+        inside, size = self.base.carrier(other.base), self.base.size
+        return lambda x: np.concatenate([inside(x[:size]), x[size:]])
+
+    def refined(self) -> tuple[Extended, Carrier] | None:
+        """Return the extended system on every interval halved, and the carrier."""
+        return self._moved(self.base.refined())
+
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Extended, Carrier] | None:
+        """Return the extended system on a better mesh, or with new borders where the old ones do not fit; its carrier."""
+        changed = self.base.adapted(x[: self.base.size], control)
+        if changed is None and not self.borders_fit(x):
+            changed = self.base, np.array
+        return self._moved(changed)
+
+    def _moved(self, changed: tuple[System, Carrier] | None) -> tuple[Extended, Carrier] | None:
+        if changed is None:
+            return None
+        other = self.on(changed[0])
+        return other, self.carrier(other)
+
+
+def cosine(a: Array, b: Array) -> float:
+    """Return the absolute cosine between two vectors."""
+    return float(abs(a @ b) / np.sqrt((a @ a) * (b @ b)))
+
+
+@dataclasses.dataclass(frozen=True)
+class _ExtendedStatement:
+    """The statement behind an extended system: that of the problem, but for the number of free parameters."""
+
+    problem: Statement
+    free_size: int
+
+    @property
+    def states(self) -> Any:
+        """Names of the states."""
+        return self.problem.states
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Parameters of the problem."""
+        return self.problem.parameters
+
+    @property
+    def functionals(self) -> Mapping[str, Function]:
+        """Functionals of the problem."""
+        return self.problem.functionals
+
+    def batch(self, name: str) -> Batch:
+        """Return functions of the problem, compiled."""
+        return self.problem.batch(name)

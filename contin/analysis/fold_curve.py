@@ -1,0 +1,125 @@
+"""The extended system of a curve of folds in two parameters.
+
+With z all unknowns but the two parameters, the matrix
+
+                                   z     g
+                                [ F_z    b ]  [ v ]   [ 0 ]
+                                [  c     0 ]  [ g ] = [ 1 ]
+
+is regular along the curve, and g = 0 exactly where F_z is singular (Griewank & Reddien 1984). The extended system is F = 0, g
+= 0. The gradient of g is -w.F_zy v, with w from the transposed matrix: one difference of transposed products, since w.F_yz v
+is the change of F_y^T w along v.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from contin.analysis.extended import FITS, Borders, Extended, cosine
+from contin.arrays import Array
+from contin.detection.test_functions import own_test_functions
+from contin.discretization.system import System
+from contin.linalg.factors import Factors
+from contin.stepping.trial import TestFunction, Trial
+
+#: Length of a central difference of Jacobians along v, as its largest component: the cube root of round-off. At 1e-4 its
+#: error, squared in the length, would be 1e-8.
+_DIFFERENCE = 1e-5
+#: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
+_ROUNDS = 3
+
+
+class FoldCurve(Extended):
+    """F = 0 and F_z singular, in the free parameters of ``base``: the last one is the second parameter of the curve.
+
+    Parameters
+    ----------
+    base : System
+        With one free parameter more than a curve of solutions needs.
+    primary : int
+        Which of its free parameters is the one of the folds.
+    """
+
+    def __init__(self, base: System, borders: Borders | None = None, primary: int = 0) -> None:
+        super().__init__(base, borders)
+        self.equations = base.equations + 1
+        self.primary = primary
+
+    @property
+    def primary_index(self) -> int:
+        """The place of the parameter of the folds in x."""
+        return self.base.state_size + self.primary
+
+    def on(self, base: System) -> FoldCurve:
+        """Return the extended system of another underlying one, with borders of its own."""
+        return FoldCurve(base, None, self.primary)
+
+    def null_vectors(self, x: Array) -> tuple[Array, Array, float]:
+        """Return v (size,), w (equations of F,), and g; borders are made of v and w where there are none."""
+        base = self.base
+        held = np.zeros((2, base.size + 1))  # both parameters stay where they are
+        held[[0, 1], [self.primary_index, base.size - 1]] = 1.0
+        random = np.random.default_rng(11)
+        renew = self.borders is None
+        b, c = (random.standard_normal(base.equations), random.standard_normal(base.size)) if renew else self.borders
+        for _ in range(_ROUNDS if renew else 1):
+            _, factors = base.linearize(x, np.vstack([held, np.append(c, 0.0)]), b[None, :])
+            unit = np.zeros(base.size + 1)
+            unit[-1] = 1.0
+            solution = factors.solve(unit)
+            w = factors.solve_transposed(unit)[: base.equations]
+            v, g = solution[:-1], solution[-1]
+            if renew:
+                b, c = w / np.linalg.norm(w), base.weights * v / np.sqrt((base.weights * v) @ v)
+                self.borders = (b, c)
+        return v, w, g
+
+    def borders_fit(self, x: Array) -> bool:
+        """Return whether the null vectors have not turned away from the borders."""
+        v, w, _ = self.null_vectors(x)
+        b, c = self.borders
+        root = np.sqrt(self.base.weights)
+        return not min(cosine(c / root, v * root), cosine(b, w)) < FITS
+
+    def residual(self, x: Array) -> Array:
+        """Return F and g."""
+        return np.append(self.base.residual(x), self.null_vectors(x)[2])
+
+    def gradient(self, x: Array, v: Array, w: Array) -> Array:
+        """Return dg/dx, shape (size,)."""
+        h = _DIFFERENCE / max(np.abs(v).max(), 1e-300)
+        change = self.base.transposed_product(x + h * v, w) - self.base.transposed_product(x - h * v, w)
+        gradient: Array = -change / (2 * h)
+        return gradient
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return F and g, and the factored bordered matrix; the row of g comes first among the border rows."""
+        v, w, g = self.null_vectors(x)
+        extra = len(columns)
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + extra)
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        row = np.concatenate([self.gradient(x, v, w), columns[:, -1]])
+        residual, factors = self.base.linearize(x, np.vstack([row, rows]), columns[:, :-1])
+        return np.append(residual, g), factors
+
+
+@own_test_functions.register
+def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
+    """Codimension two: cusps (w.F_zz v v = 0), and where the fold meets a branch point (w.F_lambda = 0)."""
+
+    def cusp(trial: Trial) -> float:
+        system: Any = trial.system
+        v, w, _ = system.null_vectors(trial.x)
+        return float(system.gradient(trial.x, v, w) @ v)
+
+    def crossing(trial: Trial) -> float:
+        system: Any = trial.system
+        _, w, _ = system.null_vectors(trial.x)
+        return float(system.base.transposed_product(trial.x, w)[system.primary_index])
+
+    return [TestFunction("CP", "cusp", cusp), TestFunction("BP", "fold meets a branch point", crossing)]

@@ -1,0 +1,117 @@
+"""Branch points inside a step: how many there are, and where.
+
+A branch point changes the sign of the determinant of [F_x; row]; more of them are seen in how the smallest singular values
+change (`contin.detection.crossings`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+
+import numpy as np
+
+from contin.detection.branch_point import MultiplePoint, locate_branch_point
+from contin.detection.crossings import calm, crossings, quotients
+from contin.detection.root import find_zero
+from contin.detection.segment import Segment, SpecialPoint
+from contin.discretization.protocol import inner
+from contin.errors import ConvergenceError
+from contin.linalg.factors import Factors
+from contin.linalg.singular import smallest_directions
+from contin.stepping.trial import Trial, sign_changed
+
+#: How far outside a step, as a part of it, a branch point may be found that changes the determinant's sign inside it: places
+#: of branch points are known to about the square root of round-off there. At 1e-5 one could be reported by two steps.
+_OUTSIDE = 1e-6
+#: A branch point further off the cubic than this part of the step is another one.
+_OFF = 0.1
+#: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is "possible".
+_HALVINGS = 12
+#: A multiple point is located to this part of the step: the mean of two eigenvalues, which it is the zero of, is not smooth.
+_PRECISE = 1e-9
+#: Singular values within this factor of the smallest vanish together.
+_TOGETHER = 1e-3
+
+
+class BranchPointSearch:
+    """The branch points inside one step."""
+
+    def __init__(self, segment: Segment) -> None:
+        self.segment = segment
+        self._share = 0.5  # at which part of the step the branch point is expected
+
+    @functools.cached_property
+    def count(self) -> tuple[int, bool]:
+        """How many branch points the step passes, and whether that is clear.
+
+        Factors from Newton's last iterates do where nothing happens; the rest is decided by those right at both ends.
+        """
+        state, before, trial = self.segment.state, self.segment.before, self.segment.trial
+        row, size = state.row, state.system.size
+        if before.factors is None:
+            before.refactor(row)
+        if before.sign == trial.sign and calm(quotients(before.factors, trial.factors, size, 1)):
+            return 0, True
+        before.refactor(row)
+        trial.sharpen_factors(row)
+        values = quotients(before.factors, trial.factors, size)
+        passing = np.abs(values[values.real < 0])
+        if len(passing) == 1:  # the singular value changes about evenly
+            self._share = float(passing[0] / (1 + passing[0]))
+        return crossings(values)
+
+    @property
+    def sign_changes(self) -> bool:
+        """The determinant's sign changes inside the step."""
+        return sign_changed(self.segment.before.sign, self.segment.trial.sign)
+
+    @functools.cached_property
+    def simple(self) -> SpecialPoint:
+        """The branch point inside the step, its bracket halved until the locator's answer lies inside it."""
+        segment = self.segment
+        state, trial, step = segment.state, segment.trial, segment.step
+        low, high = segment.low, step
+        middle = low + self._share * (high - low)
+        for _ in range(_HALVINGS):
+            try:
+                found = locate_branch_point(state.system, segment.guess(middle), segment.newton)
+                at = inner(state.system, state.tangent, found.x - state.x)
+                gap = found.x - segment.guess(at)
+                off = np.sqrt(inner(state.system, gap, gap))
+                if segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE) and off < _OFF * step:
+                    found = found.along(state.system, trial.x - state.x)
+                    return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
+            except ConvergenceError:
+                pass
+            try:
+                sign = segment.at(middle).sign
+            except ConvergenceError:
+                break
+            low, high = (middle, high) if sign == segment.before.sign else (low, middle)
+            middle = (low + high) / 2
+        return SpecialPoint(high, "BP", "possible", trial)
+
+    def multiple(self) -> SpecialPoint:
+        """Return where two or more singular values pass zero together: the zero of their mean, with the kernel."""
+        segment = self.segment
+        system, step = segment.state.system, segment.step
+        right, left, _ = smallest_directions(segment.trial.factors, system.size)
+
+        def mean(factors: Factors) -> float:
+            response = right @ factors.solve(left).T
+            values = np.linalg.eigvals(np.linalg.inv(response))
+            return float(np.sort_complex(values[np.argsort(np.abs(values))[:2]]).real.mean())
+
+        at, there = step, segment.trial
+        with contextlib.suppress(ConvergenceError, np.linalg.LinAlgError):
+            ends = mean(segment.before.factors), mean(segment.trial.factors)
+            if sign_changed(*ends):
+                places = (segment.low, ends[0]), (step, ends[1])
+                at = find_zero(lambda s: mean(segment.at(s).factors), *places, _PRECISE * step)
+                there = segment.at(at)
+        right, _, response = smallest_directions(there.factors, system.size)
+        u, values, _ = np.linalg.svd(response)
+        dimension = max(2, int(np.count_nonzero(values > _TOGETHER * values[0])))
+        kernel = u[:, :dimension].T @ right
+        return SpecialPoint(at, "BP", f"kernel of dimension {dimension}", there, details=MultiplePoint(dimension, kernel))

@@ -1,0 +1,140 @@
+"""Folds inside a step: places where the primary parameter turns.
+
+The rate r of the primary parameter along the step vanishes at a fold. One fold changes its sign from one end of the step to the
+other; two folds leave it as it was, and show as a dip of r between the ends. From its values at both ends and its mean, which
+is known from the parameter itself, r is a parabola. Where that, or an end close to zero, raises the suspicion of a dip, the
+smallest |r| is searched by parabolas through three places, closer and closer as it sinks, until a place of the other sign
+is found or r stays away from zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.discretization.protocol import inner
+from contin.stepping.trial import TestFunction, Trial, sign_changed
+
+#: A component of the unit tangent below this at both ends of a step is zero: its sign says nothing.
+_ROUND_OFF = 1e-9
+#: A rate that sinks to this part of its values at the ends may pass zero, ...
+_SHALLOW = 0.5
+#: ... and the search for a smallest rate goes on while it lowers it to this part at least.
+_DEEPER = 0.5
+#: A rate at one end below this part of what it would be at the other, were the parabola's vertex at this one, is near zero.
+_BESIDE = 0.05
+
+
+@dataclass(frozen=True)
+class _Parabola:
+    """The rate between two places: first + linear z + square z^2, z from 0 to 1."""
+
+    first: float
+    last: float
+    linear: float
+    square: float
+
+    def times(self, sense: float) -> _Parabola:
+        """Return the parabola multiplied by a sign."""
+        return _Parabola(sense * self.first, sense * self.last, sense * self.linear, sense * self.square)
+
+
+class FoldSearch:
+    """The search for folds inside one step.
+
+    Parameters
+    ----------
+    segment : Segment
+    fold : TestFunction
+        The tangent's component of the primary parameter, which is its name.
+    pitchfork : callable
+        Returns the fold at the branch point inside the step, where the parameter turns right there, or None.
+    """
+
+    def __init__(self, segment: Segment, fold: TestFunction, pitchfork: Callable[[], SpecialPoint | None]) -> None:
+        self.segment, self.fold, self.pitchfork = segment, fold, pitchfork
+        self._index = segment.trial.system.parameter_index(fold.name)
+
+    def between(self, left: Place, right: Place) -> list[SpecialPoint]:
+        """Return the folds between two places, in order."""
+        ends = [trial.value(self.fold) for _, trial in (left, right)]
+        if max(map(abs, ends)) < _ROUND_OFF:
+            return []
+        if sign_changed(*ends):
+            return [self.pitchfork() or self.segment.locate(self.fold, left, right, self.estimate(left, right))]
+        dip = self._dip(left, right)
+        return [] if dip is None else self.between(left, dip) + self.between(dip, right)
+
+    def rate(self, trial: Trial) -> float:
+        """Return the rate of the primary parameter along the state's tangent."""
+        state = self.segment.state
+        return trial.value(self.fold) / inner(state.system, state.tangent, trial.tangent)
+
+    def estimate(self, left: Place, right: Place) -> float | None:
+        """Return about where the rate vanishes between two places at which it has opposite signs."""
+        parabola = self._parabola(left, right)
+        first, last, linear, square = parabola.first, parabola.last, parabola.linear, parabola.square
+        root = np.sqrt(max(linear**2 - 4 * square * first, 0.0))
+        zero = -2 * first / (linear + (root if last > first else -root))  # the one where the rate goes from first to last
+        return float(left[0] + (right[0] - left[0]) * zero) if 0 < zero < 1 else None
+
+    def _parabola(self, left: Place, right: Place) -> _Parabola:
+        (a, start), (b, end) = left, right
+        first, last = self.rate(start), self.rate(end)
+        mean = (end.x[self._index] - start.x[self._index]) / (b - a)
+        return _Parabola(first, last, 6 * mean - 4 * first - 2 * last, 3 * first + 3 * last - 6 * mean)
+
+    def _dip(self, left: Place, right: Place) -> Place | None:
+        """Return a place between two of equal rates where the rate has the other sign; None if there is none."""
+        sense = float(np.sign(self.rate(left[1])) or np.sign(self.rate(right[1])))
+        place, square = self._suspect(left, right, sense)
+        lowest = np.inf
+        while place is not None:
+            value = sense * self.rate(place[1])
+            if value <= 0:
+                return place
+            if value > _DEEPER * lowest:
+                return None
+            lowest = value
+            apart = self._distance(place, np.sqrt(value / square), left, right)
+            if apart is None:
+                return None
+            near = [(s, self.segment.at(s)) for s in (place[0] + apart, place[0] + 2 * apart)]
+            values = [sense * self.rate(trial) for _, trial in near]
+            if min(values) <= 0:
+                return near[int(np.argmin(values))]
+            bend = values[1] - 2 * values[0] + value
+            if not bend > 0:
+                return None
+            s = place[0] + apart * (0.5 - (values[0] - value) / bend)
+            place = (s, self.segment.at(s)) if left[0] < s < right[0] else None
+        return None
+
+    def _suspect(self, left: Place, right: Place, sense: float) -> tuple[Place | None, float]:
+        """Return a place between two where the rate could come near zero, or None, and half its second derivative.
+
+        That is the parabola's vertex. Where it lies outside, but the rate at one end is close to zero already: that end.
+        """
+        a, width = left[0], right[0] - left[0]
+        parabola = self._parabola(left, right).times(sense)
+        first, last, linear, square = parabola.first, parabola.last, parabola.linear, parabola.square
+        smaller = min(first, last)
+        if 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * smaller:
+            s = a - width * linear / (2 * square)
+            return (s, self.segment.at(s)), square / width**2
+        inwards = linear if first < last else -linear - 2 * square
+        beside = smaller < _BESIDE * square and inwards < _SHALLOW * square
+        return (left if first < last else right) if beside else None, square / width**2
+
+    @staticmethod
+    def _distance(place: Place, apart: float, left: Place, right: Place) -> float | None:
+        """Return the signed distance between three places, the first given, so that all lie between the ends; None if none do.
+
+        At ``apart`` the rate doubles from one place to the next if it is smallest in the first.
+        """
+        if place[0] + 2 * apart >= right[0]:
+            apart = -apart
+        return apart if place[0] + 2 * apart >= left[0] else None

@@ -1,0 +1,240 @@
+"""Inspection of a step: does it stay on its branch, and which special points does it pass?
+
+In order: the end on the trivial branch, or a branch point, or several; zeros of the test functions, looked for between the
+folds; the folds; the end of a closed branch. What was located is sorted by its distance along the step.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.detection.branch_points import BranchPointSearch
+from contin.detection.folds import FoldSearch
+from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.discretization.protocol import Discretization, inner
+from contin.stepping.settings import Settings
+from contin.stepping.state import Stop
+from contin.stepping.trial import Linearization, TestFunction, Trial, sign_changed
+
+#: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
+#: labelled already. At 1e-5 a run that starts near a fold would miss it.
+_AT_START = 1e-6
+#: This close to a branch point tangents are round-off: the square root of it, times ten.
+_BLURRED = 1e-7
+#: A test function is zero at the first point of a run where it is smaller by this factor than at the next: a corrected point
+#: that lies on the zero misses it by the corrector's tolerance.
+_ON_ZERO = 1e-8
+#: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
+_STANDS = 1e-11
+#: A tangent's component at a branch point below this is zero: tangents there come from differences with an error of 1e-8.
+_STATIONARY = 1e-5
+#: Into how many parts a step is divided to look inside it, and how often parts with several zeros are halved: zeros closer
+#: than 2^-20 of a step count as one.
+_PARTS, _CUTS = 4, 20
+#: The branch point where a branch ends on the trivial one has the trivial quantity at zero to this part of its values at the
+#: ends of the step; another branch point inside the step has not.
+_TRIVIAL = 1e-6
+#: A branch can close on its first point after this many regular points.
+_FEWEST = 3
+#: A closing branch comes back to its first point along its tangent there: with this cosine at least, ...
+_SAME_WAY = 0.5
+#: ... and at a distance of this part of the step at most.
+_BACK = 0.1
+#: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point.
+_SAME, _SAME_SHARE = 1e-4, 2e-3
+
+#: The first point of a run: system, x, tangent.
+Start = tuple[Discretization, Array, Array]
+
+
+class Inspection:
+    """The inspection of one step.
+
+    Parameters
+    ----------
+    segment : Segment
+    settings : Settings
+    start : tuple (system, x, tangent)
+        The first point of the run, to recognise a closed branch.
+    fold : TestFunction, optional
+        The tangent's component of the primary parameter; None where folds are not looked for.
+    """
+
+    def __init__(self, segment: Segment, settings: Settings, start: Start, fold: TestFunction | None) -> None:
+        self.segment, self.settings, self.start, self.fold = segment, settings, start, fold
+        self._branch_points = BranchPointSearch(segment)
+
+    # --- does the step stay on its branch? -----------------------------------------------------------------------
+
+    def is_simple(self) -> bool:
+        """Return whether the step stays on its branch, and passes one branch point at most, which can be located.
+
+        A change of the determinant's sign without a branch point means that Newton's method left the branch.
+        """
+        if not self.settings.branch_points:
+            return self._is_steady()
+        count, clear = self._branch_points.count
+        if count > 1 or not clear or not self._is_steady():
+            return False
+        return not self._branch_points.sign_changes or self._branch_points.simple.name != "possible"
+
+    def _is_steady(self) -> bool:
+        """Return whether the primary parameter goes, between its folds, the way that the tangents say."""
+        if self.fold is None:
+            return True
+        before, trial = self.segment.before, self.segment.trial
+        knots = [before, *(fold.trial for fold in self._folds), trial]
+        at = trial.system.parameter_index(self.fold.name)
+        sense = np.sign(before.value(self.fold))
+        for left, right in itertools.pairwise(knots):
+            if sense * (right.x[at] - left.x[at]) < -_STANDS * (1 + abs(right.x[at])):
+                return False
+            sense = -sense
+        return True
+
+    # --- special points ------------------------------------------------------------------------------------------
+
+    def special_points(self, tests: Iterable[TestFunction]) -> list[SpecialPoint]:
+        """Return the special points inside the step, in order."""
+        found: list[SpecialPoint] = []
+        home = None if self.segment.state.singular else self._returned()
+        if home is not None:
+            found.append(home)
+        elif self.settings.branch_points and self._branch_points.sign_changes:
+            found.append(self._branch_points.simple)
+        elif self.settings.branch_points and self._branch_points.count[0] > 1:
+            found.append(self._branch_points.multiple())
+        for test in tests:
+            found += self._zeros(test)
+        found += [fold for fold in self._folds if not _same_place(fold, found, self.segment.step)]
+        found = [point for point in found if not self._at_the_start(point)]
+        closed = self._closed()
+        if closed is not None:
+            found.append(closed)
+        return sorted(found, key=lambda point: point.at)
+
+    def _at_the_start(self, point: SpecialPoint) -> bool:
+        """Return whether a special point is the first point of the run once more."""
+        state = self.segment.state
+        near = max(_AT_START * self.segment.step, _BLURRED if state.singular else 0.0)
+        return state.accepted == 0 and point.stop is None and point.at < near
+
+    # --- folds ---------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _folds(self) -> list[SpecialPoint]:
+        """Folds with respect to the primary parameter, in order."""
+        if self.fold is None:
+            return []
+        segment = self.segment
+        search = FoldSearch(segment, self.fold, self._pitchfork)
+        return search.between((segment.low, segment.before), (segment.step, segment.trial))
+
+    def _pitchfork(self) -> SpecialPoint | None:
+        """Return the fold of a pitchfork, right at the branch point inside the step; None if there is none."""
+        fold: Any = self.fold
+        if not (self.settings.branch_points and self._branch_points.sign_changes):
+            return None
+        found = self._branch_points.simple
+        if found.name == "possible" or not found.details.tangents:
+            return None
+        component = found.details.tangents[0][self.segment.trial.system.parameter_index(fold.name)]
+        return dataclasses.replace(found, label=fold.label, test=fold) if abs(component) < _STATIONARY else None
+
+    # --- zeros of test functions ---------------------------------------------------------------------------------
+
+    def _zeros(self, test: TestFunction) -> list[SpecialPoint]:
+        """Return the zeros of a test function, looked for between the folds."""
+        state, found = self.segment.state, []
+        for left, right in itertools.pairwise(self._knots(test)):
+            before, after = left[1].value(test), right[1].value(test)
+            if state.accepted == 0 and left[0] == 0 and abs(before) < _ON_ZERO * abs(after):
+                before = 0.0  # the first point lies on the zero
+            if not test.passed(before, after):
+                continue
+            point = self.segment.locate(test, left, right)
+            if test.confirm is None or test.confirm(point.trial):
+                found.append(point)
+            if test.terminal:
+                break
+        return found
+
+    def _knots(self, test: TestFunction) -> list[Place]:
+        """Return places between which a test function has one zero at most, as far as can be told."""
+        segment = self.segment
+        first = segment.beginning()
+        knots = [(0.0, first), *((fold.at, fold.trial) for fold in self._folds), (segment.step, segment.trial)]
+        if test.several is None:
+            return knots
+        inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
+        values = [first.value(test), *(test.function(segment.guessed(s)) for s in inside), segment.trial.value(test)]
+        if np.count_nonzero(np.diff(np.sign(values))) > 1:
+            knots = self._with_places(knots, inside)
+        for _ in range(_CUTS):
+            crowded = [pair for pair in itertools.pairwise(knots) if test.several(pair[0][1], pair[1][1])]
+            if not crowded:
+                break
+            knots = self._with_places(knots, [(left[0] + right[0]) / 2 for left, right in crowded])
+        return knots
+
+    def _with_places(self, knots: list[Place], distances: list[float]) -> list[Place]:
+        """Return the knots with more places between them, in order."""
+        return sorted([*knots, *((s, self.segment.near(s)) for s in distances)], key=lambda knot: knot[0])
+
+    # --- ends ----------------------------------------------------------------------------------------------------
+
+    def _returned(self) -> SpecialPoint | None:
+        """Return the end of a branch on the trivial one, where ``settings.trivial`` passes zero."""
+        segment, name = self.segment, self.settings.trivial
+        before, trial = segment.before, segment.trial
+        if name is None or not sign_changed(before[name], trial[name]):
+            return None
+        stop = Stop("trivial branch", f"returned to the trivial branch ({name} = 0)")
+        point = self._branch_points.simple
+        if abs(point.trial[name]) > _TRIVIAL * max(abs(before[name]), abs(trial[name])):
+            test = TestFunction("EP", "trivial branch", lambda there: there[name], terminal=True)
+            point = segment.locate(test, (0.0, before), (segment.step, trial))
+        return dataclasses.replace(point, label="EP", name="trivial branch", stop=stop)
+
+    def _closed(self) -> SpecialPoint | None:
+        """Return the end of a branch that comes back to its first point."""
+        segment = self.segment
+        state, trial, step = segment.state, segment.trial, segment.step
+        home, x, tangent = self.start
+        if state.accepted < _FEWEST:
+            return None
+        p, q = x[home.state_size :], trial.x[state.system.state_size :]
+        if np.max(np.abs(p - q)) > 2 * step:
+            return None
+        if home is not state.system:
+            carry = home.carrier(state.system)
+            x, tangent = carry(x), carry(tangent)
+        passed = [inner(state.system, end - x, tangent) for end in (state.x, trial.x)]
+        if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, tangent) < _SAME_WAY:
+            return None
+        at = step * passed[0] / (passed[0] - passed[1])
+        off = segment.guess(at) - x
+        if np.sqrt(inner(state.system, off, off)) > _BACK * step:
+            return None
+        there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
+        return SpecialPoint(at, "EP", "closed", there, Stop("closed", "the branch closed on its first point"))
+
+
+def _same_place(point: SpecialPoint, found: list[SpecialPoint], step: float) -> bool:
+    """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.
+
+    Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
+    """
+    others = [other for other in found if other.label in ("BP", "CP") or other.name == "trivial branch"]
+    if point.label != "LP" or not others:
+        return False
+    lost = point.name.startswith("possible")  # the equations are singular at the crossing: nothing else was found
+    near = _SAME + _SAME_SHARE * step
+    return lost or any(np.max(np.abs(point.trial.x - other.trial.x)) < near for other in others)
