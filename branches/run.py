@@ -66,7 +66,7 @@ def _run(options) -> int:
     from branches.display import Display
     from branches.files import StoreError
     from branches.job import run_branch
-    from contin.errors import ContinError
+    from contin import ContinError
 
     display = Display(quiet=options.quiet)
     try:
@@ -86,7 +86,7 @@ def _run_diagram(config, options) -> int:
     from branches.display import Display
     from branches.executor import ExecutorError
     from branches.files import StoreError
-    from contin.errors import ContinError
+    from contin import ContinError
 
     if options.resume:
         raise ConfigError("--resume: a scene of many branches needs none; run it again and it computes what is missing")

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Who depends on whom, shape (values, states or more).
-Pattern = NDArray[np.bool_]
-
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Indices = NDArray[np.int64]
+#: Sparsity pattern, shape (values, inputs): which values depend on which inputs.
+Pattern = NDArray[np.bool_]
 #: A user's function, which the engine compiles.
 Function = Callable[..., Any]

@@ -1,4 +1,4 @@
-"""What users hand over, looked at before it is used: each function raises one sentence that names the field and the value."""
+"""Checks of what users hand over: each raises a `ProblemError` that names the field, the value and what is allowed."""
 
 from __future__ import annotations
 
@@ -11,55 +11,58 @@ import numpy as np
 
 from contin.errors import ProblemError
 
+#: Characters of a value that a message shows: with the rest of the sentence it fits on one line.
+_SHOWN = 60
+
 
 def shown(value: object) -> str:
-    """The value in one short line."""
+    """Return the value in one short line."""
     try:
         text = " ".join(repr(value).split())
     except Exception:  # an integer of too many digits, or an object whose repr is broken
         text = f"a value of type {type(value).__name__}"
-    return text if len(text) <= 60 else text[:57] + "..."
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
 
 
 def plain(name: str) -> str:
-    """A name that may be any text, as it is or in quotes."""
+    """Return a name that may be any text: as it is, or in quotes."""
     return name if name.isidentifier() else shown(name)
 
 
 def is_number(value: object) -> bool:
-    """Whether it is a real number, NaN and infinity included; a truth value is none, nor an integer beyond all floats."""
+    """Return whether a value is a real number; NaN and infinity are, True, False and integers beyond all floats are not."""
     if isinstance(value, int):
         return not isinstance(value, bool) and abs(value) <= sys.float_info.max
     return isinstance(value, (float, np.integer, np.floating))
 
 
 def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf) -> None:
-    """A number strictly between ``low`` and ``high``."""
+    """Require a number strictly between ``low`` and ``high``."""
     if not (is_number(value) and low < value < high):
         bounds = "a finite number" if math.inf == high == -low else f"a number between {low:g} and {high:g}"
         raise ProblemError(f"{what}: {shown(value)} must be {bounds}")
 
 
 def whole(what: str, value: Any, low: int, high: int) -> None:
-    """A whole number from ``low`` to ``high``."""
+    """Require a whole number from ``low`` to ``high``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
         raise ProblemError(f"{what}: {shown(value)} must be a whole number from {low} to {high}")
 
 
 def truth(what: str, value: Any) -> None:
-    """True or False."""
+    """Require True or False."""
     if not isinstance(value, (bool, np.bool_)):
         raise ProblemError(f"{what}: {shown(value)} must be True or False")
 
 
 def instance(what: str, value: Any, kind: type | tuple[type, ...], called: str) -> None:
-    """An object of a class, ``called`` so."""
+    """Require an object of a class; ``called`` names it in the message."""
     if not isinstance(value, kind):
         raise ProblemError(f"{what}: {shown(value)} must be {called}")
 
 
 def function(what: str, value: Any) -> Callable[..., Any]:
-    """Something that can be called."""
+    """Require something that can be called, and return it."""
     if not callable(value):
         raise ProblemError(f"{what}: {shown(value)} must be a function")
     found: Callable[..., Any] = value
@@ -67,14 +70,14 @@ def function(what: str, value: Any) -> Callable[..., Any]:
 
 
 def mapping(what: str, value: Any, holds: str) -> Mapping[str, Any]:
-    """A mapping from names to what it ``holds``."""
+    """Require a mapping from names to what it ``holds``, and return it."""
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
         raise ProblemError(f"{what}: {shown(value)} must be a dict from names to {holds}")
     return value
 
 
 def sequence(what: str, value: Any, holds: str) -> Sequence[Any]:
-    """A list, a tuple or an array of one dimension; text is none."""
+    """Require a list, a tuple or an array of one dimension, and return it; text is none of them."""
     array = isinstance(value, np.ndarray) and value.ndim == 1
     if not array and (not isinstance(value, Sequence) or isinstance(value, (str, bytes))):
         raise ProblemError(f"{what}: {shown(value)} must be a list of {holds}")
@@ -83,7 +86,7 @@ def sequence(what: str, value: Any, holds: str) -> Sequence[Any]:
 
 
 def names(what: str, value: Any) -> tuple[str, ...]:
-    """A list of names, as a tuple."""
+    """Require a list of names, and return it as a tuple."""
     found = tuple(sequence(what, value, "names"))
     if not all(isinstance(name, str) for name in found):
         raise ProblemError(f"{what}: {shown(value)} must be a list of names")

@@ -46,7 +46,7 @@ class Law:
         """``response(M1, M2, M3, kappa_n, *parameters)`` = (H, omega_1, omega_2, omega_3, dH/dkappa_n), plain Python."""
         if self.gradient:
             return self.gradient
-        from contin import gradient  # the engine is slow to load, and a law can be had without
+        from contin import gradient  # loads numba (.3 s): a law can be had without its derivatives
 
         return gradient(self.hamiltonian, ("M1", "M2", "M3", "kappa_n"))
 

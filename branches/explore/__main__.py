@@ -30,7 +30,7 @@ def main(argv=None) -> int:
     from branches.explore.gather import gather
     from branches.explore.page import MissingLibraryError, assemble
     from branches.files import StoreError, write_bytes
-    from contin.errors import ContinError
+    from contin import ContinError
 
     try:
         path = _page_path(options.out)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -141,9 +142,9 @@ class _Search:
             raise ConvergenceError("no branch point near by: the bordered matrix is singular")
         self._borders = _orthonormal(system, matrix.kernel), matrix.left()
         self._hessian: Array | None = None
-        self._slope = np.empty((2, 2))  # the Hessian, corrected by how the gradient has really changed
-        self._drop = np.zeros(2)  # the last update along the kernel
-        self._gradient = np.zeros(2)  # g before it
+        self._slope: Array = np.empty((2, 2))  # the Hessian, corrected by how the gradient has really changed
+        self._drop: Array = np.zeros(2)  # the last update along the kernel
+        self._gradient: Array = np.zeros(2)  # g before it
 
     def advance(self) -> bool:
         """Make one Newton step; return False where it leads nowhere."""
@@ -157,7 +158,8 @@ class _Search:
         if not (np.all(np.isfinite(self._hessian)) and np.all(np.isfinite(matrix.g))):
             return False
         correction = matrix.factors.solve(np.concatenate([matrix.residual + self.beta * self._borders[1], [0.0, 0.0]]))
-        self._drop, *_ = np.linalg.lstsq(self._slope, matrix.g, rcond=_FLAT)
+        drop: Any = np.linalg.lstsq(self._slope, matrix.g, rcond=_FLAT)[0]
+        self._drop = drop
         self._gradient = matrix.g
         if np.abs(self._slope @ self._drop - matrix.g).max() > _UNEXPLAINED * np.abs(matrix.g).max():
             return False  # a gradient that does not change along the kernel: no branch point here

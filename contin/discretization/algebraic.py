@@ -44,11 +44,11 @@ class Algebraic(System):
         return _NO_TIME
 
     def states(self, x: Array) -> Array:
-        """States, shape (1, n)."""
+        """Return the states, shape (1, n)."""
         return x[: self.state_size].reshape(1, -1)
 
     def residual(self, x: Array) -> Array:
-        """F at x, shape (equations,)."""
+        """Return F at x, shape (equations,)."""
         u, p = self.states(x), self.all_parameters(x)
         values: Array = self.problem.batch("residual").values(_NO_TIME, u, _none(self.state_size), p)[0]
         return values
@@ -62,30 +62,30 @@ class Algebraic(System):
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
-        """Residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
+        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
         residual, jacobian = self._jacobian(x)
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
         return residual, DenseFactors(np.vstack([np.hstack([jacobian, columns.T]), rows]))
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
         which = self._indices(names)
         u, p, n = self.states(x), self.all_parameters(x), self.state_size
         batch = self.problem.batch("residual")
         return batch.jacobian(_NO_TIME, u, _none(n), p, batch.colouring(which))[1][0, :, n:]
 
     def transposed_product(self, x: Array, w: Array) -> Array:
-        """F_x^T w, shape (size,)."""
+        """Return F_x^T w, shape (size,)."""
         product: Array = self._jacobian(x)[1].T @ w
         return product
 
     def eigenvalues(self, x: Array) -> ComplexArray:
-        """Eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
+        """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
         return np.linalg.eigvals(self._jacobian(x)[1][:, : self.state_size]).astype(complex, copy=False)
 
     def functionals(self, x: Array) -> Array:
-        """Values of the problem's functionals, in their order."""
+        """Return the values of the problem's functionals, in their order."""
         if not self.problem.functionals:
             return np.empty(0)
         batch = self.problem.batch("functionals")
@@ -93,21 +93,21 @@ class Algebraic(System):
         return values
 
     def carrier(self, other: Discretization) -> Carrier:
-        """The function that carries vectors of unknowns to another system of this problem: itself."""
+        """Return the function that carries vectors of unknowns to another system of this problem: a copy."""
         return np.array
 
     def refined(self) -> None:
-        """None: there is no mesh."""
+        """Return None: there is no mesh."""
 
     def adapted(self, x: Array, control: MeshControl) -> None:
-        """None: there is no mesh."""
+        """Return None: there is no mesh."""
 
     def with_parameters(self, values: Mapping[str, float]) -> Algebraic:
-        """The same problem with other values of parameters that are not free."""
+        """Return the same problem with other values of parameters that are not free."""
         return Algebraic(self.problem, self.free, dict(zip(self.problem.parameters, self.parameters)) | dict(values))
 
     def with_free(self, free: Sequence[str], x: Array) -> tuple[Algebraic, Array]:
-        """The same problem with other free parameters (values from x), and x for it."""
+        """Return the same problem with other free parameters (values from x), and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
         other = Algebraic(self.problem, free, values)
         return other, other.pack(x[: self.state_size], values)

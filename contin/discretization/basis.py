@@ -36,7 +36,12 @@ class Basis:
 
 @functools.cache
 def basis(degree: int) -> Basis:
-    """The tables of a degree from 2 to 8."""
+    """Return the tables of a degree from 2 to 8.
+
+    Raises
+    ------
+    ProblemError
+    """
     if degree not in DEGREES:
         raise ProblemError(f"degree: {degree!r} must be a whole number from 2 to 8")
     legendre = np.polynomial.legendre
@@ -60,7 +65,7 @@ def basis(degree: int) -> Basis:
 
 
 def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
-    """Matrix (len(at), len(nodes)) that evaluates the polynomial through the nodes ``at`` points (barycentric form)."""
+    """Return the matrix (len(at), len(nodes)) that evaluates the polynomial through the nodes at points (barycentric form)."""
     distance = at[:, None] - nodes
     exact = distance == 0
     terms = barycentric / np.where(exact, 1.0, distance)

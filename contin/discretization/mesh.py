@@ -1,4 +1,4 @@
-"""Where the mesh points belong: an error monitor, equidistribution, and how many intervals it takes."""
+"""Adaptation of the mesh: error density, equidistribution, number of intervals."""
 
 from __future__ import annotations
 
@@ -11,23 +11,33 @@ from contin.arrays import Array
 from contin.discretization.basis import Basis
 from contin.errors import ProblemError
 
-#: More intervals than any machine has room for.
+#: More intervals than any machine has room for: a bound for what users give.
 MOST_INTERVALS = 1_000_000
+
+#: Error wanted between the mesh points for an error e of 1 at them, as a factor: measured so that e is reached, with a margin
+#: of about ten, on the bank of test problems. At .3 errors at the mesh points exceed the tolerance.
+_BETWEEN = 0.03
+#: Part of its mean that the density is raised to: an interval grows to ten times the mean at most.
+_LEAST_DENSITY = 0.1
+#: A mesh stays with up to so many times the intervals that it needs, ...
+_TOO_MANY = 1.6
+#: ... and with an interval that has up to so many times its share of the error.
+_TOO_LARGE = 1.5
 
 
 @dataclass(frozen=True)
 class MeshControl:
-    """When and to what the mesh adapts.
+    """How the mesh adapts.
 
     Attributes
     ----------
     tolerance : float
-        Wanted error at the mesh points. Collocation is superconvergent there, h^(2 d), while the monitor sees the error
-        h^(d+1) between them; so that one is kept below 0.03 tolerance^((d+1)/(2 d)).
+        Wanted error at the mesh points. Collocation is superconvergent there, h^(2 d), while the density is about the error
+        h^(d+1) between them: that one is kept below 0.03 tolerance^((d+1)/(2 d)).
     min_intervals, max_intervals : int
         Bounds on the number of intervals N.
     every : int
-        Steps between looks at the mesh; 0 keeps it as it is.
+        Number of steps after which the mesh is looked at again; 0 keeps it as it is.
     """
 
     tolerance: float = 1e-12
@@ -45,7 +55,7 @@ class MeshControl:
 
 
 def density(basis: Basis, mesh: Array, states: Array) -> Array:
-    """The (d+1)-th root of the size of the (d+1)-th derivative, by interval, shape (N,).
+    """Return the (d+1)-th root of the size of the (d+1)-th derivative, by interval, shape (N,).
 
     The derivative comes from differences of the d-th ones of neighbouring intervals (de Boor 1973, as in AUTO and COLSYS),
     each component scaled by max(1, max |u|).
@@ -72,21 +82,21 @@ def density(basis: Basis, mesh: Array, states: Array) -> Array:
 
 
 def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl) -> Array | None:
-    """A better mesh for a solution, given by its states at the nodes, or None where the present one is good enough.
+    """Return a better mesh for a solution, given by its states at the nodes, or None where the present one is good enough.
 
-    It equidistributes the monitor (smoothed, and raised to at least a tenth of its mean so that no interval grows without
+    It equidistributes the density (smoothed, and raised to at least a tenth of its mean so that no interval grows without
     bound) over as many intervals as ``control.tolerance`` takes, by the interpolation error of degree d.
     """
     h, d = np.diff(mesh), basis.degree
     phi = density(basis, mesh, states)
     padded = np.pad(phi, 1, mode="edge")
     phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
-    phi = np.maximum(phi, 0.1 * (phi @ h) / h.sum())
+    phi = np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
     total = phi @ h
-    allowed = (0.03 * control.tolerance ** ((d + 1) / (2 * d)) / basis.constant) ** (1 / (d + 1))
+    allowed = (_BETWEEN * control.tolerance ** ((d + 1) / (2 * d)) / basis.constant) ** (1 / (d + 1))
     wanted = int(np.clip(np.ceil(total / allowed), control.min_intervals, control.max_intervals))
-    enough = wanted <= h.size <= max(1.6 * wanted, control.min_intervals)
-    if enough and (phi * h).max() <= 1.5 * max(total / h.size, allowed * wanted / h.size):
+    enough = wanted <= h.size <= max(_TOO_MANY * wanted, control.min_intervals)
+    if enough and (phi * h).max() <= _TOO_LARGE * max(total / h.size, allowed * wanted / h.size):
         return None
     intervals = h.size if enough else wanted
     if not total > 0:

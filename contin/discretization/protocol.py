@@ -1,7 +1,6 @@
-"""What the parts of the engine ask of each other: the interface of a discretized problem, of its factors, of its statement.
+"""The protocol of a discretized problem: what corrector, detection and the continuation loop ask of it.
 
-The continuation loop, the corrector and the locators know a problem by these alone; `contin.Collocation` and
-`contin.Algebraic` are of this kind, and so are the extended systems of `contin.curve`.
+`contin.Collocation` and `contin.Algebraic` follow it, and so do the extended systems of `contin.curve`.
 """
 
 from __future__ import annotations
@@ -23,12 +22,12 @@ class Equations(Protocol):
     """F(x) = 0, as Newton's method sees it."""
 
     def residual(self, x: Array) -> Array:
-        """F(x), shape (equations,)."""
+        """Return F(x), shape (equations,)."""
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
-        """F(x), and the factored matrix [[F_x, columns^T], [rows]]."""
+        """Return F(x), and the factored matrix [[F_x, columns^T], [rows]]."""
 
 
 class Discretization(Equations, Protocol):
@@ -39,10 +38,14 @@ class Discretization(Equations, Protocol):
     problem : Statement
     free : tuple of str
         The free parameters.
-    size, state_size, equations : int
-        Unknowns; where the free parameters begin among them; equations.
+    size : int
+        Number of unknowns.
+    state_size : int
+        Place of the first free parameter among them.
+    equations : int
+        Number of equations.
     weights : ndarray, shape (size,)
-        Of the inner product.
+        Weights of the inner product.
     intervals, degree : int
         Of the mesh; 0 without one.
     """
@@ -59,41 +62,41 @@ class Discretization(Equations, Protocol):
     @property
     @abstractmethod
     def nodes(self) -> Array:
-        """Where the states are given, shape (K,)."""
+        """Values of t at the nodes, where the states are given; shape (K,)."""
 
     @abstractmethod
     def states(self, x: Array) -> Array:
-        """States at the nodes, shape (K, n)."""
+        """Return the states at the nodes, shape (K, n)."""
 
     @abstractmethod
     def all_parameters(self, x: Array) -> Array:
-        """Values of all parameters."""
+        """Return the values of all parameters."""
 
     @abstractmethod
     def parameter(self, x: Array, name: str) -> float:
-        """The value of one parameter."""
+        """Return the value of one parameter."""
 
     @abstractmethod
     def parameter_index(self, name: str) -> int:
-        """Where a free parameter stands in x."""
+        """Return the place of a free parameter in x."""
 
     @abstractmethod
     def functionals(self, x: Array) -> Array:
-        """Values of the problem's functionals."""
+        """Return the values of the problem's functionals."""
 
     @abstractmethod
     def carrier(self, other: Any) -> Carrier:
-        """The function that carries vectors of unknowns to another discretization of this problem."""
+        """Return the function that carries vectors of unknowns to another discretization of this problem."""
 
     @abstractmethod
     def refined(self) -> tuple[Discretization, Carrier] | None:
-        """The same on every interval halved, and the carrier; None without a mesh."""
+        """Return the same on every interval halved, and the carrier; None without a mesh."""
 
     @abstractmethod
     def adapted(self, x: Array, control: MeshControl) -> tuple[Discretization, Carrier] | None:
-        """The same on a better mesh for x, and the carrier; None where there is no need."""
+        """Return the same on a better mesh for x, and the carrier; None where there is no need."""
 
 
 def inner(system: Discretization, a: Array, b: Array) -> float:
-    """The weighted inner product of two vectors of unknowns."""
+    """Return the weighted inner product of two vectors of unknowns."""
     return float((system.weights * a) @ b)

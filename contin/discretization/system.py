@@ -1,4 +1,4 @@
-"""What discretized problems of both kinds share: names, values and places of parameters."""
+"""Discretized problems of both kinds: names, values and places of parameters."""
 
 from __future__ import annotations
 
@@ -47,47 +47,47 @@ class System(Discretization):
         self._free = self._indices(self.free)
 
     def _indices(self, names: Sequence[str]) -> Indices:
-        """Where parameters stand among all of them."""
+        """Return the places of parameters among all of them."""
         return np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
 
     def pack(self, states: Any, values: Mapping[str, float]) -> Array:
-        """A vector of unknowns from states and the mapping of free parameters."""
+        """Return a vector of unknowns from states and the mapping of free parameters."""
         return np.concatenate([np.asarray(states, dtype=float).ravel(), [float(values[name]) for name in self.free]])
 
     def all_parameters(self, x: Array) -> Array:
-        """Values of all parameters, shape (number of names,), the free ones from x."""
+        """Return the values of all parameters, shape (number of names,), the free ones from x."""
         p = self.parameters.copy()
         p[self._free] = x[self.state_size :]
         return p
 
     def parameter(self, x: Array, name: str) -> float:
-        """The value of one parameter by name."""
+        """Return the value of one parameter."""
         return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
 
     def parameter_index(self, name: str) -> int:
-        """Where the free parameter ``name`` stands in x."""
+        """Return the place of the free parameter ``name`` in x."""
         return self.state_size + self.free.index(name)
 
     @abstractmethod
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
 
     @abstractmethod
     def refined(self) -> tuple[System, Carrier] | None:
-        """The same problem with every interval halved, and the carrier; None without a mesh."""
+        """Return the same problem with every interval halved, and the carrier; None without a mesh."""
 
     @abstractmethod
     def adapted(self, x: Array, control: MeshControl) -> tuple[System, Carrier] | None:
-        """The same problem on a better mesh for x, and the carrier; None where there is no need."""
+        """Return the same problem on a better mesh for x, and the carrier; None where there is no need."""
 
     @abstractmethod
     def transposed_product(self, x: Array, w: Array) -> Array:
-        """F_x^T w, shape (size,)."""
+        """Return F_x^T w, shape (size,)."""
 
     @abstractmethod
     def with_parameters(self, values: Mapping[str, float]) -> System:
-        """The same problem with other values of parameters that are not free."""
+        """Return the same problem with other values of parameters that are not free."""
 
     @abstractmethod
     def with_free(self, free: Sequence[str], x: Array) -> tuple[System, Array]:
-        """The same problem with other free parameters (values from x), and x for it."""
+        """Return the same problem with other free parameters (values from x), and x for it."""

@@ -184,7 +184,9 @@ def _place_cache() -> None:
     if os.access(beside if beside.exists() else package, os.W_OK):
         return
     with contextlib.suppress(ContinError):  # without any folder nothing is kept; what needs one says so
-        os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = str(cache_directory() / "engine")
+        folder = str(cache_directory() / "engine")
+        os.environ["NUMBA_CACHE_DIR"] = folder
+        vars(numba.config)["CACHE_DIR"] = folder
 
 
 _place_cache()

@@ -55,7 +55,8 @@ def _sympy_name(value: Any) -> str:
     of_math = isinstance(value, types.BuiltinFunctionType) and value.__module__ == "math"
     if not of_math and not isinstance(value, np.ufunc):
         return ""
-    return _OTHER_NAMES.get(value.__name__, value.__name__)
+    name: str = value.__name__
+    return _OTHER_NAMES.get(name, name)
 
 
 def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[..., tuple[float, ...]]:

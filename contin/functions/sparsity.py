@@ -97,7 +97,7 @@ def _traced(function: Function, count: int, signature: Signature) -> list[Any]:
             arguments.append(_TracingNumber(0))
             continue
         values = [next(marks) for _ in names]
-        arguments.append(np.array(values, dtype=object) if fills else namedtuple("Values", names)(*values))
+        arguments.append(np.array(values, dtype=object) if fills else _tuple(names, values))
     traceable = _Traceable().function(function)
     if fills:
         result = np.zeros(count, dtype=object)
@@ -105,6 +105,11 @@ def _traced(function: Function, count: int, signature: Signature) -> list[Any]:
         return list(result)
     result = traceable(*arguments)
     return list(result) if count else [result]
+
+
+def _tuple(names: tuple[str, ...], values: list[_TracingNumber]) -> Any:
+    kind: Any = namedtuple("Values", list(names))  # type: ignore[misc]  # noqa: PYI024
+    return kind(*values)
 
 
 def _sources(value: Any) -> int:

@@ -10,7 +10,7 @@ from contin.arrays import Array
 from contin.functions.compiler import Matrix, kernel
 from contin.linalg.factors import Factors
 
-#: Singular directions watched between two points.
+#: Singular values that are watched between two points: a double branch point and one more. With more each step costs more.
 _WATCHED = 3
 
 
@@ -41,9 +41,10 @@ def _orthonormalize(rows: Matrix) -> None:
 
 
 def smallest_directions(factors: Factors, size: int, rounds: int = 2) -> tuple[Array, Array, Array]:
-    """Right and left singular vectors, as rows, of the smallest singular values: inverse iteration on a block.
+    """Return right and left singular vectors of the smallest singular values, as rows, by inverse iteration on a block.
 
-    It starts from random vectors, not from those of the point before: a run resumed must decide as one undisturbed.
+    It starts from random vectors, not from those of the point before: a resumed run must decide as one that was never
+    interrupted.
 
     Returns
     -------

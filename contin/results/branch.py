@@ -1,4 +1,4 @@
-"""Points and branches: plain data, and looking things up in it."""
+"""A branch: its points in order, and why its run ended."""
 
 from __future__ import annotations
 
@@ -9,13 +9,25 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.results import plot, table
 from contin.results.point import Point
 from contin.stepping.state import Stop
 
 
 @dataclass
 class Branch:
-    """The points of one branch in order, and why it stopped."""
+    """The points of one branch in order, and why its run ended.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+    >>> [point.label for point in branch if point.label], str(branch.stop)
+    (['EP', 'LP', 'EP'], 'reached a = 4')
+    >>> abs(branch.labelled("LP")[0]["a"]) < 1e-12
+    True
+    """
 
     points: list[Point] = field(default_factory=list)
     stop: Stop | None = None
@@ -27,26 +39,49 @@ class Branch:
         return iter(self.points)
 
     def column(self, name: str) -> Array:
-        """A parameter or functional over all points."""
+        """Return a parameter or functional over all points."""
         return np.array([point[name] for point in self.points])
 
     def labelled(self, label: str) -> list[Point]:
-        """The points that carry a label, in order."""
+        """Return the points that carry a label, in order."""
         return [point for point in self.points if point.label == label]
 
     def to_pandas(self) -> Any:
-        """All points as a ``pandas.DataFrame``; see `contin.notebook.to_pandas`."""
-        from contin.results import notebook
+        """Return all points as a ``pandas.DataFrame``, a row a point, in order.
 
-        return notebook.to_pandas(self)
+        Columns: ``label``, ``name``, ``arclength``, ``intervals``, ``iterations``, all parameters, all functionals, and
+        ``norm``.
+
+        Raises
+        ------
+        ImportError
+            pandas is not installed.
+        """
+        return table.to_pandas(self.points)
 
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
-        """One column against another, by matplotlib; see `contin.notebook.plot`."""
-        from contin.results import notebook
+        """Draw one column against another, with marks at labelled points.
 
-        return notebook.plot(self, x, y, axes)
+        Parameters
+        ----------
+        x, y : str, optional
+            A parameter, a functional, ``"arclength"`` or ``"norm"`` (root mean square of the states over the nodes). By default
+            the first free parameter, and the first functional (``"norm"`` where there is none).
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; a figure of its own without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ProblemError
+            A column that the branch does not have, or no points.
+        ImportError
+            matplotlib is not installed.
+        """
+        return plot.plot(self.points, x, y, axes)
 
     def _repr_html_(self) -> str:
-        from contin.results import notebook
-
-        return notebook.to_html(self)
+        return table.to_html(self.points, self.stop)

@@ -14,7 +14,7 @@ from contin.stepping.trial import Trial
 
 
 def system_of(point: Point, what: str) -> System:
-    """The system of a point, where other parameters of its problem may become free.
+    """Return the system of a point, where other parameters of its problem may become free.
 
     Raises
     ------
@@ -33,15 +33,16 @@ class Point:
     Attributes
     ----------
     label : str
-        AUTO's two letters: EP end, LP fold (limit point), BP branch point, UZ user zero, MX failed; "" for a regular point.
+        AUTO's two letters: EP end, LP fold (limit point), BP branch point, HB Hopf point, UZ user zero, MX failed; "" for a
+        regular point.
     name : str
-        What the label refers to (the monitor's name), "" for a regular point.
+        The test function's name, "" for a regular point.
     parameters, functionals : mapping of str to float
         All parameters; the problem's functionals.
     x, tangent : ndarray, shape (size,)
         Unknowns of ``system``, and the unit tangent (``nan`` at a branch point, which has several).
     system : Discretization
-        The discretized problem of this point.
+        The discretized problem.
     arclength : float
         Distance travelled from the branch's first point, in the weighted norm.
     iterations, newton_error : int, float
@@ -50,7 +51,7 @@ class Point:
         Estimated error of the free parameters, where it was asked for: of the discretization or, without a mesh, of the
         location alone. NaN where the point was not found again, and at points of higher codimension.
     details : object
-        What the location found besides: the `contin.switching.BranchPoint` of a BP.
+        What the location found besides: the `BranchPoint` of a BP, the frequency of an HB.
     """
 
     label: str
@@ -67,12 +68,12 @@ class Point:
     details: Any = None
 
     def __getitem__(self, name: str) -> float:
-        """A parameter or functional by name."""
+        """Return a parameter or functional by name."""
         return self.parameters[name] if name in self.parameters else self.functionals[name]
 
 
 def point_of(system: Discretization, x: Array, iterations: int = 0, error: float = 0.0) -> Point:
-    """A Point of any solution x of a system."""
+    """Return the Point of any solution x of a system."""
     trial = Trial.without_tangent(system, x)
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point("", "", parameters, trial.functionals, x, trial.tangent, system, 0.0, iterations, error)

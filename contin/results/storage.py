@@ -27,10 +27,10 @@ _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 
 
 def save(branch: Branch, path: str | Path) -> None:
-    """Write a branch: all its points, with their solutions.
+    """Write a branch to a file: all its points, with their solutions.
 
-    The problem itself is code and is not stored: `load` takes it again. Details of branch points are kept, those of other
-    events are not.
+    The problem is code and is not stored: `load` takes it again. Details of branch points are kept, those of other special
+    points are not.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def save(branch: Branch, path: str | Path) -> None:
 
 
 def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> Branch:
-    """Read a branch back, as points of ``problem``.
+    """Read a branch from a file, as points of ``problem``.
 
     Raises
     ------

@@ -193,6 +193,10 @@ class TestFunction:
         return after >= 0 if self.limit else sign_changed(before, after)
 
 
+#: The first name of the class, for programs that use it.
+Monitor = TestFunction
+
+
 def sign_changed(before: float, after: float) -> bool:
     """Return whether a value passed zero. A zero at the start of a step is not counted again."""
     return bool(np.isfinite(before) and np.isfinite(after) and before != 0 and before * after <= 0)

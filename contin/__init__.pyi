@@ -1,0 +1,33 @@
+# The public names, and where they come from. `import contin` loads none of them: each is imported when it is first used.
+from .analysis.diagram import Diagram, diagram
+from .analysis.sensitivity import sensitivities
+from .analysis.solving import solve
+from .analysis.two_parameter import curve
+from .continuation.run import Continuation, follow
+from .continuation.trace import trace
+from .detection.branch_point import BranchPoint, MultiplePoint, locate_branch_point
+from .discretization.algebraic import Algebraic
+from .discretization.basis import basis, interpolation
+from .discretization.collocation import Collocation
+from .discretization.mesh import MeshControl
+from .errors import ContinError, ConvergenceError, ProblemError
+from .functions.batch import Batch
+from .functions.cache import cache_directory
+from .functions.gradient import gradient
+from .problems.algebraic import AlgebraicProblem
+from .problems.boundary_value import BoundaryValueProblem
+from .results.branch import Branch
+from .results.point import Point, point_of
+from .results.storage import load, save
+from .stepping.newton import Newton, correct
+from .stepping.settings import Settings
+from .stepping.state import State, Stop
+from .stepping.trial import Monitor, TestFunction, Trial
+
+__all__ = [
+    "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
+    "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
+    "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "basis", "cache_directory", "correct", "curve",
+    "diagram", "follow", "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save", "sensitivities",
+    "solve", "trace",
+]  # fmt: skip

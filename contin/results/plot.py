@@ -1,0 +1,86 @@
+"""Columns of a branch against each other, drawn by matplotlib (which is imported when it is asked for)."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.errors import ProblemError
+from contin.results.point import Point
+
+#: Marks of labelled points: matplotlib's symbol and colour (Okabe-Ito: told apart by the colour-blind).
+_MARKS = {
+    "LP": ("*", "#D55E00"), "BP": ("o", "#000000"), "HB": ("s", "#009E73"), "UZ": ("D", "#CC79A7"), "CP": ("^", "#D55E00"),
+}  # fmt: skip
+_OTHER_MARK = (".", "#000000")
+#: Areas of the marks in points squared: a star needs a larger one to look as large.
+_AREA = {"*": 90, "": 30}
+
+
+def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+    """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`."""
+    x, y = _columns(points, x, y)
+    across, up = column(points, x), column(points, y)
+    if axes is None:
+        try:
+            from matplotlib import pyplot
+        except ImportError as error:
+            raise ImportError("plot needs matplotlib, which is not installed: pip install matplotlib") from error
+        axes = pyplot.subplots(layout="constrained")[1]
+    axes.plot(across, up, lw=1.5, color="#0072B2", zorder=1)
+    labels = [point.label for point in points]
+    for label in dict.fromkeys(filter(None, labels)):
+        here = [i for i, other in enumerate(labels) if other == label]
+        marker, colour = _MARKS.get(label, _OTHER_MARK)
+        area = _AREA.get(marker, _AREA[""])
+        axes.scatter(across[here], up[here], s=area, marker=marker, color=colour, label=label, zorder=2)
+    axes.set(xlabel=x, ylabel=y)
+    if any(labels):
+        axes.legend(frameon=False)
+    return axes
+
+
+def picture(points: Sequence[Point]) -> str:
+    """Return the plot as SVG, or nothing where matplotlib is not installed."""
+    try:
+        from matplotlib import rc_context
+        from matplotlib.figure import Figure
+    except ImportError:
+        return ""
+    text = io.StringIO()
+    with rc_context({"svg.hashsalt": "contin"}):  # the same branch gives the same file
+        figure = Figure(figsize=(4.5, 2.8), layout="constrained")
+        plot(points, axes=figure.subplots())
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def column(points: Sequence[Point], name: str) -> Array:
+    """Return a parameter, a functional, ``"arclength"`` or ``"norm"`` over all points.
+
+    The norm is the root mean square of the states over the nodes.
+    """
+    if points and (name in points[0].parameters or name in points[0].functionals):
+        return np.array([point[name] for point in points])
+    if name == "arclength":
+        return np.array([point.arclength for point in points])
+    return np.array([np.sqrt(np.mean(np.sum(point.system.states(point.x) ** 2, axis=1))) for point in points])
+
+
+def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str, str]:
+    """Return the names of the two columns to draw, with the defaults of `plot`."""
+    if not points:
+        raise ProblemError("the branch has no points to draw")
+    first = points[0]
+    known = [*first.parameters, *first.functionals, "arclength", "norm"]
+    x = first.system.free[0] if x is None else x
+    y = next(iter(first.functionals), "norm") if y is None else y
+    for argument, name in (("x", x), ("y", y)):
+        if name not in known:
+            raise ProblemError(f"{argument}: {checks.shown(name)} is no column; there are {', '.join(known)}")
+    return x, y
