@@ -8,12 +8,12 @@ import glob
 import io
 import os
 import platform
-import secrets
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
+
+from contin import temporary_name, write_whole
 
 #: Bytes that the smallest result takes, for a look at the disk before anything is computed.
 _SMALLEST = 64 * 1024
@@ -21,18 +21,6 @@ _SMALLEST = 64 * 1024
 
 class StoreError(Exception):
     """A file that cannot be written or read; the message is one sentence."""
-
-
-def _temporary(path: Path) -> Path:
-    """A hidden name of its own beside ``path``, no longer than names may be."""
-    return path.with_name(f".{path.name[:50]}.{secrets.token_hex(4)}.part")
-
-
-def _write(path: Path, data: bytes) -> None:
-    with open(path, "xb") as file:  # its mode is what the umask says
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -43,16 +31,8 @@ def write_bytes(path: Path, data: bytes) -> None:
     StoreError
         It cannot be written.
     """
-    path = Path(os.path.realpath(path))
-    temporary = _temporary(path)
     try:
-        try:
-            _write(temporary, data)
-            if path.exists():
-                shutil.copymode(path, temporary)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_whole(path, data)
     except OSError as error:
         raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
 
@@ -178,9 +158,9 @@ def prepare(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists() and not os.access(path, os.W_OK):
             raise StoreError(f"cannot write {str(path)!r}: the file is read-only")
-        probe = _temporary(path)
+        probe = temporary_name(path)
         try:
-            _write(probe, bytes(_SMALLEST))
+            write_whole(probe, bytes(_SMALLEST))
         finally:
             probe.unlink(missing_ok=True)
         for left in path.parent.glob(f".{glob.escape(path.name[:50])}.????????.part"):

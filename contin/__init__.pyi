@@ -11,6 +11,7 @@ from .discretization.basis import basis, interpolation
 from .discretization.collocation import Collocation
 from .discretization.mesh import MeshControl
 from .errors import ContinError, ConvergenceError, ProblemError
+from .files import temporary_name, write_whole
 from .functions.batch import Batch
 from .functions.cache import cache_directory
 from .functions.gradient import gradient
@@ -29,5 +30,5 @@ __all__ = [
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
     "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "basis", "cache_directory", "correct", "curve",
     "diagram", "follow", "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save", "sensitivities",
-    "solve", "trace",
+    "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import functools
 import os
-import secrets
 import sys
 import tempfile
 from pathlib import Path
 
 from contin.errors import ContinError
+from contin.files import write_whole
 
 _ADVICE = "set CONTIN_CACHE_DIR to a folder that can be written"
 
 
 def cache_directory() -> Path:
-    """Where compiled problems are kept: ``CONTIN_CACHE_DIR``, else the user's cache directory, else a temporary one."""
+    """Return the folder for compiled problems: ``CONTIN_CACHE_DIR``, else the user's cache directory, else a temporary one."""
     chosen = os.environ.get("CONTIN_CACHE_DIR")
     if not chosen:
         from platformdirs import user_cache_dir
@@ -40,27 +40,8 @@ def _temporary_directory() -> Path:
     return path
 
 
-def write_bytes(path: Path, data: bytes) -> None:
-    """Put a whole file in place of ``path``: no process, and no power cut, ever sees half of it.
-
-    Raises
-    ------
-    OSError
-        It cannot be written; what was there is left as it was.
-    """
-    temporary = path.with_name(f".{path.name[:50]}.{secrets.token_hex(4)}.part")
-    try:
-        with open(temporary, "xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def write_source(name: str, text: str) -> Path:
-    """Keep generated code in the cache directory or, where that is full, in a temporary one; the path.
+    """Write generated code to the cache directory or, where that is full, to a temporary one; return its path.
 
     Raises
     ------
@@ -69,12 +50,12 @@ def write_source(name: str, text: str) -> Path:
     """
     folder = cache_directory()
     try:
-        write_bytes(folder / name, text.encode("utf-8"))
+        write_whole(folder / name, text.encode("utf-8"))
         return folder / name
     except OSError:
         path = _temporary_directory() / name
     try:
-        write_bytes(path, text.encode("utf-8"))
+        write_whole(path, text.encode("utf-8"))
     except OSError as error:
         raise ContinError(f"no place for compiled code: {folder} and {path.parent}: {error.strerror}; {_ADVICE}") from error
     return path

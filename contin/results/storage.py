@@ -15,7 +15,7 @@ from contin.detection.branch_point import BranchPoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
 from contin.errors import ProblemError
-from contin.functions.cache import write_bytes
+from contin.files import write_whole
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.results.branch import Branch
@@ -72,7 +72,7 @@ def save(branch: Branch, path: str | Path) -> None:
     }  # fmt: skip
     image = io.BytesIO()
     np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
-    write_bytes(Path(path), image.getvalue())
+    write_whole(path, image.getvalue())
 
 
 def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> Branch:
