@@ -57,10 +57,11 @@ def _killed_while_writing(scene: Scene, chance: random.Random) -> Run:
     return run
 
 
-def writers() -> tuple[str, str]:
+def writers() -> tuple[str, ...]:
     from branches import files, store
+    from contin import write_whole
 
-    return files.__file__, store.__file__
+    return files.__file__, store.__file__, write_whole.__code__.co_filename
 
 
 def _no_room(scene: Scene, chance: random.Random) -> Run:
