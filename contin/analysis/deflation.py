@@ -1,4 +1,8 @@
-"""Deflation: solutions other than the known ones."""
+"""Deflation: solutions other than the known ones (Farrell, Birkisson & Funke 2015).
+
+Newton's method is applied to F multiplied by prod (1 + 1 / |x - r|^2) over the known solutions r. Its step is that of F,
+stretched: known solutions repel it.
+"""
 
 from __future__ import annotations
 
@@ -12,24 +16,36 @@ from contin.errors import ConvergenceError
 from contin.results.point import Point
 from contin.stepping.newton import Corrected, Newton, correct
 
-#: Solutions no further apart than this are one.
+#: Solutions no further apart than this are one; the deflated iteration ends at updates of that size.
 _SAME = 1e-6
-#: Where a deflated Newton iteration starts, as multiples of the guess's distance from the nearest known solution, and its
-#: longest step. It wanders before it converges, and may not come back; then it is the turn of the next.
+#: A guess that is a known solution itself is moved by this part of 1 + |x|.
+_ASIDE = 0.1
+#: Where a deflated iteration starts, as multiples of the guess's distance from the nearest known solution, and its longest
+#: step. It wanders before it converges, and may not come back; then it is the turn of the next.
 _STARTS = [(m, longest) for longest in (3.0, 1.0, 0.3) for m in (1.0, -1.0, 5.0, -5.0, 20.0, -20.0, 50.0, -50.0)]
+#: Iterations from one start: ten times those of an iteration that converges.
+_MOST_ITERATIONS = 100
+#: Smallest squared distance, in place of zero where it is divided by.
+_NO_DISTANCE = 1e-300
 
 
-def _correct_away(system: Discretization, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
-    """Newton on the deflated residual: a Newton step stretched so that known solutions repel."""
+def correct_away(system: Discretization, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
+    """Return a solution near x that is none of the ``others``.
+
+    Raises
+    ------
+    ConvergenceError
+        None was found.
+    """
     known = [point.system.carrier(system)(point.x)[: system.state_size] for point in others]
     known = [np.append(states, x[system.state_size :]) for states in known]
     nearest = min(known, key=lambda root: inner(system, x - root, x - root))
     away = x - nearest
     if np.max(np.abs(away)) < _SAME:  # the known solution itself for a guess
-        away = np.where(np.arange(x.size) < system.state_size, 0.1 * (1 + np.abs(x)), 0.0)
+        away = np.where(np.arange(x.size) < system.state_size, _ASIDE * (1 + np.abs(x)), 0.0)
     for multiple, longest in _STARTS:
         with np.errstate(all="ignore"):
-            found = _wander(system, nearest + multiple * away, known, longest)
+            found = _deflated(system, nearest + multiple * away, known, longest)
         if found is not None:
             done = correct(system, found, newton=newton)
             if all(np.max(np.abs(done.x - root)) > _SAME for root in known):
@@ -37,21 +53,21 @@ def _correct_away(system: Discretization, x: Array, others: Sequence[Point], new
     raise ConvergenceError("no further solution was found from this guess; another guess may lead to one")
 
 
-def _wander(system: Discretization, x: Array, known: list[Array], longest: float, max_iterations: int = 100) -> Array | None:
-    """Where the deflated iteration from x converges, or None."""
-    for _ in range(max_iterations):
+def _deflated(system: Discretization, x: Array, known: list[Array], longest: float) -> Array | None:
+    """Return where the deflated iteration from x converges, or None."""
+    for _ in range(_MOST_ITERATIONS):
         residual, factors = system.linearize(x)
         step = -factors.solve(residual)
         stretch = 0.0  # the derivative of log(prod (1 + 1 / |x - r|^2)) along the step
         for root in known:
             away = x - root
-            distance = max(inner(system, away, away), 1e-300)
+            distance = max(inner(system, away, away), _NO_DISTANCE)
             stretch -= 2 * inner(system, away, step) / (distance * (1 + distance))
         step = step / (1 - stretch)
         size = np.max(np.abs(step) / (1 + np.abs(x)))
         if not np.isfinite(size):
             return None
         x = x + step * min(1.0, longest / size)
-        if size < 1e-6:
+        if size < _SAME:
             return x
     return None

@@ -1,4 +1,4 @@
-"""All branches that hang together: follow one, leave it at every branch point, and so on to a given depth."""
+"""Connected branches: follow one, leave it at every branch point, and so on to a given depth."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Diagram:
     junctions: list[Junction] = field(default_factory=list)
 
     def graph(self) -> Any:
-        """The diagram as a ``networkx.MultiGraph``.
+        """Return the diagram as a ``networkx.MultiGraph``.
 
         Nodes are special points (attributes: label, name, parameters and functionals), shared where branches meet; edges are
         the pieces of branches between them (attributes: branch, points, parameter and functional columns).
@@ -83,7 +83,7 @@ def _values(point: Point) -> dict[str, float]:
 
 
 class _Explorer:
-    """The work of `diagram`."""
+    """The search of `diagram`: branches and junctions so far."""
 
     def __init__(self, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float) -> None:
         self.settings, self.tolerance = settings, tolerance
@@ -117,7 +117,7 @@ class _Explorer:
             junction.failed.append((which, way, str(error)))
 
     def _follow(self, run: Continuation, depth: int, origin: Junction | None = None) -> None:
-        """One run, watched: at a junction that it comes to, what it passed through counts as taken; known ground ends it."""
+        """Follow one run to its end, or to a known branch. Half-branches that it passes at junctions count as taken."""
         number, branch = len(self.result.branches), Branch()
         self.result.branches.append(branch)
         for place, point in enumerate(run):
@@ -130,7 +130,7 @@ class _Explorer:
         branch.stop = branch.stop or run.stop
 
     def _arrived(self, point: Point, number: int, depth: int) -> bool:
-        """Note a branch point that a run passes; True if the way ahead was followed before."""
+        """Note a branch point that a run passes; return True if the way ahead was followed before."""
         for junction in self.result.junctions:
             image = self._match(junction.point, point)
             if image is None:
@@ -147,7 +147,7 @@ class _Explorer:
         return False
 
     def _match(self, known: Point, point: Point) -> tuple[int, int] | None:
-        """(tangent, way) of a known junction along which ``point``'s own branch goes, if they are one point up to symmetry."""
+        """Return (tangent, way) of a known junction along which the branch of ``point`` goes, if they are images of each other."""
         a, b = known.system, point.system
         scale = 1 + np.abs(point.x[b.state_size :])
         if np.any(np.abs(known.x[a.state_size :] - point.x[b.state_size :]) > self.tolerance * scale):
@@ -166,7 +166,7 @@ class _Explorer:
         return None
 
     def _images(self, point: Point, direction: Array) -> list[tuple[int, int]]:
-        """(tangent, way) of the half-branches at ``point`` that are images of the one along ``direction``."""
+        """Return (tangent, way) of the half-branches at ``point`` that are images of the one along ``direction``."""
         system, result = point.system, []
         for symmetry in self.symmetries:
             gap = self._image(system, symmetry, point.x) - point.x
@@ -188,7 +188,7 @@ def diagram(
     start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
     symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, **options: Any,
 ) -> Diagram:  # fmt: skip
-    """Every branch that can be reached from a solution by leaving branch points, to a given depth.
+    """Follow every branch that can be reached from a solution by leaving branch points, to a given depth.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def diagram(
     free : sequence of str, optional
         Free parameters, if they shall differ from those of ``start``.
     depth : int
-        How many branch points lie at most between ``start``'s branch and the others: 0 follows that branch alone.
+        Largest number of branch points between ``start``'s branch and the others: 0 follows that branch alone.
     symmetries : sequence of callable
         Maps ``s(t, states) -> states`` of solutions to solutions (nodes t, states (K, n), same parameters), for states whose
         parameters they leave alone: images of a branch count as that branch.

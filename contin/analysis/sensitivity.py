@@ -1,4 +1,4 @@
-"""How special points move when a further parameter changes: derivatives from null vectors, without a further run."""
+"""Sensitivities: derivatives of special points by further parameters, from null vectors, without a further run."""
 
 from __future__ import annotations
 
@@ -16,11 +16,15 @@ from contin.errors import ProblemError
 from contin.results.point import Point, system_of
 from contin.stepping.trial import Linearization, Trial
 
+#: Step of the central differences of fourth order: their error is its fourth power, and round-off divided by it. At 1e-2 the
+#: error would be 1e-8.
+_STEP = 1e-3
+
 
 def sensitivities(
     point: Point, by: Sequence[str] | None = None, held: str | Callable[[Trial], float] | None = None
 ) -> dict[str, dict[str, float]]:
-    """Derivatives of the free parameters at a special point with respect to every other parameter.
+    """Return the derivatives of the free parameters at a special point with respect to every other parameter.
 
     Parameters
     ----------
@@ -31,8 +35,8 @@ def sensitivities(
     by : sequence of str, optional
         The other parameters; all that are not free by default.
     held : str or callable, optional
-        For points that are neither: what stays fixed, a parameter, a functional, or ``held(trial)``; the name before " = " in
-        a user zero's name by default, else the first free parameter.
+        For points that are neither, the quantity that stays fixed: a parameter, a functional, or ``held(trial)``; the name
+        before " = " in a user zero's name by default, else the first free parameter.
 
     Returns
     -------
@@ -64,7 +68,7 @@ def sensitivities(
 
 
 def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[str, dict[str, float]]:
-    """-(w.F_mu) / (w.F_lambda) for all mu at once."""
+    """Return -(w.F_mu) / (w.F_lambda) for all mu at once."""
     system, primary = point.system, point.name
     unit = np.zeros(system.size)
     unit[system.parameter_index(primary)] = 1.0
@@ -77,7 +81,7 @@ def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[st
 
 
 def _response(point: Point, name: str) -> Array:
-    """How x changes with a parameter at a fixed place along the tangent, shape (size,)."""
+    """Return the derivative of x by a parameter at a fixed place along the tangent, shape (size,)."""
     system = system_of(point, "point")
     column = system.parameter_columns(point.x, (name,))[:, 0]
     _, factors = system.linearize(point.x, (system.weights * point.tangent,))
@@ -85,13 +89,13 @@ def _response(point: Point, name: str) -> Array:
 
 
 def _slope(function: Callable[[float], Any]) -> Any:
-    """The derivative at 0 of a function of one number, by central differences of fourth order."""
-    h = 1e-3
+    """Return the derivative at 0 of a function of one number, by central differences of fourth order."""
+    h = _STEP
     return (8 * (function(h) - function(-h)) - (function(2 * h) - function(-2 * h))) / (12 * h)
 
 
 def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) -> dict[str, float]:
-    """The response, moved along the branch until the held quantity is what it was."""
+    """Return the response, moved along the branch until the held quantity is what it was."""
     system = system_of(point, "point")
     if held is None:
         held = point.name.partition(" = ")[0] or system.free[0]
@@ -109,7 +113,7 @@ def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) 
 
 
 def _of_branch_point(point: Point, name: str) -> dict[str, float]:
-    """Both g of the locating equations stay zero: the particular response, corrected along the kernel by the Hessian."""
+    """Return the response with both g of the locating equations zero: a particular one, corrected along the kernel."""
     system, found = system_of(point, "point"), point.details
     matrix = BorderedMatrix(system, point.x, found.kernel, found.left)
     column = system.parameter_columns(point.x, (name,))[:, 0]

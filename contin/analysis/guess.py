@@ -1,0 +1,113 @@
+"""First guesses: the discretized problem and the vector of unknowns that a user's guess stands for."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.discretization.algebraic import Algebraic
+from contin.discretization.collocation import Collocation
+from contin.discretization.system import System
+from contin.errors import ProblemError
+from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.boundary_value import BoundaryValueProblem
+from contin.results.point import Point
+
+Guess = Callable[[float], Any] | Point | Sequence[float] | tuple[Sequence[float] | Array, Any] | None
+
+
+@dataclass(frozen=True)
+class Options:
+    """Parameters and first mesh of a solution; as in `contin.solve`."""
+
+    parameters: Mapping[str, float]
+    free: Sequence[str]
+    intervals: int
+    degree: int
+
+
+@functools.singledispatch
+def first_guess(problem: Any, guess: Guess, options: Options) -> tuple[System, Array]:
+    """Return the discretized problem and a vector of unknowns for a guess. Each kind of problem registers its own.
+
+    Raises
+    ------
+    ProblemError
+        A problem of an unknown kind, or a guess that does not fit.
+    """
+    raise ProblemError(f"problem: {checks.shown(problem)} must be a BoundaryValueProblem or AlgebraicProblem")
+
+
+@first_guess.register
+def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tuple[System, Array]:
+    system = Algebraic(problem, options.free, options.parameters)
+    given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
+    states = np.zeros(system.state_size) if given is None else _numbers(given, system.state_size)
+    return system, system.pack(states, {**problem.parameters, **options.parameters})
+
+
+@first_guess.register
+def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Options) -> tuple[System, Array]:
+    a, b = problem.domain
+    mesh, degree = np.linspace(a, b, options.intervals + 1), options.degree
+    if isinstance(guess, Point):
+        mesh, degree = _meshed(guess).mesh, guess.system.degree
+    elif _is_pair(guess):
+        given = _numbers(guess[0])
+        if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a or not given[-1] >= b:
+            raise ProblemError(f"guess: its t must increase and cover the domain {a:g} ... {b:g}")
+    system = Collocation(problem, mesh, degree, options.free, options.parameters)
+    states = _sampled(guess, system.nodes, len(problem.state_names))
+    return system, system.pack(states, {**problem.parameters, **options.parameters})
+
+
+def _sampled(guess: Guess, nodes: Array, count: int) -> Array:
+    """Return the states of a guess at the nodes, shape (K, count)."""
+    if isinstance(guess, Point):
+        states = _meshed(guess).evaluate(guess.x, nodes)
+        if states.shape[1] != count:
+            raise ProblemError(f"guess: a Point of {states.shape[1]} states for a problem of {count}")
+        return states
+    if callable(guess):
+        try:
+            values = [guess(t) for t in nodes]
+        except Exception as error:  # a user's function may raise anything
+            raise ProblemError(f"guess cannot be called: {type(error).__name__}: {error}") from error
+        return np.array([_numbers(value, count) for value in values])
+    if _is_pair(guess):
+        t, columns = _numbers(guess[0]), _numbers(guess[1])
+        if columns.size != len(t) * count:
+            raise ProblemError(f"guess: {columns.size} numbers for {len(t)} places t and {count} states")
+        return np.stack([np.interp(nodes, t, column) for column in columns.reshape(len(t), count).T], axis=1)
+    if guess is None:
+        raise ProblemError("guess: a boundary value problem needs one (a function of t, arrays, or numbers)")
+    return np.tile(_numbers(guess, count), (len(nodes), 1))
+
+
+def _numbers(values: Any, count: int | None = None) -> Array:
+    """Return a guess as an array of numbers, shape (count,) where that is given."""
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ProblemError(f"guess: {checks.shown(values)} must be numbers") from None
+    if count is not None and array.size != count:
+        raise ProblemError(f"guess: {array.size} numbers, must be the {count} states")
+    return array if count is None else array.ravel()
+
+
+def _meshed(guess: Point) -> Collocation:
+    """Return the system of a guess that is a solution of a boundary value problem."""
+    if not isinstance(guess.system, Collocation):
+        raise ProblemError("guess: a Point must be a solution of a boundary value problem")
+    return guess.system
+
+
+def _is_pair(guess: Guess) -> TypeGuard[tuple[Any, Any]]:
+    """Return whether a guess is (t, states)."""
+    return isinstance(guess, tuple) and len(guess) == 2 and isinstance(guess[0], (list, tuple, np.ndarray))
