@@ -147,7 +147,7 @@ class _Explorer:
         return False
 
     def _match(self, known: Point, point: Point) -> tuple[int, int] | None:
-        """Return (tangent, way) of a known junction along which the branch of ``point`` goes, if they are images of each other."""
+        """Return (tangent, way) of a known junction along which the branch of ``point`` goes, if they are images."""
         a, b = known.system, point.system
         scale = 1 + np.abs(point.x[b.state_size :])
         if np.any(np.abs(known.x[a.state_size :] - point.x[b.state_size :]) > self.tolerance * scale):

@@ -40,7 +40,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": -1.0})
     >>> trivial = trace(solve(pitchfork, [0.0]), free=["a"], limits={"a": (-1, 1)})
     >>> forked = trace(trivial.labelled("BP")[0], branch=1, limits={"a": (-1, 1)})
-    >>> round(abs(forked.points[-1].x[0]), 9)
+    >>> print(round(abs(forked.points[-1].x[0]), 9))
     1.0
     """
     checks.instance("start", start, Point, "a Point")
