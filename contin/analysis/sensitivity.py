@@ -76,7 +76,8 @@ def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[st
     _, factors = system.linearize(point.x, (system.weights * point.tangent,))
     w = factors.solve_transposed(unit)[: system.equations]
     slopes = wide.transposed_product(x, w)
-    at = {name: slopes[wide.parameter_index(name)] for name in (primary, *by)}
+    sizes = dict(zip(wide.free, wide.free_scales))
+    at = {name: slopes[wide.parameter_index(name)] / sizes[name] for name in (primary, *by)}
     return {name: {primary: float(-at[name] / at[primary])} for name in by}
 
 
@@ -109,7 +110,7 @@ def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) 
     across = _slope(lambda s: measured(point.x + s * response, s))
     along = _slope(lambda s: measured(point.x + s * point.tangent))
     moved = response - (across / along) * point.tangent
-    return dict(zip(system.free, map(float, moved[system.state_size :])))
+    return dict(zip(system.free, map(float, moved[system.state_size :] * system.free_scales)))
 
 
 def _of_branch_point(point: Point, name: str) -> dict[str, float]:
@@ -126,4 +127,4 @@ def _of_branch_point(point: Point, name: str) -> dict[str, float]:
 
     hessian = matrix.hessian(point.x)
     moved = response - np.linalg.solve(hessian, _slope(gradient)) @ matrix.kernel
-    return dict(zip(system.free, map(float, moved[system.state_size :])))
+    return dict(zip(system.free, map(float, moved[system.state_size :] * system.free_scales)))

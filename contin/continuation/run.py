@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from contin.arrays import Array
+from contin.continuation.scaling import scaled
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.segment import Place, Segment, SpecialPoint
@@ -146,7 +147,12 @@ class Continuation:
             x = carry(x)
         else:
             x, row = self._first_correction(system, x)
-        unit = linearization(system, x, row).tangent
+        linear = linearization(system, x, row)
+        rescaled, z = scaled(system, x, linear, self.primary, settings)
+        if rescaled is not system:
+            x, row = self._first_correction(rescaled, z)
+            system, linear = rescaled, linearization(rescaled, x, row)
+        unit = linear.tangent
         unit *= settings.direction * (np.sign(unit[system.parameter_index(self.primary)]) or 1.0)
         state = standing_at(system, x, unit, settings.step)
         return dataclasses.replace(state, sign=system.linearize(x, (state.row,))[1].sign)
@@ -186,7 +192,8 @@ class Continuation:
 
     def _out_of_limits(self, trial: Trial) -> Stop | None:
         for name, (low, high) in self.settings.limits.items():
-            if not low - _SLACK * (1 + abs(low)) <= trial[name] <= high + _SLACK * (1 + abs(high)):
+            size = min(1.0, high - low)
+            if not low - _SLACK * (size + abs(low)) <= trial[name] <= high + _SLACK * (size + abs(high)):
                 return Stop("limit", f"{name} = {trial[name]:g} at the start lies outside {low:g} ... {high:g}")
         return None
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
+from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
 from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
@@ -31,8 +34,14 @@ class Algebraic(System):
     degree = 0
     problem: AlgebraicProblem
 
-    def __init__(self, problem: AlgebraicProblem, free: Sequence[str], parameters: Mapping[str, float] | None = None) -> None:
-        super().__init__(problem, free, parameters or {})
+    def __init__(
+        self,
+        problem: AlgebraicProblem,
+        free: Sequence[str],
+        parameters: Mapping[str, float] | None = None,
+        scales: Scales | None = None,
+    ) -> None:
+        super().__init__(problem, free, parameters or {}, scales)
         self.state_size = len(problem.state_names)
         self.size = self.state_size + len(self.free)
         self.equations = problem.equation_size
@@ -45,17 +54,23 @@ class Algebraic(System):
 
     def states(self, x: Array) -> Array:
         """Return the states, shape (1, n)."""
-        return x[: self.state_size].reshape(1, -1)
+        states = x[: self.state_size].reshape(1, -1)
+        return states if self.scales is None else states * self.scales.states
 
     def residual(self, x: Array) -> Array:
         """Return F at x, shape (equations,)."""
-        u, p = self.states(x), self.all_parameters(x)
-        values: Array = self.problem.batch("residual").values(_NO_TIME, u, _none(self.state_size), p)[0]
+        u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
+        values: Array = self._residual.values(_NO_TIME, u, _none(self.state_size), p)[0]
         return values
 
+    @functools.cached_property
+    def _residual(self) -> Any:
+        """The residual, compiled."""
+        return self._batch("residual", ("residual",))
+
     def _jacobian(self, x: Array) -> tuple[Array, Array]:
-        u, p = self.states(x), self.all_parameters(x)
-        batch = self.problem.batch("residual")
+        u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
+        batch = self._residual
         values, jacobian = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.colouring(self._free))
         return values[0], jacobian[0]
 
@@ -71,9 +86,10 @@ class Algebraic(System):
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
         which = self._indices(names)
-        u, p, n = self.states(x), self.all_parameters(x), self.state_size
-        batch = self.problem.batch("residual")
-        return batch.jacobian(_NO_TIME, u, _none(n), p, batch.colouring(which))[1][0, :, n:]
+        u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
+        batch = self._residual
+        columns: Array = batch.jacobian(_NO_TIME, u, _none(n), p, batch.colouring(which))[1][0, :, n:]
+        return columns
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,)."""
@@ -82,7 +98,10 @@ class Algebraic(System):
 
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
-        return np.linalg.eigvals(self._jacobian(x)[1][:, : self.state_size]).astype(complex, copy=False)
+        jacobian = self._jacobian(x)[1][:, : self.state_size]
+        if self.scales is not None:
+            jacobian = jacobian * self.scales.rows["residual"][:, None] / self.scales.states
+        return np.linalg.eigvals(jacobian).astype(complex, copy=False)
 
     def functionals(self, x: Array) -> Array:
         """Return the values of the problem's functionals, in their order."""
@@ -92,7 +111,20 @@ class Algebraic(System):
         values: Array = batch.values(_NO_TIME, self.states(x), _none(self.state_size), self.all_parameters(x))[0]
         return values
 
-    def carrier(self, other: Discretization) -> Carrier:
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Algebraic, Array]:
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
+        scaled = self._with(scales=Scales(states, parameters, {"residual": np.ones(self.equations)}))
+        z = self._between_scales(scaled)(x)
+        rows = usual(np.abs(scaled._jacobian(z)[1]).max(axis=1, initial=0.0))
+        return self._with(scales=Scales(states, parameters, {"residual": rows})), z
+
+    def _with(self, **changes: Any) -> Algebraic:
+        """Return the same with other free parameters, parameters or scales."""
+        values = dict(zip(self.problem.parameters, self.parameters))
+        kept = {"free": self.free, "parameters": values, "scales": self.scales}
+        return Algebraic(self.problem, **{**kept, **changes})
+
+    def _carrier(self, other: Discretization) -> Carrier:
         """Return the function that carries vectors of unknowns to another system of this problem: a copy."""
         return np.array
 
@@ -104,13 +136,13 @@ class Algebraic(System):
 
     def with_parameters(self, values: Mapping[str, float]) -> Algebraic:
         """Return the same problem with other values of parameters that are not free."""
-        return Algebraic(self.problem, self.free, dict(zip(self.problem.parameters, self.parameters)) | dict(values))
+        return self._with(parameters=dict(zip(self.problem.parameters, self.parameters)) | dict(values))
 
     def with_free(self, free: Sequence[str], x: Array) -> tuple[Algebraic, Array]:
         """Return the same problem with other free parameters (values from x), and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
-        other = Algebraic(self.problem, free, values)
-        return other, other.pack(x[: self.state_size], values)
+        other = self._with(free=free, parameters=values)
+        return other, other.pack(self.states(x), values)
 
 
 _NO_TIME = np.zeros(1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from contin.discretization.assembly import assemble, at_points, collocate
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier, Discretization
+from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.functions.colouring import Colouring
@@ -60,8 +62,9 @@ class Collocation(System):
         degree: int,
         free: Sequence[str],
         parameters: Mapping[str, float],
+        scales: Scales | None = None,
     ) -> None:
-        super().__init__(problem, free, parameters)
+        super().__init__(problem, free, parameters, scales)
         self.degree = degree
         self.basis = basis(degree)
         self.mesh = np.array(mesh, dtype=float)
@@ -93,6 +96,16 @@ class Collocation(System):
     def _colourings(self) -> tuple[Colouring, Colouring]:
         return self._colourings_for(self._free)
 
+    @functools.cached_property
+    def _field(self) -> Any:
+        """Right-hand side and integrands, compiled."""
+        return self._batch("field", ("states", "integrals"))
+
+    @functools.cached_property
+    def _boundary(self) -> Any:
+        """Boundary conditions, compiled."""
+        return self._batch("boundary", ("boundary",))
+
     def _colourings_for(self, parameters: Indices) -> tuple[Colouring, Colouring]:
         """Colourings of field, by states in the layout's order, and of boundary; each by these parameters, too."""
         problem = self.problem
@@ -107,7 +120,12 @@ class Collocation(System):
         return np.append(inner, self.mesh[-1])
 
     def states(self, x: Array) -> Array:
-        """States at the nodes, a view of shape (N d + 1, n)."""
+        """Return the states at the nodes, shape (N d + 1, n)."""
+        states = self._scaled_states(x)
+        return states if self.scales is None else states * self.scales.states
+
+    def _scaled_states(self, x: Array) -> Array:
+        """Return the states divided by their sizes, a view of x."""
         return x[: self.state_size].reshape(-1, self._n)
 
     def _local(self, states: Array) -> Array:
@@ -116,16 +134,21 @@ class Collocation(System):
         return local
 
     def at_gauss_points(self, x: Array) -> Array:
-        """States at the Gauss points, shape (N d, n)."""
+        """Return the states divided by their sizes at the Gauss points, shape (N d, n)."""
         points = np.empty((self._times.size, self._n))
         at_points(self.basis.value, x, points)
         return points
 
     def evaluate(self, x: Array, times: Array) -> Array:
-        """States at ``times`` (m,), shape (m, n), by the piecewise polynomial."""
+        """Return the states at ``times`` (m,), shape (m, n), by the piecewise polynomial."""
+        states = self._interpolated(x, times)
+        return states if self.scales is None else states * self.scales.states
+
+    def _interpolated(self, x: Array, times: Array) -> Array:
+        """Return the piecewise polynomial of the values in x."""
         j = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, self.intervals - 1)
         matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
-        states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self.states(x))[j])
+        states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self._scaled_states(x))[j])
         return states
 
     # --- the discrete equations ----------------------------------------------------------------------------------
@@ -137,9 +160,9 @@ class Collocation(System):
 
     def residual(self, x: Array) -> Array:
         """Residual of the discrete equations at x, shape (equations,)."""
-        p, u = self.all_parameters(x), self.states(x)
-        field = self.problem.batch("field").values(self._times, self.at_gauss_points(x), _NONE(self._n), p)
-        boundary = self.problem.batch("boundary").values(_TIME, u[:1], u[-1:], p)
+        p, u = self._scaled_parameters(x), self._scaled_states(x)
+        field = self._field.values(self._times, self.at_gauss_points(x), _NONE(self._n), p)
+        boundary = self._boundary.values(_TIME, u[:1], u[-1:], p)
         return self._residual(x, field, boundary)
 
     def _blocks(
@@ -147,11 +170,11 @@ class Collocation(System):
     ) -> tuple[Array, tuple[Array, Array, Array, Array, Array]]:
         """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as `Factorization` takes them."""
         problem, n, d, k = self.problem, self._n, self._d, len(self.free)
-        p, u = self.all_parameters(x), self.states(x)
+        p, u = self._scaled_parameters(x), self._scaled_states(x)
         points = self.at_gauss_points(x)
         of_field, of_boundary = self._colourings
-        field, jacobian = problem.batch("field").jacobian(self._times, points, _NONE(n), p, of_field)
-        boundary, ends = problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
+        field, jacobian = self._field.jacobian(self._times, points, _NONE(n), p, of_field)
+        boundary, ends = self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
         c, r = len(columns), len(rows) + problem.integral_size
         conditions, width = problem.boundary_size, n * (d + 1) + k + c
         blocks = (
@@ -177,10 +200,10 @@ class Collocation(System):
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
-        n, p, u = self._n, self.all_parameters(x), self.states(x)
+        n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
         of_field, of_boundary = self._colourings_for(self._indices(names))
-        field = self.problem.batch("field").jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, :, n:]
-        ends = self.problem.batch("boundary").jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0, :, 2 * n :]
+        field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, :, n:]
+        ends = self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0, :, 2 * n :]
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
         return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self._quadrature, field[:, n:])])
 
@@ -209,21 +232,44 @@ class Collocation(System):
         if not self.problem.functionals:
             return np.empty(0)
         batch = self.problem.batch("functionals")
-        values = batch.values(self._times, self.at_gauss_points(x), _NONE(self._n), self.all_parameters(x))
+        points = self.at_gauss_points(x)
+        points = points if self.scales is None else points * self.scales.states
+        values = batch.values(self._times, points, _NONE(self._n), self.all_parameters(x))
         integrals: Array = self._quadrature @ values
         return integrals
 
     # --- meshes --------------------------------------------------------------------------------------------------
 
-    def carrier(self, other: Discretization) -> Carrier:
-        """The function that carries vectors of unknowns from this mesh to the mesh of another system."""
+    def _carrier(self, other: Discretization) -> Carrier:
         nodes = other.nodes
-        return lambda x: np.concatenate([self.evaluate(x, nodes).ravel(), x[self.state_size :]])
+        return lambda x: np.concatenate([self._interpolated(x, nodes).ravel(), x[self.state_size :]])
+
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Collocation, Array]:
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
+        rows = {"boundary": np.ones(self.problem.boundary_size), "integrals": np.ones(self.problem.integral_size)}
+        scaled = self._with(scales=Scales(states, parameters, rows))
+        z = self._between_scales(scaled)(x)
+        rows["boundary"], rows["integrals"] = scaled._row_sizes(z)
+        other = self._with(scales=Scales(states, parameters, rows))
+        return other, z
+
+    def _row_sizes(self, x: Array) -> tuple[Array, Array]:
+        """Return the largest entries of the rows of boundary and integral conditions, as powers of two."""
+        n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
+        of_field, of_boundary = self._colourings
+        ends = self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0]
+        field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, n:]
+        return usual(np.abs(ends).max(axis=1, initial=0.0)), usual(np.abs(field).max(axis=(0, 2), initial=0.0))
+
+    def _with(self, **changes: Any) -> Collocation:
+        """Return the same with other mesh, free parameters, parameters or scales."""
+        values = dict(zip(self.problem.parameters, self.parameters))
+        kept = {"mesh": self.mesh, "free": self.free, "parameters": values, "scales": self.scales}
+        return Collocation(self.problem, degree=self.degree, **{**kept, **changes})
 
     def on_mesh(self, mesh: Array) -> tuple[Collocation, Carrier]:
         """The same problem on another mesh, and the function that carries vectors of unknowns over to it."""
-        values = dict(zip(self.problem.parameters, self.parameters))
-        other = Collocation(self.problem, mesh, self.degree, self.free, values)
+        other = self._with(mesh=mesh)
         return other, self.carrier(other)
 
     def refined(self) -> tuple[Collocation, Carrier]:
@@ -232,18 +278,18 @@ class Collocation(System):
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
         """The same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
-        mesh = adapted_mesh(self.basis, self.mesh, self.states(x), control) if control.every else None
+        mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control) if control.every else None
         return None if mesh is None else self.on_mesh(mesh)
 
     def with_parameters(self, values: Mapping[str, float]) -> Collocation:
         """The same problem with other values of parameters that are not free."""
         names = dict(zip(self.problem.parameters, self.parameters)) | dict(values)
-        return Collocation(self.problem, self.mesh, self.degree, self.free, names)
+        return self._with(parameters=names)
 
     def with_free(self, free: Sequence[str], x: Array) -> tuple[Collocation, Array]:
         """The same problem with other free parameters (values from x), on the same mesh, and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
-        other = Collocation(self.problem, self.mesh, self.degree, free, values)
+        other = self._with(free=free, parameters=values)
         return other, other.pack(self.states(x), values)
 
 

@@ -48,6 +48,8 @@ class Discretization(Equations, Protocol):
         Weights of the inner product.
     intervals, degree : int
         Of the mesh; 0 without one.
+    free_scales : ndarray
+        Sizes of the free parameters, by which they are divided in x.
     """
 
     problem: Statement
@@ -58,6 +60,7 @@ class Discretization(Equations, Protocol):
     weights: Array
     intervals: int
     degree: int
+    free_scales: Array
 
     @property
     @abstractmethod

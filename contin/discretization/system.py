@@ -12,6 +12,7 @@ from contin import checks
 from contin.arrays import Array, Indices
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
+from contin.discretization.scales import ScaledBatch, Scales
 from contin.errors import ProblemError
 from contin.problems.statement import Statement
 
@@ -37,7 +38,9 @@ class System(Discretization):
 
     parameters: Array
 
-    def __init__(self, problem: Statement, free: Sequence[str], parameters: Mapping[str, float]) -> None:
+    def __init__(
+        self, problem: Statement, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None
+    ) -> None:
         self.problem, self.free = problem, checks.names("free", free)
         names = tuple(problem.parameters)
         for name in (*self.free, *parameters):
@@ -45,6 +48,9 @@ class System(Discretization):
                 raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}")
         self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
         self._free = self._indices(self.free)
+        self.scales = scales
+        #: Sizes of the free parameters.
+        self.free_scales: Array = np.ones(len(self.free)) if scales is None else scales.parameters[self._free]
 
     def _indices(self, names: Sequence[str]) -> Indices:
         """Return the places of parameters among all of them."""
@@ -52,13 +58,58 @@ class System(Discretization):
 
     def pack(self, states: Any, values: Mapping[str, float]) -> Array:
         """Return a vector of unknowns from states and the mapping of free parameters."""
-        return np.concatenate([np.asarray(states, dtype=float).ravel(), [float(values[name]) for name in self.free]])
+        states = np.asarray(states, dtype=float)
+        free = np.array([float(values[name]) for name in self.free])
+        if self.scales is None:
+            return np.concatenate([states.ravel(), free])
+        return np.concatenate(
+            [(states.reshape(-1, self.scales.states.size) / self.scales.states).ravel(), free / self.free_scales]
+        )
 
     def all_parameters(self, x: Array) -> Array:
         """Return the values of all parameters, shape (number of names,), the free ones from x."""
         p = self.parameters.copy()
-        p[self._free] = x[self.state_size :]
+        p[self._free] = x[self.state_size :] * self.free_scales
         return p
+
+    def _scaled_parameters(self, x: Array) -> Array:
+        """Return all parameters divided by their sizes."""
+        p = self.all_parameters(x)
+        return p if self.scales is None else p / self.scales.parameters
+
+    def _batch(self, name: str, rows: Sequence[str] = ()) -> Any:
+        """Return some of the functions, compiled, on scaled inputs; ``rows`` name the sizes of its values."""
+        batch = self.problem.batch(name)
+        if self.scales is None:
+            return batch
+        sizes = {"states": self.scales.states, **self.scales.rows}
+        values = np.concatenate([sizes[row] for row in rows]) if rows else np.ones(batch.count)
+        return ScaledBatch(batch, self.scales.states, self.scales.parameters, values)
+
+    def carrier(self, other: Any) -> Carrier:
+        """Return the function that carries vectors of unknowns to another system of this problem."""
+        return self._carrier(other) if other.scales is self.scales else self._between_scales(other)
+
+    def _between_scales(self, other: Any) -> Carrier:
+        ours, theirs = self.unscaled_factors, other.unscaled_factors
+        carry = self._carrier(other)
+        return lambda x: carry(x * ours) / theirs
+
+    @property
+    def unscaled_factors(self) -> Array:
+        """Sizes of all unknowns, shape (size,)."""
+        if self.scales is None:
+            return np.ones(self.size)
+        count = self.state_size // self.scales.states.size
+        return np.concatenate([np.tile(self.scales.states, count), self.free_scales])
+
+    @abstractmethod
+    def _carrier(self, other: Any) -> Carrier:
+        """Return the carrier to another system with the same scales."""
+
+    @abstractmethod
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[System, Array]:
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
 
     def parameter(self, x: Array, name: str) -> float:
         """Return the value of one parameter."""

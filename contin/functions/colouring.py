@@ -18,12 +18,17 @@ class Colouring(NamedTuple):
 
     Colour c has the inputs ``inputs[inputs[c]:inputs[c + 1]]``: the vector begins with the places of its own parts. When they
     are perturbed together, the change of value a is the derivative in column ``owner[c, a]`` of the Jacobian; there is none
-    where that is -1. The Jacobian has ``width`` columns.
+    where that is -1. ``columns`` are the inputs that the columns of the Jacobian belong to.
     """
 
     inputs: Indices
     owner: Indices
-    width: int
+    columns: Indices
+
+    @property
+    def width(self) -> int:
+        """Number of columns of the Jacobian."""
+        return self.columns.size
 
 
 def colouring(depends: Pattern, columns: Sequence[int] | Indices) -> Colouring:
@@ -56,4 +61,4 @@ def colouring(depends: Pattern, columns: Sequence[int] | Indices) -> Colouring:
             owner[c, depends[:, columns[column]]] = column
     starts = len(together) + 1 + np.cumsum([0, *map(len, together)])
     inputs = np.array([*starts, *(columns[column] for group in together for column in group)], dtype=np.int64)
-    return Colouring(inputs, owner, len(columns))
+    return Colouring(inputs, owner, np.array(columns, dtype=np.int64))

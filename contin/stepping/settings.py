@@ -49,6 +49,8 @@ class Settings:
         Largest change of any free parameter p in one step, as a fraction of 1 + |p|.
     accuracy : float
         Distance between predicted and corrected point that the step aims at, as a fraction of the step.
+    scales : mapping of str to float
+        Sizes of states and parameters, where those that the first point shows are not typical. Only those far from one matter.
     newton, mesh :
         See `Newton`, `MeshControl`.
 
@@ -82,6 +84,7 @@ class Settings:
     newton: Newton = field(default_factory=Newton)
     mesh: MeshControl = field(default_factory=MeshControl)
     test_functions: Sequence[TestFunction] = ()
+    scales: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -113,6 +116,8 @@ class Settings:
             checks.number(name, getattr(self, name), 0, 1.5)
 
     def _check_columns(self) -> None:
+        for name, size in checks.mapping("scales", self.scales, "positive numbers").items():
+            checks.number(f"scales: {checks.plain(name)}", size, 0)
         for name, ends in checks.mapping("limits", self.limits, "pairs of numbers").items():
             what, allowed = f"limits: {checks.plain(name)}", "two numbers, the first the smaller"
             pair = tuple(checks.sequence(what, ends, allowed))

@@ -139,7 +139,8 @@ class Trial:
     def __getitem__(self, name: str) -> float:
         """Return a parameter or functional by name."""
         if name in self.system.free:
-            return float(self.x[self.system.parameter_index(name)])
+            at = self.system.parameter_index(name)
+            return float(self.x[at] * self.system.free_scales[at - self.system.state_size])
         if name in self.system.problem.functionals:
             return self.functionals[name]
         return self.system.parameter(self.x, name)

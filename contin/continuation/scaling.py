@@ -1,0 +1,70 @@
+"""Sizes of states and parameters, taken from the first point of a run.
+
+The size of a parameter is that of its first value; where that is zero, of its smallest limit or labelled value. The size of a
+state is its largest value. What is zero at the first point gets the size that the tangent gives it: a parameter, the change
+that moves some state by its size; a state, its response to such a change. Only sizes far from one count
+(`contin.discretization.scales`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.discretization.protocol import Discretization
+from contin.discretization.scales import usual
+from contin.discretization.system import System
+from contin.stepping.settings import Settings
+from contin.stepping.trial import Linearization
+
+#: A value counts as zero below so many times its own round-off: the last update that Newton's method would make. At 10
+#: round-off of a state that vanishes by symmetry could become its size.
+_NOISE = 1e4
+
+
+def scaled(
+    system: Discretization, x: Array, linear: Linearization, primary: str, settings: Settings
+) -> tuple[Discretization, Array]:
+    """Return the system with sizes of states and parameters taken from a first point, and x for it.
+
+    Unchanged where it has sizes already, or where all are of order one.
+    """
+    if not isinstance(system, System) or system.scales is not None:
+        return system, x
+    names, states, count = list(system.problem.parameters), system.problem.states, len(system.problem.states)
+    known = {name: abs(value) for name, value in settings.scales.items()}
+    factors: Any = linear.factors
+    noise = np.abs(factors.solve(np.append(system.residual(x), 0.0)))[: system.state_size].reshape(-1, count).max(axis=0)
+    size = np.abs(system.states(x)).max(axis=0)
+    size = np.where(size > _NOISE * noise, size, 0.0)
+    size = np.array([known.get(name, found) for name, found in zip(states, size)])
+    given = zip(system.free, x[system.state_size :])
+    free = np.array([known.get(name) or _given(float(value), name, settings) for name, value in given])
+    # what is zero at the first point: by the tangent
+    at, rate = system.free.index(primary), np.abs(linear.tangent)
+    rates, rate_of_free = rate[: system.state_size].reshape(-1, count).max(axis=0), rate[system.state_size :]
+    if not free[at]:
+        moves = rates > 0
+        needed = usual(np.where(size > 0, size, 1.0))[moves] * rate_of_free[at] / rates[moves]
+        free[at] = needed.min(initial=np.inf)
+    change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
+    response = rates * change
+    size = np.where(size > 0, size, np.where(response > _NOISE * noise, response, 0.0))
+    parameters = np.array([known.get(name, 1.0) for name in names])
+    parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, rate_of_free * change)
+    sizes = usual(size), usual(parameters)
+    if all(np.all(found == 1) for found in sizes):
+        return system, x
+    return system.with_scales(x, *sizes)
+
+
+def _given(value: float, name: str, settings: Settings) -> float:
+    """Return the size of a parameter from what is said of it; 0 where nothing is."""
+    if value:
+        return abs(value)
+    said: Iterable[float] = (*settings.limits.get(name, ()), *settings.zeros.get(name, ()))
+    sizes = [abs(float(number)) for number in said if number and np.isfinite(number)]
+    return min(sizes, default=0.0)

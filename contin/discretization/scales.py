@@ -1,0 +1,77 @@
+"""Scales: sizes of states and parameters, by which the unknowns of a discretized problem are divided.
+
+All tolerances, steps and norms of the engine are made for unknowns of order one. A system with scales works on x = (u / s_u, p
+/ s_p), and on equations divided by sizes of their own, so that a problem in newtons and one in giganewtons are the same
+problem. Scales are powers of two: multiplication by them is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from contin.arrays import Array, Indices
+from contin.functions.batch import Batch
+from contin.functions.colouring import Colouring
+
+#: Sizes within this factor of one count as one: problems of everyday sizes are not scaled. With a factor of 10 many would be,
+#: with one of 1e5 tolerances would be off by as much.
+USUAL = 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """Sizes of the states (n,), of all parameters, and of the equations that have a number of their own.
+
+    ``rows`` are those of boundary conditions and integral conditions, or of the residual of an algebraic problem.
+    """
+
+    states: Array
+    parameters: Array
+    rows: dict[str, Array]
+
+
+def usual(sizes: Array | float) -> Array:
+    """Return sizes as powers of two; 1 for those of everyday size, and for zero, infinity and NaN."""
+    sizes = np.abs(sizes)
+    odd = np.isfinite(sizes) & (sizes > 0) & ((sizes > USUAL) | (sizes < 1 / USUAL))
+    result: Array = np.where(odd, np.exp2(np.round(np.log2(np.where(odd, sizes, 1.0)))), 1.0)
+    return result
+
+
+class ScaledBatch:
+    """A batch whose inputs and values are divided by their sizes.
+
+    Parameters
+    ----------
+    batch : Batch
+    states, parameters : ndarray
+        Sizes of the inputs.
+    values : ndarray, shape (count,)
+        Sizes of the values.
+    """
+
+    def __init__(self, batch: Batch, states: Array, parameters: Array, values: Array) -> None:
+        self._batch, self._states, self._parameters, self._values = batch, states, parameters, values
+
+    @property
+    def depends(self) -> Array:
+        """Sparsity pattern."""
+        return self._batch.depends
+
+    def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:
+        """Return the colouring of the batch."""
+        return self._batch.colouring(free, order)
+
+    def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
+        """Return the values, shape (points, count)."""
+        return self._batch.values(t, u * self._states, v * self._states, p * self._parameters) / self._values
+
+    def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
+        """Return values and derivatives, shape (points, count, colours.width)."""
+        arguments = u * self._states, v * self._states, p * self._parameters
+        values, jacobian = self._batch.jacobian(t, *arguments, colours)
+        inputs = np.concatenate([self._states, *([self._states] if self._batch.signature.ends else []), self._parameters])
+        return values / self._values, jacobian * inputs[colours.columns] / self._values[:, None]
