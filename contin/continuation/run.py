@@ -48,6 +48,11 @@ _ASIDE = 0.01
 _SLACK = 1e-9
 #: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
 _SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
+#: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
+#: the curvature, it is one half.
+_MISSED = 0.75
+#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
+_NOISE = 1e-12
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
 _ROUNDS = 3
 #: Smallest angle and rate, in place of zero where they are divided by.
@@ -270,6 +275,8 @@ class Continuation:
             raise ConvergenceError("the corrected point does not lie where the tangents at both ends lead")
         if self._fold is not None and self._may_turn(trial, residual):
             trial = sharpened(state, trial)
+        if self._fold is not None and self._jumped(state, guess, trial, step):
+            raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
         return Segment(state, self._before(state, step), trial, step, settings.newton), distance
 
     def _before(self, state: State, step: float) -> Place:
@@ -293,6 +300,16 @@ class Continuation:
         at = trial.system.parameter_index(self.primary)
         component = abs(trial.tangent[at])
         return component < _STEEP and not abs(tangent_error(trial, residual)[at]) < _DOUBT * component
+
+    def _jumped(self, state: State, guess: Array, trial: Trial, step: float) -> bool:
+        """Return whether the primary parameter misses its prediction by much of what it changes at all.
+
+        It may be a small part of the whole: the distance from the prediction does not show it then, and folds would be jumped.
+        """
+        at = trial.system.parameter_index(self.primary)
+        missed = abs(guess[at] - trial.x[at])
+        change = step * max(abs(state.tangent[at]), abs(trial.tangent[at]))
+        return missed > _MISSED * change and missed > _NOISE * (1 + abs(trial.x[at]))
 
     def _exact_tangent(self, state: State) -> Array:
         """Return the tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""

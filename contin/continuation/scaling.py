@@ -1,8 +1,8 @@
 """Sizes of states and parameters, taken from the first point of a run.
 
 The size of a parameter is that of its first value; where that is zero, of its smallest limit or labelled value. The size of a
-state is its largest value. What is zero at the first point gets the size that the tangent gives it: a parameter, the change
-that moves some state by its size; a state, its response to such a change. Only sizes far from one count
+state is its largest value. For what is zero at the first point the tangent says whether it is small: a parameter, by the change
+that moves some state by its size; a state, by its response to such a change. Only sizes far from one count
 (`contin.discretization.scales`).
 """
 
@@ -23,6 +23,8 @@ from contin.stepping.trial import Linearization
 #: A value counts as zero below so many times its own round-off: the last update that Newton's method would make. At 10
 #: round-off of a state that vanishes by symmetry could become its size.
 _NOISE = 1e4
+#: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
+_TINY = 1e-14
 
 
 def scaled(
@@ -37,11 +39,13 @@ def scaled(
     names, states, count = list(system.problem.parameters), system.problem.states, len(system.problem.states)
     known = {name: abs(value) for name, value in settings.scales.items()}
     factors: Any = linear.factors
-    noise = np.abs(factors.solve(np.append(system.residual(x), 0.0)))[: system.state_size].reshape(-1, count).max(axis=0)
+    update = _NOISE * np.abs(factors.solve(np.append(system.residual(x), 0.0))) + _TINY
+    noise, noise_of_free = update[: system.state_size].reshape(-1, count).max(axis=0), update[system.state_size :]
     size = np.abs(system.states(x)).max(axis=0)
-    size = np.where(size > _NOISE * noise, size, 0.0)
+    size = np.where(size > noise, size, 0.0)
     size = np.array([known.get(name, found) for name, found in zip(states, size)])
-    given = zip(system.free, x[system.state_size :])
+    values = np.where(np.abs(x[system.state_size :]) > noise_of_free, x[system.state_size :], 0.0)
+    given = zip(system.free, values)
     free = np.array([known.get(name) or _given(float(value), name, settings) for name, value in given])
     # what is zero at the first point: by the tangent
     at, rate = system.free.index(primary), np.abs(linear.tangent)
@@ -49,12 +53,12 @@ def scaled(
     if not free[at]:
         moves = rates > 0
         needed = usual(np.where(size > 0, size, 1.0))[moves] * rate_of_free[at] / rates[moves]
-        free[at] = needed.min(initial=np.inf)
+        free[at] = min(1.0, needed.min(initial=1.0))
     change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
-    response = rates * change
-    size = np.where(size > 0, size, np.where(response > _NOISE * noise, response, 0.0))
+    response = np.minimum(1.0, rates * change)
+    size = np.where(size > 0, size, np.where(response > noise, response, 0.0))
     parameters = np.array([known.get(name, 1.0) for name in names])
-    parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, rate_of_free * change)
+    parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, np.minimum(1.0, rate_of_free * change))
     sizes = usual(size), usual(parameters)
     if all(np.all(found == 1) for found in sizes):
         return system, x

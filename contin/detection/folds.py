@@ -18,8 +18,10 @@ from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.discretization.protocol import inner
 from contin.stepping.trial import TestFunction, Trial, sign_changed
 
-#: A component of the unit tangent below this at both ends of a step is zero: its sign says nothing.
+#: A component of the unit tangent below this may be round-off: it is believed where the parameter itself changes.
 _ROUND_OFF = 1e-9
+#: Units in the last place by which a parameter may differ between two points where it is the same.
+_UNITS = 16
 #: A rate that sinks to this part of its values at the ends may pass zero, ...
 _SHALLOW = 0.5
 #: ... and the search for a smallest rate goes on while it lowers it to this part at least.
@@ -58,10 +60,36 @@ class FoldSearch:
         self.segment, self.fold, self.pitchfork = segment, fold, pitchfork
         self._index = segment.trial.system.parameter_index(fold.name)
 
+    def find(self) -> list[SpecialPoint]:
+        """Return the folds inside the step, in order.
+
+        The parameter goes one way before a fold and the other way behind it. Where it differs by no more than round-off from one
+        fold to the next, or to both ends of the step, there is none.
+        """
+        segment = self.segment
+        left, right = (segment.low, segment.before), (segment.step, segment.trial)
+        found = self.between(left, right)
+        at = 0
+        while at < len(found):
+            places = [left[1], *(fold.trial for fold in found), right[1]]
+            if at + 1 < len(found) and not self._differs(places[at + 1], places[at + 2]):
+                del found[at : at + 2]
+            elif not (self._differs(places[at], places[at + 1]) or self._differs(places[at + 1], places[at + 2])):
+                del found[at]
+            else:
+                at += 1
+        return found
+
+    def _differs(self, one: Trial, other: Trial) -> bool:
+        """Return whether the parameter differs between two points by more than round-off."""
+        p, q = one.x[self._index], other.x[self._index]
+        noise = _UNITS * np.finfo(float).eps + one.newton_error + other.newton_error
+        return bool(abs(p - q) > noise * (1 + abs(p)))
+
     def between(self, left: Place, right: Place) -> list[SpecialPoint]:
-        """Return the folds between two places, in order."""
+        """Return the places between two where the rate changes its sign, in order."""
         ends = [trial.value(self.fold) for _, trial in (left, right)]
-        if max(map(abs, ends)) < _ROUND_OFF:
+        if max(map(abs, ends)) < _ROUND_OFF and not self._differs(left[1], right[1]):
             return []
         if sign_changed(*ends):
             return [self.pitchfork() or self.segment.locate(self.fold, left, right, self.estimate(left, right))]
@@ -78,7 +106,10 @@ class FoldSearch:
         parabola = self._parabola(left, right)
         first, last, linear, square = parabola.first, parabola.last, parabola.linear, parabola.square
         root = np.sqrt(max(linear**2 - 4 * square * first, 0.0))
-        zero = -2 * first / (linear + (root if last > first else -root))  # the one where the rate goes from first to last
+        slope = linear + (root if last > first else -root)
+        if slope == 0:
+            return None
+        zero = -2 * first / slope  # the one where the rate goes from first to last
         return float(left[0] + (right[0] - left[0]) * zero) if 0 < zero < 1 else None
 
     def _parabola(self, left: Place, right: Place) -> _Parabola:

@@ -133,9 +133,7 @@ class Inspection:
         """Folds with respect to the primary parameter, in order."""
         if self.fold is None:
             return []
-        segment = self.segment
-        search = FoldSearch(segment, self.fold, self._pitchfork)
-        return search.between((segment.low, segment.before), (segment.step, segment.trial))
+        return FoldSearch(self.segment, self.fold, self._pitchfork).find()
 
     def _pitchfork(self) -> SpecialPoint | None:
         """Return the fold of a pitchfork, right at the branch point inside the step; None if there is none."""
