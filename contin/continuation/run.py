@@ -370,8 +370,9 @@ class Continuation:
         errors: Mapping[str, float] = {}
         labelled = found.label not in ("", "MX") and found.name != "closed"  # closed: the first point once more
         if labelled and self.settings.errors:
-            again = refined(found, self.settings)
-            trial, errors, details = again.trial, again.errors, again.details
+            again = refined(found.same_as or found, self.settings)
+            trial, errors = again.trial, again.errors
+            details = details if found.same_as else again.details
         system = trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
         return Point(

@@ -63,8 +63,8 @@ class FoldSearch:
     def find(self) -> list[SpecialPoint]:
         """Return the folds inside the step, in order.
 
-        The parameter goes one way before a fold and the other way behind it. Where it differs by no more than round-off from one
-        fold to the next, or to both ends of the step, there is none.
+        The parameter goes one way before a fold and the other way behind it. Where it differs by no more than round-off from
+        one fold to the next, or to both ends of the step, there is none.
         """
         segment = self.segment
         left, right = (segment.low, segment.before), (segment.step, segment.trial)

@@ -17,7 +17,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
-from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
 from contin.discretization.protocol import Discretization, inner
 from contin.stepping.settings import Settings
 from contin.stepping.state import Stop
@@ -35,9 +35,11 @@ _ON_ZERO = 1e-8
 _STANDS = 1e-11
 #: A tangent's component at a branch point below this is zero: tangents there come from differences with an error of 1e-8.
 _STATIONARY = 1e-5
-#: Into how many parts a step is divided to look inside it, and how often parts with several zeros are halved: zeros closer
-#: than 2^-20 of a step count as one.
-_PARTS, _CUTS = 4, 20
+#: A test function vanishes at a special point where it is smaller there by this factor than at the larger end of the step: as
+#: exactly as branch points are located. Values that are typed as round numbers coincide exactly.
+_COINCIDENT = 1e-10
+#: Zeros of a test function that vanishes at a special point are looked for from this part of the step on beside it.
+_BESIDE = 1e-4
 #: The branch point where a branch ends on the trivial one has the trivial quantity at zero to this part of its values at the
 #: ends of the step; another branch point inside the step has not.
 _TRIVIAL = 1e-6
@@ -111,14 +113,15 @@ class Inspection:
             found.append(self._branch_points.simple)
         elif self.settings.branch_points and self._branch_points.count[0] > 1:
             found.append(self._branch_points.multiple())
+        crossings = [point for point in found if not point.name.startswith("possible")]
         for test in tests:
-            found += self._zeros(test)
+            found += self._zeros(test, crossings)
         found += [fold for fold in self._folds if not _same_place(fold, found, self.segment.step)]
         found = [point for point in found if not self._at_the_start(point)]
         closed = self._closed()
         if closed is not None:
             found.append(closed)
-        return sorted(found, key=lambda point: point.at)
+        return sorted(found, key=lambda point: (point.at, point.test is not None and point.test.label != "LP"))
 
     def _at_the_start(self, point: SpecialPoint) -> bool:
         """Return whether a special point is the first point of the run once more."""
@@ -148,10 +151,15 @@ class Inspection:
 
     # --- zeros of test functions ---------------------------------------------------------------------------------
 
-    def _zeros(self, test: TestFunction) -> list[SpecialPoint]:
-        """Return the zeros of a test function, looked for between the folds."""
-        state, found = self.segment.state, []
-        for left, right in itertools.pairwise(self._knots(test)):
+    def _zeros(self, test: TestFunction, crossings: list[SpecialPoint]) -> list[SpecialPoint]:
+        """Return the zeros of a test function, looked for between the folds. At a fold or branch point they lie right there."""
+        if test.search is not None:
+            points: list[SpecialPoint] = test.search(self.segment, self._knots())
+            return points
+        state = self.segment.state
+        same = [point for point in (*self._folds, *crossings) if self._coincides(test, point)]
+        found = [self._at_special(test, point) for point in same]
+        for left, right in self._pieces(same):
             before, after = left[1].value(test), right[1].value(test)
             if state.accepted == 0 and left[0] == 0 and abs(before) < _ON_ZERO * abs(after):
                 before = 0.0  # the first point lies on the zero
@@ -164,27 +172,37 @@ class Inspection:
                 break
         return found
 
-    def _knots(self, test: TestFunction) -> list[Place]:
+    def _coincides(self, test: TestFunction, point: SpecialPoint) -> bool:
+        """Return whether a test function vanishes at a special point of the step."""
+        if self._at_the_start(point) or point.name.startswith("possible"):
+            return False
+        largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
+        return bool(abs(point.trial.value(test)) <= _COINCIDENT * largest)
+
+    def _at_special(self, test: TestFunction, point: SpecialPoint) -> SpecialPoint:
+        """Return the zero of a test function that lies at a special point."""
+        details = None if test.describe is None else test.describe(point.trial)
+        return SpecialPoint(point.at, test.label, test.name, point.trial, stop_of(test), details, test, same_as=point)
+
+    def _pieces(self, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
+        """Return the pieces of the step between the folds, without what is right beside some special points."""
+        segment, aside = self.segment, _BESIDE * self.segment.step
+        if not same:
+            return list(itertools.pairwise(self._knots()))
+        knots, cut = [], [point.at for point in same]
+        for place in self._knots():
+            if not any(abs(place[0] - at) <= aside for at in cut) or place[0] in (0.0, segment.step):
+                knots.append(place)
+        beside = [s for at in cut for s in (at - aside, at + aside) if 0 < s < segment.step]
+        knots = sorted([*knots, *((s, segment.near(s)) for s in beside)], key=lambda place: place[0])
+        pairs = itertools.pairwise(knots)
+        return [(left, right) for left, right in pairs if not any(left[0] < at < right[0] for at in cut)]
+
+    def _knots(self) -> list[Place]:
         """Return places between which a test function has one zero at most, as far as can be told."""
         segment = self.segment
         first = segment.beginning()
-        knots = [(0.0, first), *((fold.at, fold.trial) for fold in self._folds), (segment.step, segment.trial)]
-        if test.several is None:
-            return knots
-        inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
-        values = [first.value(test), *(test.function(segment.guessed(s)) for s in inside), segment.trial.value(test)]
-        if np.count_nonzero(np.diff(np.sign(values))) > 1:
-            knots = self._with_places(knots, inside)
-        for _ in range(_CUTS):
-            crowded = [pair for pair in itertools.pairwise(knots) if test.several(pair[0][1], pair[1][1])]
-            if not crowded:
-                break
-            knots = self._with_places(knots, [(left[0] + right[0]) / 2 for left, right in crowded])
-        return knots
-
-    def _with_places(self, knots: list[Place], distances: list[float]) -> list[Place]:
-        """Return the knots with more places between them, in order."""
-        return sorted([*knots, *((s, self.segment.near(s)) for s in distances)], key=lambda knot: knot[0])
+        return [(0.0, first), *((fold.at, fold.trial) for fold in self._folds), (segment.step, segment.trial)]
 
     # --- ends ----------------------------------------------------------------------------------------------------
 

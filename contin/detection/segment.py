@@ -41,6 +41,8 @@ class SpecialPoint:
         As in `contin.Point`.
     test : TestFunction, optional
         Vanishes here.
+    same_as : SpecialPoint, optional
+        The fold or branch point that lies at the same place and is located better.
     """
 
     at: float
@@ -50,6 +52,7 @@ class SpecialPoint:
     stop: Stop | None = None
     details: Any = None
     test: TestFunction | None = None
+    same_as: SpecialPoint | None = None
 
 
 class Segment:
@@ -110,6 +113,11 @@ class Segment:
         except ConvergenceError:
             return self.guessed(distance)
 
+    @property
+    def precision(self) -> float:
+        """Distance to which zeros are located."""
+        return max(_PRECISE, _SHARE * self.newton.tolerance) * self.step
+
     def beginning(self) -> Trial:
         """Return the state's point, be it a branch point."""
         state = self.state
@@ -125,13 +133,16 @@ class Segment:
             if ends[0] * ends[1] > 0 or ends[0] == 0:  # a limit that the run starts on
                 at, there = a, first
             else:
-                precise = max(_PRECISE, _SHARE * self.newton.tolerance) * self.step
-                at = find_zero(lambda s: test.function(self.at(s)), (a, ends[0]), (b, ends[1]), precise, guess)
+                at = find_zero(lambda s: test.function(self.at(s)), (a, ends[0]), (b, ends[1]), self.precision, guess)
                 there = self.at(at)
         except ConvergenceError:
             at, there, name = b, last, f"possible {test.name}"
-        stop = None
-        if test.terminal:
-            stop = Stop("limit", f"reached {test.name}") if test.limit else Stop("event", f"met {test.name}")
         details = None if test.describe is None else test.describe(there)
-        return SpecialPoint(at, test.label, name, there, stop, details, test)
+        return SpecialPoint(at, test.label, name, there, stop_of(test), details, test)
+
+
+def stop_of(test: TestFunction) -> Stop | None:
+    """Return the reason why a run ends at a zero of a test function; None where it goes on."""
+    if not test.terminal:
+        return None
+    return Stop("limit", f"reached {test.name}") if test.limit else Stop("event", f"met {test.name}")

@@ -166,9 +166,9 @@ class TestFunction:
         ``describe(trial)`` at the located point gives its ``details``.
     limit : bool
         The run must not go where the function is positive: a start on the limit, too, is left inwards only.
-    several : callable, optional
-        ``several(before, after) -> bool`` of two neighbouring trials: more than one zero must lie between them. Such steps are
-        cut, and the function's sign is also looked at inside every step.
+    search : callable, optional
+        ``search(segment, places)`` returns the special points between places of a step (`contin.detection.segment`), where a
+        sign does not tell them all.
 
     Examples
     --------
@@ -187,7 +187,7 @@ class TestFunction:
     confirm: Callable[[Trial], bool] | None = None
     describe: Callable[[Trial], object] | None = None
     limit: bool = False
-    several: Callable[[Trial, Trial], bool] | None = None
+    search: Callable[..., Any] | None = None
 
     def passed(self, before: float, after: float) -> bool:
         """Return whether there is a zero between two neighbouring points where the function has these values."""
