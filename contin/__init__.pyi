@@ -5,7 +5,8 @@ from .analysis.solving import solve
 from .analysis.two_parameter import curve
 from .continuation.run import Continuation, follow
 from .continuation.trace import trace
-from .detection.branch_point import BranchPoint, MultiplePoint, locate_branch_point
+from .detection.branch_point import BranchPoint, locate_branch_point
+from .detection.multiple_point import MultiplePoint
 from .discretization.algebraic import Algebraic
 from .discretization.basis import basis, interpolation
 from .discretization.collocation import Collocation

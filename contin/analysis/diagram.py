@@ -13,6 +13,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
+from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
 from contin.results.branch import Branch
@@ -124,7 +125,11 @@ class _Explorer:
             branch.points.append(point)
             if place == 0 and origin is not None:
                 origin.also.append(point)
-            elif isinstance(point.details, BranchPoint) and self._arrived(point, number, depth):
+            elif (
+                isinstance(point.details, (BranchPoint, MultiplePoint))
+                and point.details.tangents
+                and self._arrived(point, number, depth)
+            ):
                 branch.stop = Stop("known branch", "came to a branch that was followed before")
                 break
         branch.stop = branch.stop or run.stop

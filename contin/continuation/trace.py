@@ -8,6 +8,7 @@ from typing import Any
 from contin import checks
 from contin.continuation.run import follow
 from contin.detection.branch_point import BranchPoint
+from contin.detection.multiple_point import MultiplePoint
 from contin.errors import ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of
@@ -51,7 +52,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if branch is None:
         return follow(system, x, settings)
     checks.whole("branch", branch, 0, 10)
-    if not isinstance(start.details, BranchPoint):
+    if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")
     if not 0 <= branch < len(start.details.tangents):
         raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")

@@ -72,22 +72,6 @@ class BranchPoint:
         return dataclasses.replace(self, tangents=tuple(tangents))
 
 
-@dataclass(frozen=True, eq=False)
-class MultiplePoint:
-    """A point where F_x loses rank by two or more at once: reported, its branches are not computed.
-
-    Attributes
-    ----------
-    dimension : int
-        Dimension of the kernel beyond the tangent of the branch.
-    kernel : ndarray, shape (dimension, size)
-        Unit vectors that span it.
-    """
-
-    dimension: int
-    kernel: Array
-
-
 def locate_branch_point(
     system: Discretization, x: Array, newton: Newton = Newton(), kernel: Array | None = None, max_iterations: int = 12
 ) -> BranchPoint:

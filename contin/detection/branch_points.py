@@ -6,18 +6,16 @@ change (`contin.detection.crossings`).
 
 from __future__ import annotations
 
-import contextlib
 import functools
 
 import numpy as np
 
-from contin.detection.branch_point import MultiplePoint, locate_branch_point
+from contin.detection.branch_point import locate_branch_point
 from contin.detection.crossings import calm, crossings, quotients
-from contin.detection.root import find_zero
+from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
 from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
-from contin.linalg.factors import Factors
 from contin.linalg.singular import smallest_directions
 from contin.stepping.trial import Trial, sign_changed
 
@@ -28,10 +26,6 @@ _OUTSIDE = 1e-6
 _OFF = 0.1
 #: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is "possible".
 _HALVINGS = 12
-#: A multiple point is located to this part of the step: the mean of two eigenvalues, which it is the zero of, is not smooth.
-_PRECISE = 1e-9
-#: Singular values within this factor of the smallest vanish together.
-_TOGETHER = 1e-3
 
 
 class BranchPointSearch:
@@ -57,8 +51,8 @@ class BranchPointSearch:
         trial.sharpen_factors(row)
         values = quotients(before.factors, trial.factors, size)
         passing = np.abs(values[values.real < 0])
-        if len(passing) == 1:  # the singular value changes about evenly
-            self._share = float(passing[0] / (1 + passing[0]))
+        if len(passing):  # singular values change about evenly
+            self._share = float(np.mean(passing / (1 + passing)))
         return crossings(values)
 
     @property
@@ -92,26 +86,20 @@ class BranchPointSearch:
             middle = (low + high) / 2
         return SpecialPoint(high, "BP", "possible", trial)
 
+    @functools.cached_property
     def multiple(self) -> SpecialPoint:
-        """Return where two or more singular values pass zero together: the zero of their mean, with the kernel."""
+        """The multiple point inside the step, where several singular values pass zero together; "possible" where they do not."""
         segment = self.segment
-        system, step = segment.state.system, segment.step
-        right, left, _ = smallest_directions(segment.trial.factors, system.size)
-
-        def mean(factors: Factors) -> float:
-            response = right @ factors.solve(left).T
-            values = np.linalg.eigvals(np.linalg.inv(response))
-            return float(np.sort_complex(values[np.argsort(np.abs(values))[:2]]).real.mean())
-
-        at, there = step, segment.trial
-        with contextlib.suppress(ConvergenceError, np.linalg.LinAlgError):
-            ends = mean(segment.before.factors), mean(segment.trial.factors)
-            if sign_changed(*ends):
-                places = (segment.low, ends[0]), (step, ends[1])
-                at = find_zero(lambda s: mean(segment.at(s).factors), *places, _PRECISE * step)
-                there = segment.at(at)
-        right, _, response = smallest_directions(there.factors, system.size)
-        u, values, _ = np.linalg.svd(response)
-        dimension = max(2, int(np.count_nonzero(values > _TOGETHER * values[0])))
-        kernel = u[:, :dimension].T @ right
-        return SpecialPoint(at, "BP", f"kernel of dimension {dimension}", there, details=MultiplePoint(dimension, kernel))
+        state, step = segment.state, segment.step
+        for middle in (segment.low + self._share * (step - segment.low), step / 2, step / 4, 3 * step / 4):
+            try:
+                found = locate_multiple_point(state.system, segment.guess(middle), state.row, self.count[0], segment.newton)
+            except ConvergenceError:
+                continue
+            assert found.x is not None
+            at = inner(state.system, state.tangent, found.x - state.x)
+            if segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE):
+                trial = Trial.without_tangent(state.system, found.x)
+                return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
+        kernel = smallest_directions(segment.trial.factors, state.system.size)[0][: self.count[0]]
+        return SpecialPoint(step, "BP", "possible", segment.trial, details=MultiplePoint(self.count[0], kernel))

@@ -76,15 +76,17 @@ class Inspection:
     # --- does the step stay on its branch? -----------------------------------------------------------------------
 
     def is_simple(self) -> bool:
-        """Return whether the step stays on its branch, and passes one branch point at most, which can be located.
+        """Return whether the step stays on its branch, and passes one point at most, simple or multiple, where others cross.
 
         A change of the determinant's sign without a branch point means that Newton's method left the branch.
         """
         if not self.settings.branch_points:
             return self._is_steady()
         count, clear = self._branch_points.count
-        if count > 1 or not clear or not self._is_steady():
+        if not clear or not self._is_steady():
             return False
+        if count > 1:
+            return self._branch_points.multiple.name != "possible"
         return not self._branch_points.sign_changes or self._branch_points.simple.name != "possible"
 
     def _is_steady(self) -> bool:
@@ -109,10 +111,10 @@ class Inspection:
         home = None if self.segment.state.singular else self._returned()
         if home is not None:
             found.append(home)
+        elif self.settings.branch_points and self._branch_points.count[0] > 1:
+            found.append(self._branch_points.multiple)
         elif self.settings.branch_points and self._branch_points.sign_changes:
             found.append(self._branch_points.simple)
-        elif self.settings.branch_points and self._branch_points.count[0] > 1:
-            found.append(self._branch_points.multiple())
         crossings = [point for point in found if not point.name.startswith("possible")]
         for test in tests:
             found += self._zeros(test, crossings)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.detection.branch_point import BranchPoint, MultiplePoint, locate_branch_point
+from contin.detection.branch_point import BranchPoint, locate_branch_point
+from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
 from contin.detection.segment import SpecialPoint
 from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
@@ -55,7 +56,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """
     trial, details, last = point.trial, point.details, np.inf
     errors = dict.fromkeys(trial.system.free, np.nan)
-    if isinstance(details, MultiplePoint):
+    if isinstance(details, MultiplePoint) and details.x is None:
         return Refined(trial, errors, details)
     for _ in range(_HALVINGS):
         coarse = trial.system
@@ -90,6 +91,11 @@ def _again(
         It was not found, or another one was.
     """
     system, carry = finer
+    if isinstance(details, MultiplePoint):
+        home = carry(details.tangents[0]) if details.tangents else carry(details.kernel[0])
+        again = locate_multiple_point(system, carry(trial.x), system.weights * home, details.dimension, newton)
+        assert again.x is not None
+        return Trial(system, again.x, Linearization(carry(trial.tangent), np.nan)), again
     if isinstance(details, BranchPoint) or (point.label == "BP" and point.test is None):
         found = _branch_point_again(system, carry, trial.x, details, newton)
         return Trial(system, found.x, Linearization(carry(trial.tangent), np.nan)), found

@@ -1,0 +1,256 @@
+"""Multiple points: where F_x loses rank by d > 1 at once, located, with the tangents of all branches that meet there.
+
+With d columns Psi and 1 + d rows Phi the matrix M of `contin.detection.bordered` is regular there, too. It defines the
+manifold F(x) + Psi beta = 0 over the coordinates s = Phi.(x - x0): beta(s), of d components, with derivatives G from M. At the
+point beta and G vanish (d + d (1 + d) equations for 1 + d unknowns: Gauss-Newton, which converges where a symmetry makes them
+agree). Branches are the zeros of beta. Its terms of second and third order are fitted to G around the point, and their zeros on
+two small spheres are found from many directions; where they converge as the sphere shrinks they are tangents.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.discretization.protocol import Discretization, inner
+from contin.errors import ConvergenceError
+from contin.linalg.factors import Factors
+from contin.linalg.singular import smallest_directions
+from contin.stepping.newton import Newton
+
+#: Step of the differences of G along s, and the radius on which its terms are fitted: small against one, the size of the
+#: unknowns, and large against the cube root of round-off.
+_DIFFERENCE, _RADIUS = 1e-4, 2e-2
+#: Gauss-Newton steps; it converges fast or, where there is no multiple point, not at all.
+_MOST_STEPS = 12
+#: Residual of the equations, beta and G together, above which they contradict each other: two branch points, not one.
+_CONSISTENT = 1e-6
+#: An update below this is round-off of the differences.
+_ROUND_OFF = 1e-8
+#: Directions from which zeros on a sphere are sought: each of the at most 3^d lines is found many times.
+_DIRECTIONS = 300
+#: Radii of the spheres; the directions of zeros on them are extrapolated to radius zero.
+_SPHERES = 0.02, 0.01
+#: Directions closer than this are one.
+_SAME = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class MultiplePoint:
+    """A point where F_x loses rank by two or more at once.
+
+    Attributes
+    ----------
+    dimension : int
+        Dimension of the kernel beyond the tangent of the branch.
+    kernel : ndarray, shape (dimension, size)
+        Unit vectors that span it.
+    x : ndarray, shape (size,), or None
+        The point, where it was located.
+    tangents : tuple of ndarray
+        Unit tangents of the branches that meet there, first that of the branch it was found on; empty where none are known.
+    continuum : bool
+        The branches are not isolated: a continuous symmetry turns each into a whole family.
+    """
+
+    dimension: int
+    kernel: Array
+    x: Array | None = None
+    tangents: tuple[Array, ...] = ()
+    continuum: bool = False
+
+
+class _Manifold:
+    """F(x) + Psi beta = 0 over coordinates s, around x0."""
+
+    def __init__(self, system: Discretization, x0: Array, phi: Array, psi: Array, newton: Newton) -> None:
+        self.system, self.x0, self.psi, self.newton = system, x0, psi, newton
+        self.d = len(psi)
+        self.phi = phi
+        self.rows = np.zeros((len(phi), system.size + self.d))
+        self.rows[:, : system.size] = phi * system.weights
+        self.factors: Factors
+
+    def at(self, s: Array) -> tuple[Array, Array, Array]:
+        """Return x (size,), beta (d,) and G (d, 1 + d) at coordinates s.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        system, size = self.system, self.system.size
+        z = np.append(self.x0 + s @ self.phi, np.zeros(self.d))
+        last = np.inf
+        for _ in range(self.newton.max_iterations):
+            residual, factors = system.linearize(z[:size], self.rows, self.psi)
+            held = self.rows[:, :size] @ (z[:size] - self.x0) - s
+            update = factors.solve(np.concatenate([residual + z[size:] @ self.psi, held]))
+            z = z - update
+            change = float(np.max(np.abs(update) / (1 + np.abs(z))))
+            if not np.isfinite(change) or (change > last and change > _ROUND_OFF):
+                break
+            if change <= max(self.newton.tolerance, 1e-14) or (change >= last / 2 and change < _ROUND_OFF):
+                _, factors = system.linearize(z[:size], self.rows, self.psi)
+                unit = np.hstack([np.zeros((len(self.phi), system.equations)), np.eye(len(self.phi))])
+                solutions = factors.solve(unit)
+                self.vectors = solutions[:, :size]
+                return z[:size], z[size:], solutions[:, size:].T
+            last = change
+        raise ConvergenceError("the manifold around a multiple point was not found")
+
+
+def locate_multiple_point(
+    system: Discretization, x: Array, row: Array, dimension: int, newton: Newton = Newton()
+) -> MultiplePoint:
+    """Return the multiple point near x, with the tangents of its branches.
+
+    Parameters
+    ----------
+    system : Collocation or alike
+    x : ndarray, shape (size,)
+    row : ndarray, shape (size,)
+        Borders F_x: the tangent of the branch times the weights.
+    dimension : int
+        d, the number of singular values that vanish.
+
+    Raises
+    ------
+    ConvergenceError
+        None was found.
+    """
+    with np.errstate(all="ignore"):
+        manifold, s = _bordered(system, x, row, dimension, newton), np.zeros(1 + dimension)
+        for _ in range(_MOST_STEPS):
+            _, beta, G = manifold.at(s)
+            slopes = _slopes(manifold, s)
+            residual = np.append(beta, G.ravel())
+            jacobian = np.vstack([G, slopes.reshape(-1, 1 + dimension)])
+            update = np.linalg.lstsq(jacobian, residual, rcond=1e-8)[0]
+            s = s - update
+            if not np.all(np.isfinite(s)) or np.max(np.abs(s)) > 1:
+                break
+            if np.max(np.abs(update)) < _ROUND_OFF:
+                if np.max(np.abs(residual)) > _CONSISTENT:
+                    break
+                return _described(manifold, s, row)
+    raise ConvergenceError(f"no multiple point of dimension {dimension} near by")
+
+
+def _bordered(system: Discretization, x: Array, row: Array, dimension: int, newton: Newton) -> _Manifold:
+    """Return the manifold with borders made of the null vectors at x."""
+    factors = system.linearize(x, (row,))[1]
+    right, left, response = smallest_directions(factors, system.size, 3)
+    if len(right) < dimension or not np.all(np.isfinite(response)):
+        raise ConvergenceError("the matrix is singular")
+    u, _, vh = np.linalg.svd(response)
+    phi = [row / system.weights, *(u[:, :dimension].T @ right)]
+    psi = (vh[:dimension] @ left)[:, : system.equations]
+    psi /= np.linalg.norm(psi, axis=1)[:, None]
+    return _Manifold(system, x, _orthonormal(system, np.array(phi)), psi, newton)
+
+
+def _orthonormal(system: Discretization, vectors: Array) -> Array:
+    root = np.sqrt(system.weights)
+    q, _ = np.linalg.qr((vectors * root).T)
+    result: Array = q.T / root
+    return result
+
+
+def _slopes(manifold: _Manifold, s: Array) -> Array:
+    """Return the derivatives of G by s, shape (d, 1 + d, 1 + d), by central differences."""
+    columns = []
+    for direction in np.eye(len(s)):
+        ahead, behind = (manifold.at(s + sign * _DIFFERENCE * direction)[2] for sign in (1, -1))
+        columns.append((ahead - behind) / (2 * _DIFFERENCE))
+    return np.stack(columns, axis=2)
+
+
+def _described(manifold: _Manifold, s: Array, row: Array) -> MultiplePoint:
+    """Return the point at coordinates s with its kernel and tangents."""
+    system = manifold.system
+    x = manifold.at(s)[0]
+    vectors = manifold.vectors
+    basis = _orthonormal(system, vectors)
+    home = row / system.weights
+    ours = np.linalg.lstsq(vectors.T, home, rcond=None)[0]
+    directions, continuum = _branch_directions(manifold, s)
+    tangents = []
+    for a in [] if continuum else directions:
+        tangent = a @ vectors
+        tangents.append(tangent / np.sqrt(inner(system, tangent, tangent)))
+    tangents.sort(key=lambda tangent: -abs(inner(system, tangent, home)))
+    if tangents:
+        tangents[0] = tangents[0] * (np.sign(inner(system, tangents[0], home)) or 1.0)
+    along = ours @ vectors
+    along = along / np.sqrt(inner(system, along, along))
+    across = _orthonormal(system, np.vstack([along, basis]))[1 : manifold.d + 1]
+    return MultiplePoint(manifold.d, across, x, tuple(tangents), continuum)
+
+
+def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool]:
+    """Return the directions in s of the branches, one of each line, and whether they form a continuum."""
+    count = len(s)
+    linear, quadratic = _fitted(manifold, s)
+    random = np.random.default_rng(7)
+    starts = random.standard_normal((_DIRECTIONS, count))
+    starts = np.vstack([np.eye(count), starts / np.linalg.norm(starts, axis=1)[:, None]])
+    outer, inside = (_zeros(linear, quadratic, radius, starts) for radius in _SPHERES)
+    if max(len(outer), len(inside)) > 2 * 3**manifold.d:
+        return [], True
+    result: list[Array] = []
+    for a in inside:
+        nearest = max(outer, key=lambda other: float(other @ a), default=None)
+        if nearest is None or nearest @ a < np.cos(10 * _SPHERES[0]):
+            continue
+        direction = 2 * a - nearest
+        direction = direction / np.linalg.norm(direction)
+        if all(abs(direction @ other) < 1 - 1e-2 * _SAME for other in result):
+            result.append(direction)
+    return result, False
+
+
+def _fitted(manifold: _Manifold, s: Array) -> tuple[Array, Array]:
+    """Return the terms of G of first and second order around s: shapes (d, 1 + d, 1 + d), (d, 1 + d, 1 + d, 1 + d)."""
+    count = len(s)
+    pairs = list(itertools.combinations_with_replacement(range(count), 2))
+    random = np.random.default_rng(3)
+    places = random.standard_normal((2 * (count + len(pairs)), count))
+    places *= _RADIUS / np.linalg.norm(places, axis=1)[:, None]
+    places = np.vstack([places, -places])
+    values = np.array([manifold.at(s + place)[2] for place in places])
+    columns = np.hstack([places, np.array([[place[i] * place[j] for i, j in pairs] for place in places])])
+    fit = np.linalg.lstsq(columns, values.reshape(len(places), -1), rcond=None)[0].reshape(-1, *values.shape[1:])
+    linear = np.moveaxis(fit[:count], 0, 2)
+    quadratic = np.zeros((*values.shape[1:], count, count))
+    for (i, j), term in zip(pairs, fit[count:]):
+        quadratic[:, :, i, j] += term / 2
+        quadratic[:, :, j, i] += term / 2
+    return linear, quadratic
+
+
+def _zeros(linear: Array, quadratic: Array, radius: float, starts: Array) -> list[Array]:
+    """Return the unit vectors a with beta(radius a) = 0, from Newton's method with many starts.
+
+    beta = 1/2 G_1(s).s + 1/3 G_2(s, s).s, with the terms of G of first and second order.
+    """
+    found: list[Array] = []
+    scale = max(np.abs(linear).max(), radius * np.abs(quadratic).max(), 1e-300)
+    for start in starts:
+        a = start.copy()
+        for _ in range(50):
+            first = np.einsum("kij,j->ki", linear, a)
+            second = np.einsum("kijl,j,l->ki", quadratic, a, a) * radius
+            value = np.append((first @ a / 2 + second @ a / 3) / scale, (a @ a - 1) / 2)
+            slope = np.vstack([(first + second) / scale, a])
+            step = np.linalg.lstsq(slope, value, rcond=1e-10)[0]
+            a = a - step * min(1.0, 0.5 / max(np.linalg.norm(step), 1e-300))
+            if np.linalg.norm(step) < 1e-12:
+                break
+        else:
+            continue
+        if np.max(np.abs(value)) < 1e-9 and all(np.linalg.norm(a - other) > _SAME for other in found):
+            found.append(a)
+    return found
