@@ -6,6 +6,7 @@ change (`contin.detection.crossings`).
 
 from __future__ import annotations
 
+import contextlib
 import functools
 
 import numpy as np
@@ -28,12 +29,16 @@ _OFF = 0.1
 _HALVINGS = 12
 
 
+#: Singular values that vanish together are expected at places no further apart than this part of the step.
+_TOGETHER = 0.1
+
+
 class BranchPointSearch:
     """The branch points inside one step."""
 
     def __init__(self, segment: Segment) -> None:
         self.segment = segment
-        self._share = 0.5  # at which part of the step the branch point is expected
+        self._share, self._spread = 0.5, 0.0  # at which part of the step branch points are expected, and how far apart
 
     @functools.cached_property
     def count(self) -> tuple[int, bool]:
@@ -52,7 +57,8 @@ class BranchPointSearch:
         values = quotients(before.factors, trial.factors, size)
         passing = np.abs(values[values.real < 0])
         if len(passing):  # singular values change about evenly
-            self._share = float(np.mean(passing / (1 + passing)))
+            shares = passing / (1 + passing)
+            self._share, self._spread = float(np.mean(shares)), float(np.ptp(shares))
         return crossings(values)
 
     @property
@@ -88,18 +94,17 @@ class BranchPointSearch:
 
     @functools.cached_property
     def multiple(self) -> SpecialPoint:
-        """The multiple point inside the step, where several singular values pass zero together; "possible" where they do not."""
+        """The multiple point inside the step, where several singular values vanish together; "possible" where they do not."""
         segment = self.segment
         state, step = segment.state, segment.step
-        for middle in (segment.low + self._share * (step - segment.low), step / 2, step / 4, 3 * step / 4):
-            try:
-                found = locate_multiple_point(state.system, segment.guess(middle), state.row, self.count[0], segment.newton)
-            except ConvergenceError:
-                continue
-            assert found.x is not None
-            at = inner(state.system, state.tangent, found.x - state.x)
-            if segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE):
-                trial = Trial.without_tangent(state.system, found.x)
-                return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
-        kernel = smallest_directions(segment.trial.factors, state.system.size)[0][: self.count[0]]
-        return SpecialPoint(step, "BP", "possible", segment.trial, details=MultiplePoint(self.count[0], kernel))
+        count, middle = self.count[0], segment.low + self._share * (step - segment.low)
+        with contextlib.suppress(ConvergenceError):
+            if self._spread < _TOGETHER:
+                found = locate_multiple_point(state.system, segment.guess(middle), state.row, count, segment.newton)
+                assert found.x is not None
+                at = inner(state.system, state.tangent, found.x - state.x)
+                if segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE):
+                    trial = Trial.without_tangent(state.system, found.x)
+                    return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
+        kernel = smallest_directions(segment.trial.factors, state.system.size)[0][:count]
+        return SpecialPoint(step, "BP", "possible", segment.trial, details=MultiplePoint(count, kernel))
