@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from contin import ConvergenceError, Monitor, correct
+from contin import ConvergenceError, TestFunction, correct
 from ribbon_model.convexity import margin
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
@@ -126,7 +126,7 @@ class Watch:
         result = self._within_law(point.system, there.x)
         return result.index if result is not None and result.decided else UNDECIDED
 
-    def _monitor(self, name) -> Monitor:
+    def _monitor(self, name) -> TestFunction:
         """The determinant of one symmetry class, whose zeros are bifurcations that break the symmetry."""
 
         def determinant(trial):
@@ -143,7 +143,7 @@ class Watch:
             return float(np.prod(values))
 
         wavenumber, parity = name
-        return Monitor(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant)
+        return TestFunction(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant, looks=3, estimated=False)
 
 
 def _broken(point) -> tuple[int, str]:

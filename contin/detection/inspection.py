@@ -161,7 +161,7 @@ class Inspection:
         state = self.segment.state
         same = [point for point in (*self._folds, *crossings) if self._coincides(test, point)]
         found = [self._at_special(test, point) for point in same]
-        for left, right in self._pieces(same):
+        for left, right in self._pieces(test, same):
             before, after = left[1].value(test), right[1].value(test)
             if state.accepted == 0 and left[0] == 0 and abs(before) < _ON_ZERO * abs(after):
                 before = 0.0  # the first point lies on the zero
@@ -186,19 +186,31 @@ class Inspection:
         details = None if test.describe is None else test.describe(point.trial)
         return SpecialPoint(point.at, test.label, test.name, point.trial, stop_of(test), details, test, same_as=point)
 
-    def _pieces(self, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
+    def _pieces(self, test: TestFunction, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
         """Return the pieces of the step between the folds, without what is right beside some special points."""
         segment, aside = self.segment, _BESIDE * self.segment.step
+        between = self._looked_at(test, self._knots())
         if not same:
-            return list(itertools.pairwise(self._knots()))
+            return list(itertools.pairwise(between))
         knots, cut = [], [point.at for point in same]
-        for place in self._knots():
+        for place in between:
             if not any(abs(place[0] - at) <= aside for at in cut) or place[0] in (0.0, segment.step):
                 knots.append(place)
         beside = [s for at in cut for s in (at - aside, at + aside) if 0 < s < segment.step]
         knots = sorted([*knots, *((s, segment.near(s)) for s in beside)], key=lambda place: place[0])
         pairs = itertools.pairwise(knots)
         return [(left, right) for left, right in pairs if not any(left[0] < at < right[0] for at in cut)]
+
+    def _looked_at(self, test: TestFunction, knots: list[Place]) -> list[Place]:
+        """Return the knots and, where a test function changes its sign inside the step more than once, places between them."""
+        inside = [self.segment.step * part / (test.looks + 1) for part in range(1, test.looks + 1)]
+        if not inside:
+            return knots
+        known = [*((s, trial.value(test)) for s, trial in knots), *((s, test.function(self.segment.guessed(s))) for s in inside)]
+        signs = np.sign([value for _, value in sorted(known)])
+        if np.count_nonzero(np.diff(signs)) <= 1:
+            return knots
+        return sorted([*knots, *((s, self.segment.near(s)) for s in inside)], key=lambda place: place[0])
 
     def _knots(self) -> list[Place]:
         """Return places between which a test function has one zero at most, as far as can be told."""
