@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from contin.arrays import Array
-from contin.continuation.scaling import scaled
+from contin.continuation.scaling import outgrown, scaled
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.segment import Place, Segment, SpecialPoint
@@ -341,7 +341,7 @@ class Continuation:
         due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
         if state.singular or not due or state.accepted % due:
             return
-        adapted = state.system.adapted(state.x, control)
+        adapted = state.system.adapted(state.x, control) or outgrown(state.system, state.x)
         if adapted is None:
             return
         system, carry = adapted

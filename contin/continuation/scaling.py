@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.discretization.protocol import Discretization
+from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import usual
 from contin.discretization.system import System
 from contin.stepping.settings import Settings
@@ -63,6 +63,23 @@ def scaled(
     if all(np.all(found == 1) for found in sizes):
         return system, x
     return system.with_scales(x, *sizes)
+
+
+def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier] | None:
+    """Return the system with larger sizes where unknowns have outgrown theirs, and the carrier; None where there is no need."""
+    if not isinstance(system, System):
+        return None
+    names, count = list(system.problem.parameters), len(system.problem.states)
+    states, parameters = np.ones(count), np.ones(len(names))
+    if system.scales is not None:
+        states, parameters = system.scales.states, system.scales.parameters.copy()
+    size = usual(np.abs(x[: system.state_size]).reshape(-1, count).max(axis=0, initial=0.0))
+    size_of_free = usual(x[system.state_size :])
+    if max(size.max(), size_of_free.max(initial=0.0)) <= 1:
+        return None
+    parameters[[names.index(name) for name in system.free]] *= np.maximum(1.0, size_of_free)
+    other, _ = system.with_scales(x, states * np.maximum(1.0, size), parameters)
+    return other, system.carrier(other)
 
 
 def _given(value: float, name: str, settings: Settings) -> float:
