@@ -309,7 +309,7 @@ class Continuation:
         at = trial.system.parameter_index(self.primary)
         missed = abs(guess[at] - trial.x[at])
         change = step * max(abs(state.tangent[at]), abs(trial.tangent[at]))
-        return missed > _MISSED * change and missed > _NOISE * (1 + abs(trial.x[at]))
+        return bool(missed > _MISSED * change and missed > _NOISE * (1 + abs(trial.x[at])))
 
     def _exact_tangent(self, state: State) -> Array:
         """Return the tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""

@@ -57,7 +57,7 @@ def scaled(
     change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
     response = np.minimum(1.0, rates * change)
     size = np.where(size > 0, size, np.where(response > noise, response, 0.0))
-    parameters = np.array([known.get(name, 1.0) for name in names])
+    parameters = np.array([known.get(name, value) for name, value in zip(names, system.parameters)])
     parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, np.minimum(1.0, rate_of_free * change))
     sizes = usual(size), usual(parameters)
     if all(np.all(found == 1) for found in sizes):

@@ -77,10 +77,10 @@ def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
 
 def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
     """Return the eigenvalues at both ends that changed the side of the imaginary axis."""
-    from scipy.optimize import linear_sum_assignment  # loads .1 s of SciPy, which only equilibria need
+    from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]  # takes .1 s; only equilibria need it
 
     system: Any = left.system
-    first, last = system.eigenvalues(left.x), right.system.eigenvalues(right.x)  # type: ignore[attr-defined]
+    first, last = system.eigenvalues(left.x), system.eigenvalues(right.x)
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(last))):
         return np.empty(0, complex), np.empty(0, complex)
     ours, theirs = linear_sum_assignment(np.abs(first[:, None] - last))

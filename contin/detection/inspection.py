@@ -206,7 +206,10 @@ class Inspection:
         inside = [self.segment.step * part / (test.looks + 1) for part in range(1, test.looks + 1)]
         if not inside:
             return knots
-        known = [*((s, trial.value(test)) for s, trial in knots), *((s, test.function(self.segment.guessed(s))) for s in inside)]
+        known = [
+            *((s, trial.value(test)) for s, trial in knots),
+            *((s, test.function(self.segment.guessed(s))) for s in inside),
+        ]
         signs = np.sign([value for _, value in sorted(known)])
         if np.count_nonzero(np.diff(signs)) <= 1:
             return knots

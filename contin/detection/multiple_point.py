@@ -34,6 +34,8 @@ _ROUND_OFF = 1e-8
 _DIRECTIONS = 300
 #: Radii of the spheres; the directions of zeros on them are extrapolated to radius zero.
 _SPHERES = 0.02, 0.01
+#: Newton's method on a sphere: its longest step, the step at which it has settled, and its iterations at most.
+_LONGEST, _SETTLED, _MOST_ITERATIONS = 0.5, 1e-12, 50
 #: Directions closer than this are one.
 _SAME = 1e-3
 
@@ -240,14 +242,15 @@ def _zeros(linear: Array, quadratic: Array, radius: float, starts: Array) -> lis
     scale = max(np.abs(linear).max(), radius * np.abs(quadratic).max(), 1e-300)
     for start in starts:
         a = start.copy()
-        for _ in range(50):
+        for _ in range(_MOST_ITERATIONS):
             first = np.einsum("kij,j->ki", linear, a)
             second = np.einsum("kijl,j,l->ki", quadratic, a, a) * radius
             value = np.append((first @ a / 2 + second @ a / 3) / scale, (a @ a - 1) / 2)
             slope = np.vstack([(first + second) / scale, a])
             step = np.linalg.lstsq(slope, value, rcond=1e-10)[0]
-            a = a - step * min(1.0, 0.5 / max(np.linalg.norm(step), 1e-300))
-            if np.linalg.norm(step) < 1e-12:
+            length = float(np.linalg.norm(step))
+            a = a - step * min(1.0, _LONGEST / max(length, _LONGEST))
+            if length < _SETTLED:
                 break
         else:
             continue

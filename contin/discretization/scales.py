@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin.arrays import Array, Indices
+from contin.arrays import Array, Indices, Pattern
 from contin.functions.batch import Batch
 from contin.functions.colouring import Colouring
 
@@ -31,6 +31,16 @@ class Scales:
     states: Array
     parameters: Array
     rows: dict[str, Array]
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all sizes by name, for a file."""
+        return {"states": self.states, "parameters": self.parameters, **self.rows}
+
+    @classmethod
+    def of_arrays(cls, arrays: dict[str, Array]) -> Scales:
+        """Return the scales that `arrays` gave."""
+        rows = {name: sizes for name, sizes in arrays.items() if name not in ("states", "parameters")}
+        return cls(arrays["states"], arrays["parameters"], rows)
 
 
 def usual(sizes: Array | float) -> Array:
@@ -57,7 +67,7 @@ class ScaledBatch:
         self._batch, self._states, self._parameters, self._values = batch, states, parameters, values
 
     @property
-    def depends(self) -> Array:
+    def depends(self) -> Pattern:
         """Sparsity pattern."""
         return self._batch.depends
 

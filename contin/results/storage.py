@@ -12,8 +12,10 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint
+from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
+from contin.discretization.scales import Scales
 from contin.errors import ProblemError
 from contin.files import write_whole
 from contin.problems.algebraic import AlgebraicProblem
@@ -54,15 +56,21 @@ def save(branch: Branch, path: str | Path) -> None:
             arrays[f"parameters{at}"] = point.system.parameters
             if isinstance(point.system, Collocation):
                 arrays[f"mesh{at}"] = point.system.mesh
+            if point.system.scales is not None:
+                arrays |= {f"scale_{name}{at}": sizes for name, sizes in point.system.scales.arrays().items()}
         arrays[f"x{number}"], arrays[f"tangent{number}"] = point.x, point.tangent
         if isinstance(point.details, BranchPoint):
             for name in _OF_BRANCH_POINT:
                 arrays[f"{name}{number}"] = getattr(point.details, name)
+        if isinstance(point.details, MultiplePoint):
+            arrays[f"kernel{number}"] = point.details.kernel
+        if isinstance(point.details, (BranchPoint, MultiplePoint)):
             arrays[f"tangents{number}"] = np.array(point.details.tangents)
         rows.append({
             "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
             "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
             "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
+            "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
         })  # fmt: skip
     first = branch.points[0].system
     stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
@@ -109,16 +117,23 @@ def _system(
     problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, Any], arrays: dict[str, Array], i: int
 ) -> Collocation | Algebraic:
     values = dict(zip(head["names"], arrays[f"parameters{i}"]))
+    sizes = {name.removeprefix("scale_").removesuffix(str(i)): array for name, array in arrays.items()
+             if name.startswith("scale_") and name.rstrip("0123456789") + str(i) == name}  # fmt: skip
+    scales = Scales.of_arrays(sizes) if sizes else None
     if isinstance(problem, AlgebraicProblem):
-        return Algebraic(problem, head["free"], values)
-    return Collocation(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values)
+        return Algebraic(problem, head["free"], values, scales)
+    return Collocation(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values, scales)
 
 
 def _point(row: dict[str, Any], system: Collocation | Algebraic, arrays: dict[str, Array], number: int) -> Point:
-    x, details = arrays[f"x{number}"], None
+    x = arrays[f"x{number}"]
+    details: BranchPoint | MultiplePoint | None = None
     if row["imperfection"] is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}
         details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)
+    elif row.get("dimension") is not None:
+        tangents = tuple(arrays[f"tangents{number}"])
+        details = MultiplePoint(row["dimension"], arrays[f"kernel{number}"], x, tangents, row["continuum"])
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point(
         row["label"], row["name"], parameters, row["functionals"], x, arrays[f"tangent{number}"], system, row["arclength"],
