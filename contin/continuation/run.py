@@ -210,7 +210,7 @@ class Continuation:
         except ConvergenceError as error:
             self.stop = Stop(
                 "no convergence", f"the step became smaller than min_step = {self.settings.min_step:g} ({error})",
-                "more intervals, a smaller min_step, or a start elsewhere may help",
+                "more intervals, a smaller min_step, scales for states or parameters far from one, or a start elsewhere may help",
             )  # fmt: skip
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return

@@ -16,9 +16,9 @@ from contin.arrays import Array, Indices, Pattern
 from contin.functions.batch import Batch
 from contin.functions.colouring import Colouring
 
-#: Sizes within this factor of one count as one: problems of everyday sizes are not scaled. With a factor of 10 many would be,
-#: with one of 1e5 tolerances would be off by as much.
-USUAL = 1e3
+#: Sizes between these bounds count as one: problems of everyday sizes are not scaled. Tolerances relative to 1 + |x| suit large
+#: numbers, and small ones less.
+USUAL = 1e-2, 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Scales:
 def usual(sizes: Array | float) -> Array:
     """Return sizes as powers of two; 1 for those of everyday size, and for zero, infinity and NaN."""
     sizes = np.abs(sizes)
-    odd = np.isfinite(sizes) & (sizes > 0) & ((sizes > USUAL) | (sizes < 1 / USUAL))
+    odd = np.isfinite(sizes) & (sizes > 0) & ((sizes < USUAL[0]) | (sizes > USUAL[1]))
     result: Array = np.where(odd, np.exp2(np.round(np.log2(np.where(odd, sizes, 1.0)))), 1.0)
     return result
 
