@@ -43,7 +43,7 @@ class Extended(Discretization):
         self.problem, self.free = _ExtendedStatement(base.problem, len(base.free)), base.free
         self.weights, self.size, self.state_size = base.weights, base.size, base.state_size
         self.intervals, self.degree = base.intervals, base.degree
-        self.free_scales = base.free_scales
+        self.scales, self.free_scales = base.scales, base.free_scales
 
     @abstractmethod
     def borders_fit(self, x: Array) -> bool:

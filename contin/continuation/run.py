@@ -210,7 +210,7 @@ class Continuation:
         except ConvergenceError as error:
             self.stop = Stop(
                 "no convergence", f"the step became smaller than min_step = {self.settings.min_step:g} ({error})",
-                "more intervals, a smaller min_step, scales for states or parameters far from one, or a start elsewhere may help",
+                "more intervals, a smaller min_step, scales for unknowns far from one, or a start elsewhere may help",
             )  # fmt: skip
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
@@ -346,8 +346,11 @@ class Continuation:
             return
         system, carry = adapted
         tangent = carry(state.tangent)
-        tangent /= np.sqrt(inner(system, tangent, tangent))
-        previous = None if state.previous_tangent is None else carry(state.previous_tangent)
+        length = float(np.sqrt(inner(system, tangent, tangent)))
+        tangent /= length
+        previous, step = None if state.previous_tangent is None else carry(state.previous_tangent), state.step
+        if system.scales is not state.system.scales:
+            previous, step = None, float(np.clip(step * length, self.settings.min_step, self.settings.max_step))
         x, row = carry(state.x), system.weights * tangent
         try:
             done = correct(system, x, row, row @ x, self.settings.newton)
@@ -359,7 +362,7 @@ class Continuation:
             return  # a special point would fall between the meshes; the next point will do as well
         self._end = end
         self.state = dataclasses.replace(
-            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, sign=end.sign
+            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
         )
 
     # --- results -------------------------------------------------------------------------------------------------

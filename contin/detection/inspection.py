@@ -243,12 +243,14 @@ class Inspection:
         home, x, tangent = self.start
         if state.accepted < _FEWEST:
             return None
-        p, q = x[home.state_size :], trial.x[state.system.state_size :]
-        if np.max(np.abs(p - q)) > 2 * step:
-            return None
         if home is not state.system:
             carry = home.carrier(state.system)
             x, tangent = carry(x), carry(tangent)
+            if home.scales is not state.system.scales:
+                tangent = tangent / np.sqrt(inner(state.system, tangent, tangent))
+        size = state.system.state_size
+        if np.max(np.abs(x[size:] - trial.x[size:])) > 2 * step:
+            return None
         passed = [inner(state.system, end - x, tangent) for end in (state.x, trial.x)]
         if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, tangent) < _SAME_WAY:
             return None

@@ -48,8 +48,10 @@ class Discretization(Equations, Protocol):
         Weights of the inner product.
     intervals, degree : int
         Of the mesh; 0 without one.
+    scales : object
+        Sizes of states and parameters, by which they are divided in x; None where these are as they are.
     free_scales : ndarray
-        Sizes of the free parameters, by which they are divided in x.
+        Those of the free parameters.
     """
 
     problem: Statement
@@ -60,6 +62,7 @@ class Discretization(Equations, Protocol):
     weights: Array
     intervals: int
     degree: int
+    scales: Any
     free_scales: Array
 
     @property
