@@ -33,8 +33,7 @@ from contin.stepping.state import State, Stop, standing_at
 from contin.stepping.step import corrected, hidden_turn, located, predict, sharpened, tangent_error, trial_of, turn
 from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
 
-#: A step is cut down to this fraction of itself to take several branch points one by one, before they count as one. At 1e-2
-#: close branch points are reported as one of higher dimension.
+#: A step is cut down to this fraction of itself to take several branch points one by one.
 _FINEST = 1e-3
 #: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
 _ASTRAY = 2.5

@@ -20,8 +20,7 @@ from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton
 
-#: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear. At 1 every
-#: location would take an iteration more.
+#: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear.
 _LINEAR = 0.1
 #: Updates that small and no longer shrinking (by less than `_SHRINKING`) are round-off.
 _ROUND_OFF, _SHRINKING = 1e-9, 0.3

@@ -21,7 +21,7 @@ from contin.linalg.singular import smallest_directions
 from contin.stepping.trial import Trial, sign_changed
 
 #: How far outside a step, as a part of it, a branch point may be found that changes the determinant's sign inside it: places
-#: of branch points are known to about the square root of round-off there. At 1e-5 one could be reported by two steps.
+#: of branch points are known to about the square root of round-off there.
 _OUTSIDE = 1e-6
 #: A branch point further off the cubic than this part of the step is another one.
 _OFF = 0.1

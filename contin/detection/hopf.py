@@ -20,7 +20,7 @@ from contin.errors import ConvergenceError
 from contin.stepping.trial import TestFunction, Trial
 
 #: An eigenvalue with a smaller imaginary part, relative to 1 + its size, is real: a double real one splits by the square root
-#: of round-off. At 1e-7 slow oscillations would be taken for neutral saddles.
+#: of round-off.
 _REAL = 1e-8
 #: Into how many parts a step is divided to look inside it, on the cubic, ...
 _PARTS = 4

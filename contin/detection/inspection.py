@@ -24,7 +24,7 @@ from contin.stepping.state import Stop
 from contin.stepping.trial import Linearization, TestFunction, Trial, sign_changed
 
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
-#: labelled already. At 1e-5 a run that starts near a fold would miss it.
+#: labelled already.
 _AT_START = 1e-6
 #: This close to a branch point tangents are round-off: the square root of it, times ten.
 _BLURRED = 1e-7

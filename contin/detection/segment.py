@@ -14,8 +14,8 @@ from contin.stepping.state import State, Stop
 from contin.stepping.step import located
 from contin.stepping.trial import Linearization, TestFunction, Trial
 
-#: Part of a step, and part of the corrector's tolerance of it, to which a zero is located. Ten times larger, user zeros would
-#: miss their value by more than round-off; smaller is below round-off of the place itself.
+#: Part of a step, and part of the corrector's tolerance of it, to which a zero is located: round-off of the place and, of the
+#: function, what the corrector leaves.
 _PRECISE, _SHARE = 1e-12, 1e-2
 #: Least cosine between the tangents at both ends that the cubic is made with: accepted steps turn by less.
 _LEAST_COSINE = 0.1
