@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+import contin
+
 PROJECT = Path(__file__).resolve().parent.parent
 PAGES = [page for page in sorted((PROJECT / "docs").glob("*.md")) if "```" in page.read_text() and page.stem != "file-format"]
 PROGRAM = ".venv/bin/python "
@@ -51,6 +53,11 @@ def test_architecture_names_what_there_is():
     for file, name in steps:
         for part in name.split("."):
             assert re.search(rf"^ *(def|class) {part}\b", (package / file).read_text(), re.M), (file, name)
+
+
+def test_reference_lists_all_public_names():
+    listed = re.findall(r"^::: contin\.(\w+)$", (PROJECT / "docs" / "reference.md").read_text(), re.M)
+    assert sorted([*listed, "Monitor"]) == sorted(contin.__all__)  # the first name of TestFunction: mkdocstrings shows none
 
 
 def test_picture_of_the_rooms_is_true():
