@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import glob
 import io
 import os
@@ -11,7 +10,8 @@ import platform
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+
+from filelock import FileLock, Timeout
 
 from contin import temporary_name, write_whole
 
@@ -37,8 +37,12 @@ def write_bytes(path: Path, data: bytes) -> None:
         raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
 
 
-#: Locks that this process holds: the file locked, and the open lock file beside it.
-_held: dict[Path, BinaryIO] = {}
+#: Locks that this process holds, by the file locked.
+_held: dict[Path, FileLock] = {}
+
+#: Seconds until a run is refused. A run that is killed while it forks a worker keeps its lock for up to 11 ms (measured), and
+#: a run that ends may be removing its lock file. Ten times more: a refusal takes half a second.
+_PATIENCE = 0.05
 
 
 @contextlib.contextmanager
@@ -68,79 +72,57 @@ def _lock_file(path: Path) -> Path:
     return path.with_name(f".{path.name[:50]}.lock")
 
 
-def _is_open_as(name: Path, file) -> bool:
-    """Whether the open file is the one that has this name (now; another process may remove it at any time)."""
-    try:
-        return os.path.samestat(os.fstat(file.fileno()), name.stat())
-    except FileNotFoundError:
-        return False
-
-
 def _lock(path: Path) -> bool:
-    """Take the lock; False if another process has it."""
-    name = _lock_file(path)
-    while True:
-        try:
-            file = open(name, "a+b")  # noqa: SIM115 - open as long as the lock is held
-        except OSError:
-            return True  # no folder, or one that cannot be written: there is nothing to protect
-        try:
-            _lock_open_file(file)
-        except OSError as error:
-            file.close()
-            return error.errno not in (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
-        if _is_open_as(name, file):
-            break
-        file.close()  # the run that had it removed it just now
-    with contextlib.suppress(OSError):  # a full disk
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {platform.node()}".encode())
-        file.flush()
-    _held[path] = file
+    """Take the lock; False if another run has it.
+
+    Forked workers inherit the lock. Since version 3.30, filelock closes it in them, so that it ends with this process.
+    """
+    if not os.path.isdir(path.parent):
+        return True  # FileLock would make the folder
+    lock = FileLock(_lock_file(path), _PATIENCE, thread_local=False, fallback_to_soft=False, on_acquired=_sign)
+    try:
+        lock.acquire()
+    except Timeout:
+        return False
+    except OSError:
+        return True  # a folder that cannot be written, or that has no locks
+    _held[path] = lock
     return True
 
 
-def _lock_open_file(file: BinaryIO) -> None:
-    """OSError if another process has locked it. These locks are not inherited by processes that this one starts."""
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        import msvcrt
+def _sign(descriptor: int) -> None:
+    """Write into the lock file who has the lock, behind its first byte: on Windows no other process can read that one."""
+    with contextlib.suppress(OSError):  # a full disk
+        os.ftruncate(descriptor, 0)
+        os.write(descriptor, f"\nprocess {os.getpid()} on {platform.node()}".encode())
 
-        file.seek(1_000_000)  # beyond what is written there, which others may then read
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-    else:
-        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+def _holder(path: Path) -> str:
+    """Return who has the lock, as far as that is known."""
+    if path in _held:
+        return "of this process"
+    try:
+        with open(_lock_file(path), "rb") as file:
+            file.seek(1)
+            text = file.read(200).decode("utf-8", "replace")
+    except OSError:
+        text = ""
+    return text if text and text.isprintable() else "unknown"
 
 
 def _unlock(path: Path) -> None:
-    file = _held.pop(path, None)
-    if file is None:
-        return
-    name = _lock_file(path)
-    with contextlib.suppress(OSError):  # where an open file cannot be removed, after it is closed
-        name.unlink()
-    with contextlib.suppress(OSError):
-        file.close()
-        if os.name == "nt":
-            name.unlink()
+    lock = _held.pop(path, None)
+    if lock is not None and lock.is_locked:  # a forked worker does not hold it
+        with contextlib.suppress(OSError):  # on Windows FileLock removes the file, after it is closed
+            _lock_file(path).unlink()
+        with contextlib.suppress(OSError):
+            lock.release()
 
 
 def unlock_all() -> None:
     """Give up all locks, for a process that leaves without unwinding."""
     for path in list(_held):
         _unlock(path)
-
-
-def _holder(path: Path) -> str:
-    """Who has the lock, as far as that is known."""
-    if path in _held:  # and is kept: to close the file once more would give the lock up
-        return "of this process"
-    try:
-        text = _lock_file(path).read_bytes()[:200].decode("utf-8", "replace")
-    except OSError:
-        text = ""
-    return text if text and text.isprintable() else "unknown"
 
 
 def prepare(path: Path) -> None:

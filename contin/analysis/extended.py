@@ -20,7 +20,7 @@ from contin.functions.batch import Batch
 from contin.problems.statement import Statement
 
 #: Cosine between a border and the null vector that it stands for, below which it is renewed: the bordered matrix is then still
-#: far from singular. At .07 its condition would be a hundred times that of the best borders.
+#: far from singular (with a cosine of zero it is).
 FITS = 0.7
 
 #: The vectors that border the singular matrix: about its null vectors.

@@ -25,8 +25,8 @@ from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.trial import TestFunction, Trial
 
-#: Length of a central difference of Jacobians along v, as its largest component: the cube root of round-off. At 1e-4 its
-#: error, squared in the length, would be 1e-8.
+#: Length of a central difference of Jacobians along v, as its largest component: the cube root of round-off, where the error of
+#: second order and round-off are equal.
 _DIFFERENCE = 1e-5
 #: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
 _ROUNDS = 3

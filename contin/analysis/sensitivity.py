@@ -16,8 +16,7 @@ from contin.errors import ProblemError
 from contin.results.point import Point, system_of
 from contin.stepping.trial import Linearization, Trial
 
-#: Step of the central differences of fourth order: their error is its fourth power, and round-off divided by it. At 1e-2 the
-#: error would be 1e-8.
+#: Step of the central differences of fourth order: the fifth root of round-off, where their error and round-off are equal.
 _STEP = 1e-3
 
 

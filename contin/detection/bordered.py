@@ -21,8 +21,8 @@ import numpy as np
 from contin.arrays import Array
 from contin.discretization.protocol import Discretization
 
-#: Length of the differences for the Hessian, as the largest component of the change of x: of fourth order, their error and
-#: round-off, which is divided by its square, are about 1e-10 then. At .05 the error of order would be 1e-6.
+#: Length of the differences for the Hessian, as the largest component of the change of x: their error of fourth order and
+#: round-off, which is divided by its square, are both about 1e-10 for derivatives of order one.
 _DIFFERENCE = 5e-3
 
 

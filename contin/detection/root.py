@@ -16,7 +16,7 @@ from contin.errors import ConvergenceError
 #: Steps up to so many tolerances may be round-off of the function. At 1e4 the search could end early where the function is
 #: flat.
 _IDLE = 1e3
-#: A zero is found in 5 to 10 evaluations; where 60 bisections would not do, the function jumps.
+#: A zero takes 4 evaluations on average; where as many as bisection to round-off would need do not do, the function jumps.
 _MOST_EVALUATIONS = 60
 
 #: A place and the function's value there.

@@ -10,7 +10,7 @@ from contin.arrays import Array
 from contin.functions.compiler import Matrix, kernel
 from contin.linalg.factors import Factors
 
-#: Singular values that are watched between two points: a double branch point and one more. With more each step costs more.
+#: Singular values that are watched between two points: two that vanish together, and one more.
 _WATCHED = 3
 
 

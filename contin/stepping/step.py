@@ -17,11 +17,10 @@ from contin.stepping.newton import Corrected, Newton, correct
 from contin.stepping.state import State
 from contin.stepping.trial import Linearization, Trial, linearization, unit_tangent
 
-#: Share of the states in a unit tangent below which their direction is not compared: there it is round-off of the parameters'
-#: direction. At 0.1 a turn of the states would go unseen where a parameter dominates the norm.
+#: Share of the states in a unit tangent below which their direction is not compared: the states hardly take part in the step.
 _STILL = 0.01
 #: Length over which a difference of residuals stands for the product of Jacobian and tangent: the square root of round-off,
-#: times a hundred for large states. At 1e-5 the curvature would begin to count.
+#: times a hundred for large states. The curvature over it adds an error as large.
 _NEAR = 1e-6
 
 

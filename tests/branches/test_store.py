@@ -270,14 +270,17 @@ def test_processes_that_a_run_starts_do_not_keep_its_lock(command, tmp_path):
     process.communicate()
 
 
-def test_where_there_are_no_locks_there_is_no_lock(tmp_path, monkeypatch):
-    def unsupported(file):
-        raise OSError(errno.ENOLCK, "No locks available")
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EIO])
+def test_where_there_are_no_locks_there_is_no_lock(tmp_path, monkeypatch, number):
+    def unsupported(descriptor, operation):
+        raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr(files, "_lock_open_file", unsupported)
+    monkeypatch.setattr("fcntl.flock", unsupported)
     for path in (tmp_path / "x.h5", tmp_path / "none" / "x.h5"):
-        with files.only_run(path):
-            pass
+        for _ in range(2):
+            with files.only_run(path):
+                assert files._held == {}
+    assert not (tmp_path / "none").exists()
 
 
 def test_two_processes_never_hold_it_both(command, tmp_path):

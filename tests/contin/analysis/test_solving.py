@@ -1,95 +1,44 @@
-"""Algebraic problems, Hopf points, first solutions, deflation."""
+"""One solution from a guess, and another one by deflation, against the closed form of Bratu's problem."""
 
+import functools
 import math
 
 import numpy as np
 import pytest
+from bank.closed_forms import bratu, bratu_middles
 
-from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, MeshControl, ProblemError, solve, trace
-
-
-def test_hopf_of_the_normal_form():
-    """x' = mu x - 2 y - ..., y' = 2 x + mu y - ...: Hopf at mu = 0 with frequency 2."""
-    problem = AlgebraicProblem(
-        lambda u, p: (p.mu * u.x - 2 * u.y - u.x * (u.x**2 + u.y**2), 2 * u.x + p.mu * u.y - u.y * (u.x**2 + u.y**2)),
-        ["x", "y"], {"mu": -1.0},
-    )  # fmt: skip
-    branch = trace(solve(problem, [0.0, 0.0]), free=["mu"], limits={"mu": (-2, 2)})
-    (hopf,) = branch.labelled("HB")
-    assert abs(hopf["mu"]) < 1e-10
-    assert hopf.details["frequency"] == pytest.approx(2, abs=1e-9)
-    assert [p.label for p in branch if p.label] == ["EP", "HB", "EP"]
-    assert sorted(hopf.system.eigenvalues(hopf.x).imag) == pytest.approx([-2, 2])
-
-
-def test_neutral_saddles_are_no_hopf_points():
-    """Eigenvalues 1 and mu - 1: their sum passes zero at mu = 0, both real."""
-    problem = AlgebraicProblem(lambda u, p: (u.x, (p.mu - 1) * u.y), ["x", "y"], {"mu": -0.5})
-    branch = trace(solve(problem, [0.0, 0.0]), free=["mu"], limits={"mu": (-0.9, 0.9)})
-    assert not branch.labelled("HB")
-
-
-def test_filling_residuals_and_functionals():
-    """A chain of n states, u_i = mu + i: written for arrays."""
-
-    def residual(u, p, out):
-        for i in range(u.size):
-            out[i] = u[i] - p[0] - i
-
-    problem = AlgebraicProblem(residual, 5, {"mu": 0.0}, functionals={"sum": lambda u, p: u.u0 + u.u4})
-    point = solve(problem, parameters={"mu": 2.0})
-    assert point.x == pytest.approx([2, 3, 4, 5, 6], abs=1e-13)
-    assert point["sum"] == pytest.approx(8)
-
-
-def bratu():
-    return BoundaryValueProblem(
-        lambda t, u, p: (u.v, -p.lam * math.exp(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"lam": 1.0},
-        functionals={"mean": lambda t, u, p: u.u},
-    )  # fmt: skip
-
-
-def bratu_values(lam):
-    """Both values of u(1/2) at lam < fold: u(1/2) = 2 log cosh s with lam = 8 s^2 / cosh^2 s."""
-    from scipy.optimize import brentq
-
-    def miss(s):
-        return 8 * s**2 / math.cosh(s) ** 2 - lam
-
-    return [2 * math.log(math.cosh(brentq(miss, *ends, xtol=1e-15))) for ends in ((0.01, 1.19), (1.2, 20))]
+from contin import BoundaryValueProblem, ConvergenceError, ProblemError, solve
 
 
 def middle(point):
     return point.system.evaluate(point.x, np.array([0.5]))[0, 0]
 
 
-def test_first_solutions_from_numbers_functions_arrays_and_points():
-    low, high = bratu_values(1.0)
-    t = np.linspace(0, 1, 9)
-    arrays = (t, np.stack([16 * t * (1 - t), 16 - 32 * t], axis=1))
-    assert middle(solve(bratu(), [0, 0], degree=6)) == pytest.approx(low, abs=1e-11)
-    upper = solve(bratu(), lambda t: (16 * t * (1 - t), 16 - 32 * t), degree=6)
-    assert middle(upper) == pytest.approx(high, abs=1e-10)
-    assert middle(solve(bratu(), arrays, degree=6)) == pytest.approx(high, abs=1e-10)
-    again = solve(bratu(), upper, {"lam": 1.01})
-    assert middle(again) == pytest.approx(bratu_values(1.01)[1], abs=1e-10)
+@functools.cache
+def lower(lam=1.0, degree=8):
+    return solve(bratu(), [0, 0], {"lam": lam}, degree=degree)
 
 
-def test_deflation_finds_the_other_solution():
-    first = solve(bratu(), [0, 0], degree=6)
-    second = solve(bratu(), [0, 0.1], degree=6, others=[first])
-    assert middle(second) == pytest.approx(bratu_values(1.0)[1], abs=1e-10)
-    with pytest.raises(ConvergenceError, match="no further solution"):
-        solve(bratu(), [0, 0.1], degree=6, others=[first, second])
+T = np.linspace(0, 1, 9)
+GUESSES = {
+    "numbers": (lambda: [0, 0], 0),
+    "a function": (lambda: lambda t: (16 * t * (1 - t), 16 - 32 * t), 1),
+    "arrays": (lambda: (T, np.stack([16 * T * (1 - T), 16 - 32 * T], axis=1)), 1),
+    "a point": (lambda: lower(1.01), 0),
+}
 
 
-@pytest.mark.parametrize("lam", [1.0, 2.0, 3.0])
-@pytest.mark.parametrize("guess", ([0, 0.1], [1, 0], [0.3, 0.1], None))
-def test_deflation_from_many_guesses(lam, guess):
-    """Also from the known solution itself; the value from the closed form, at a place between mesh points."""
-    first = solve(bratu(), [0, 0], {"lam": lam}, degree=8)
-    second = solve(bratu(), first if guess is None else guess, {"lam": lam}, degree=8, others=[first])
-    assert middle(second) == pytest.approx(bratu_values(lam)[1], abs=1e-8)
+@pytest.mark.parametrize("guess", GUESSES)
+def test_first_solutions(guess):
+    """Guesses of every kind, near the lower solution at lam = 1 or near the upper one."""
+    made, which = GUESSES[guess]
+    point = solve(bratu(), made(), {"lam": 1.0}, degree=6)
+    assert middle(point) == pytest.approx(bratu_middles(1.0)[which], abs=1e-10)
+
+
+def test_a_point_as_a_guess_brings_its_parameters():
+    again = solve(bratu(), lower(1.01), degree=6)
+    assert again["lam"] == 1.01 and middle(again) == pytest.approx(bratu_middles(1.01)[0], abs=1e-10)
 
 
 def test_eigenvalue_as_a_free_parameter():
@@ -107,8 +56,11 @@ def test_eigenvalue_as_a_free_parameter():
         ([0, 0, 0], {}, "must be the 2 states"),
         (None, {}, "needs one"),
         ((np.array([0.0, 0.5]), np.zeros((2, 2))), {}, "cover the domain"),
+        ([0, math.nan], {}, "must be finite"),
         ([0, 0], {"free": ["lam"]}, "needs 0"),
         ([0, 0], {"parameters": {"mu": 1}}, "'mu' is not one of lam"),
+        ([0, 0], {"degree": 9}, "degree: 9 must be a whole number from 2 to 8"),
+        ([0, 0], {"others": [3]}, "others: 3 must be a Point"),
     ],
 )
 def test_bad_first_guesses(guess, options, said):
@@ -116,5 +68,19 @@ def test_bad_first_guesses(guess, options, said):
         solve(bratu(), guess, **options)
 
 
-def test_a_fixed_mesh_stays():
-    assert solve(bratu(), [0, 0], intervals=3, degree=4, mesh=MeshControl(every=0)).system.intervals == 3
+# --- deflation ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("lam", [1.0, 2.0, 3.0])
+@pytest.mark.parametrize("guess", ([0, 0.1], [1, 0], [0.3, 0.1], None))
+def test_deflation_from_many_guesses(lam, guess):
+    """Also from the known solution itself (None); the value from the closed form, at a place between mesh points."""
+    second = solve(bratu(), lower(lam) if guess is None else guess, {"lam": lam}, degree=8, others=[lower(lam)])
+    assert middle(second) == pytest.approx(bratu_middles(lam)[1], abs=1e-8)
+
+
+def test_where_all_solutions_are_known_there_is_no_further_one():
+    first = lower(1.0, 6)
+    second = solve(bratu(), [0, 0.1], {"lam": 1.0}, degree=6, others=[first])
+    with pytest.raises(ConvergenceError, match="no further solution"):
+        solve(bratu(), [0, 0.1], {"lam": 1.0}, degree=6, others=[first, second])

@@ -95,7 +95,7 @@ def test_a_full_disk_costs_a_line_and_the_cache(kernel, monkeypatch, capsys):
 
 
 def test_code_finds_a_place_or_says_what_to_set(tmp_path, monkeypatch, capsys):
-    write = cache.write_bytes
+    write = cache.write_whole
     monkeypatch.setenv("CONTIN_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr(cache, "_temporary_directory", lambda: tmp_path)
 
@@ -104,7 +104,7 @@ def test_code_finds_a_place_or_says_what_to_set(tmp_path, monkeypatch, capsys):
             raise OSError(errno.EDQUOT, "Disk quota exceeded")
         write(path, data)
 
-    monkeypatch.setattr(cache, "write_bytes", full)
+    monkeypatch.setattr(cache, "write_whole", full)
     assert cache.write_source("x.py", "1") == tmp_path / "x.py"
     monkeypatch.setattr(cache, "_temporary_directory", lambda: tmp_path / "cache")
     with pytest.raises(ContinError, match="Disk quota exceeded; set CONTIN_CACHE_DIR to a folder that can be written"):
@@ -130,6 +130,46 @@ def test_processes_that_compile_the_same_problem_at_once(tmp_path):
     ]
     ended = [process.communicate(timeout=120) for process in started]
     assert len(set(ended)) == 1 and ended[0][1] == ""
+
+
+SAME_NAMES = """
+import sys
+from contin import BoundaryValueProblem, Collocation
+
+def problem(helper):
+    def rhs(t, u, p):
+        return (helper(u.x),)
+    return BoundaryValueProblem(rhs, lambda a, b, p: (a.x - 1,), ["x"], {"k": 1.0})
+
+def one():
+    def helper(x):
+        return 10 * x
+    return problem(helper)
+
+def two():
+    def helper(x):
+        return x + 20
+    return problem(helper)
+
+for name in sys.argv[1:]:
+    system = Collocation(globals()[name](), [0, 1], 2, ["k"], {})
+    print(system.residual(system.pack([[3.0]] * 3, {"k": 1.0}))[0])
+"""
+
+
+def test_functions_of_one_name_compiled_by_two_processes_stay_apart(tmp_path):
+    """Each compiled by a process of its own, both loaded by a third: -h f(3) is -30 and -23."""
+    script = tmp_path / "same_names.py"
+    script.write_text(SAME_NAMES)
+    environment = {**os.environ, "CONTIN_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+
+    def run(*names):
+        done = subprocess.run([sys.executable, script, *names], env=environment, capture_output=True, text=True, check=True)
+        return [float(line) for line in done.stdout.split()]
+
+    assert run("one") == pytest.approx([-30])
+    assert run("two") == pytest.approx([-23])
+    assert run("one", "two") == pytest.approx([-30, -23])
 
 
 def test_an_installation_and_a_home_that_cannot_be_used(tmp_path, monkeypatch, capsys):

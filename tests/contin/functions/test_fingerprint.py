@@ -2,6 +2,7 @@
 
 import importlib.util
 import itertools
+import math
 import sys
 
 import numpy as np
@@ -86,6 +87,17 @@ def _fingerprint(function):
     rewriter = Rewriter()
     rewriter.function(function)
     return rewriter.fingerprint()
+
+
+def test_fingerprint_follows_what_a_function_refers_to():
+    def make(factor, inner):
+        return lambda t, u, p: (factor * inner(u.x),)
+
+    one = _fingerprint(make(2.0, lambda x: x * x))
+    assert one == _fingerprint(make(2.0, lambda x: x * x))
+    assert one != _fingerprint(make(2.5, lambda x: x * x))
+    assert one != _fingerprint(make(2.0, lambda x: x + x))
+    assert _fingerprint(make(2.0, math.sin)) != _fingerprint(make(2.0, math.cos))
 
 
 def test_large_arrays_inside_a_tuple_are_told_apart():

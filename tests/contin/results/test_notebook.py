@@ -1,4 +1,4 @@
-"""What a notebook shows of a branch. The branch is Bratu's, with its fold at lambda = 3.513830719125161."""
+"""What a notebook shows of a branch. The branch is that of Bratu's problem."""
 
 import math
 import subprocess
@@ -7,22 +7,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from bank.closed_forms import bratu, bratu_fold, parabola
 
 import contin
 
 
-def rhs(t, u, p):
-    return u.v, -p.lam * math.exp(u.u)
-
-
-PROBLEM = contin.BoundaryValueProblem(
-    rhs, lambda a, b, p: (a.u, b.u), ["u", "v"], {"lam": 0.0}, functionals={"mean": lambda t, u, p: u.u}
-)
-
-
 @pytest.fixture(scope="module")
 def branch():
-    start = contin.solve(PROBLEM, [0, 0])
+    start = contin.solve(bratu(), [0, 0])
     return contin.trace(start, free=["lam"], limits={"lam": (0, 4), "mean": (-1, 3)}, zeros={"lam": [2.0]})
 
 
@@ -31,7 +23,7 @@ def test_table_has_every_point(branch):
     assert len(table) == len(branch)
     assert list(table) == ["label", "name", "arclength", "intervals", "iterations", "lam", "mean", "norm"]
     assert np.array_equal(table["lam"], branch.column("lam"))
-    assert table[table.label == "LP"].lam.iloc[0] == pytest.approx(3.513830719125161, abs=1e-11)
+    assert table[table.label == "LP"].lam.iloc[0] == pytest.approx(bratu_fold(), abs=1e-11)
     assert contin.Branch().to_pandas().empty
 
 
@@ -70,9 +62,8 @@ def test_html_is_well_formed_and_lists_labelled_points(branch):
 
 
 def test_a_problem_without_functionals_is_drawn_against_its_norm():
-    problem = contin.AlgebraicProblem(lambda u, p: (u.x * u.x - p.a,), ["x"], {"a": 1.0})
-    axes = contin.trace(contin.solve(problem, [1.0]), free=["a"], limits={"a": (0.5, 2)}).plot()
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("a", "norm")
+    axes = contin.trace(contin.solve(parabola(), [1.0]), free=["mu"], limits={"mu": (0.5, 2)}).plot()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("mu", "norm")
 
 
 def test_contin_alone_imports_neither_library():

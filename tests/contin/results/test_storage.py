@@ -1,17 +1,10 @@
 """Branches in files."""
 
-import math
-
 import numpy as np
 import pytest
+from bank.closed_forms import elastica, parabola
 
-from contin import AlgebraicProblem, BoundaryValueProblem, ProblemError, load, save, solve, trace
-
-
-def elastica():
-    return BoundaryValueProblem(
-        lambda t, u, p: (u.v, -p.lam * math.sin(u.theta)), lambda a, b, p: (a.v, b.v), ["theta", "v"], {"lam": 5.0}
-    )
+from contin import ProblemError, load, save, solve, trace
 
 
 def test_a_stored_branch_point_can_be_left_again(tmp_path):
@@ -19,23 +12,28 @@ def test_a_stored_branch_point_can_be_left_again(tmp_path):
     save(branch, tmp_path / "b.npz")
     again = load(elastica(), tmp_path / "b.npz")
     assert [p.label for p in again] == [p.label for p in branch] and again.stop == branch.stop
-    assert np.array_equal(again.column("lam"), branch.column("lam"))
+    for name in ("lam", "k", "mode"):
+        assert np.array_equal(again.column(name), branch.column(name))
+    for one, other in zip(branch, again):
+        assert np.array_equal(one.x, other.x) and one.errors == other.errors and one.arclength == other.arclength
     first, second = (trace(b.labelled("BP")[0], branch=1, limits={"lam": (1, 15)}) for b in (branch, again))
     assert np.array_equal(first.column("lam"), second.column("lam"))
 
 
 def test_algebraic_branches_too(tmp_path):
-    problem = AlgebraicProblem(lambda u, p: (p.mu - u.x**2,), ["x"], {"mu": 1.0})
+    problem = parabola()
     branch = trace(solve(problem, [1.0]), free=["mu"], direction=-1, limits={"mu": (-1, 2)})
     save(branch, tmp_path / "a.npz")
-    assert load(problem, tmp_path / "a.npz").labelled("LP")[0]["mu"] == branch.labelled("LP")[0]["mu"]
+    again = load(problem, tmp_path / "a.npz")
+    assert [p.label for p in again] == [p.label for p in branch] and len(branch.labelled("LP")) == 1
+    assert np.array_equal([p.x for p in again], [p.x for p in branch])
 
 
 def test_what_is_no_branch_of_this_problem_is_refused(tmp_path):
     (tmp_path / "junk.npz").write_bytes(b"junk")
     with pytest.raises(ProblemError, match="no branch stored"):
         load(elastica(), tmp_path / "junk.npz")
-    problem = AlgebraicProblem(lambda u, p: (p.mu - u.x**2,), ["x"], {"mu": 1.0})
+    problem = parabola()
     save(trace(solve(problem, [1.0]), free=["mu"], limits={"mu": (0, 2)}), tmp_path / "a.npz")
     with pytest.raises(ProblemError, match="states"):
         load(elastica(), tmp_path / "a.npz")

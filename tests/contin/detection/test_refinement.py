@@ -1,0 +1,41 @@
+"""Error estimates of special points: not smaller than the error, and none where the point is not found again."""
+
+import math
+
+import pytest
+from bank import abc, bru
+from bank.closed_forms import bratu
+
+from contin import Settings, solve, trace
+from contin.detection import refinement
+from contin.stepping.trial import Linearization, Trial
+
+
+def test_branch_points_on_a_coarse_mesh_are_refined_to_themselves():
+    """Degree 3, as few intervals as the uniform state takes: modes crowd, and each must be refined to its own length."""
+    branch = trace(solve(bru.problem(), [2, 0, 2.3, 0], degree=3), free=["L"], limits={"L": (0.01, 0.45)})
+    known = sorted([*(bru.mode(n, False) for n in range(1, 6)), bru.mode(1, True), bru.mode(2, True)])
+    points = branch.labelled("BP")
+    assert len(points) == len(known)
+    for point, length in zip(points, known):
+        assert abs(point["L"] - length) < point.errors["L"] < 1e-6
+
+
+def test_a_point_that_runs_away_on_finer_meshes_stays_as_it_was(monkeypatch):
+    """No estimate is given then, rather than a wrong one."""
+    start = solve(bratu(), [0, 0], degree=6)
+    settings = Settings(limits={"lam": (0, 4), "mean": (-1, 1)})
+    coarse = trace(start, settings, free=["lam"], errors=False)
+
+    def elsewhere(system, x, tangent, test, newton):
+        return Trial(system, x + 0.5, Linearization(tangent, 1.0))
+
+    monkeypatch.setattr(refinement, "_zero_again", elsewhere)
+    (fold,) = trace(start, settings, free=["lam"]).labelled("LP")
+    assert fold["lam"] == coarse.labelled("LP")[0]["lam"] and math.isnan(fold.errors["lam"])
+
+
+@pytest.mark.parametrize("case", abc.CASES, ids=lambda case: case.name)
+def test_errors_of_algebraic_points_are_those_of_their_location(case):
+    for point, special in zip([p for p in case.run().points[1:] if p.label], case.specials):
+        assert abs(point["d"] - special.values["d"]) < 4 * point.errors["d"] and 0 < point.errors["d"] < 1e-12
