@@ -23,6 +23,8 @@ from contin.stepping.trial import Linearization
 #: A value counts as zero below so many times its own round-off: the last update that Newton's method would make. At 10
 #: round-off of a state that vanishes by symmetry could become its size.
 _NOISE = 1e4
+#: A first value smaller than this part of the limits is zero.
+_NOTHING = 1e-10
 #: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
 _TINY = 1e-14
 
@@ -43,7 +45,6 @@ def scaled(
     noise, noise_of_free = update[: system.state_size].reshape(-1, count).max(axis=0), update[system.state_size :]
     size = np.abs(system.states(x)).max(axis=0)
     size = np.where(size > noise, size, 0.0)
-    size = np.array([known.get(name, found) for name, found in zip(states, size)])
     values = np.where(np.abs(x[system.state_size :]) > noise_of_free, x[system.state_size :], 0.0)
     given = zip(system.free, values)
     free = np.array([known.get(name) or _given(float(value), name, settings) for name, value in given])
@@ -52,11 +53,13 @@ def scaled(
     rates, rate_of_free = rate[: system.state_size].reshape(-1, count).max(axis=0), rate[system.state_size :]
     if not free[at]:
         moves = rates > 0
-        needed = usual(np.where(size > 0, size, 1.0))[moves] * rate_of_free[at] / rates[moves]
+        stated = np.array([known.get(name, found) for name, found in zip(states, size)])
+        needed = usual(np.where(stated > 0, stated, 1.0))[moves] * rate_of_free[at] / rates[moves]
         free[at] = min(1.0, needed.min(initial=1.0))
     change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
     response = np.minimum(1.0, rates * change)
-    size = np.where(size > 0, size, np.where(response > noise, response, 0.0))
+    size = np.maximum(size, np.where(response > noise, response, 0.0))
+    size = np.array([known.get(name, found) for name, found in zip(states, size)])
     parameters = np.array([known.get(name, value) for name, value in zip(names, system.parameters)])
     parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, np.minimum(1.0, rate_of_free * change))
     sizes = usual(size), usual(parameters)
@@ -84,8 +87,6 @@ def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier]
 
 def _given(value: float, name: str, settings: Settings) -> float:
     """Return the size of a parameter from what is said of it; 0 where nothing is."""
-    if value:
-        return abs(value)
     said: Iterable[float] = (*settings.limits.get(name, ()), *settings.zeros.get(name, ()))
-    sizes = [abs(float(number)) for number in said if number and np.isfinite(number)]
-    return min(sizes, default=0.0)
+    smallest = min((abs(float(number)) for number in said if number and np.isfinite(number)), default=0.0)
+    return abs(value) if abs(value) > _NOTHING * smallest else smallest

@@ -20,6 +20,8 @@ from contin.stepping.trial import TestFunction, Trial, sign_changed
 
 #: A component of the unit tangent below this may be round-off: it is believed where the parameter itself changes.
 _ROUND_OFF = 1e-9
+#: A smallest rate within this part of those at the ends is zero to round-off: an inflection, not two folds.
+_FLAT = 1e-13
 #: Units in the last place by which a parameter may differ between two points where it is the same.
 _UNITS = 16
 #: A rate that sinks to this part of its values at the ends may pass zero, ...
@@ -63,12 +65,15 @@ class FoldSearch:
     def find(self) -> list[SpecialPoint]:
         """Return the folds inside the step, in order.
 
-        The parameter goes one way before a fold and the other way behind it. Where it differs by no more than round-off from
-        one fold to the next, or to both ends of the step, there is none.
+        The parameter goes one way before a fold and the other way behind it. Where its rate is so small that it may be
+        round-off, and the parameter itself does not differ from one fold to the next, or to both ends of the step, there is
+        none.
         """
         segment = self.segment
         left, right = (segment.low, segment.before), (segment.step, segment.trial)
         found = self.between(left, right)
+        if max(abs(trial.value(self.fold)) for _, trial in (left, right)) >= _ROUND_OFF:
+            return found
         at = 0
         while at < len(found):
             places = [left[1], *(fold.trial for fold in found), right[1]]
@@ -122,11 +127,13 @@ class FoldSearch:
         """Return a place between two of equal rates where the rate has the other sign; None if there is none."""
         sense = float(np.sign(self.rate(left[1])) or np.sign(self.rate(right[1])))
         place, square = self._suspect(left, right, sense)
-        lowest = np.inf
+        lowest, flat = np.inf, _FLAT * max(abs(self.rate(left[1])), abs(self.rate(right[1])))
         while place is not None:
             value = sense * self.rate(place[1])
-            if value <= 0:
+            if value < -flat:
                 return place
+            if value <= flat:
+                return None  # an inflection
             if value > _DEEPER * lowest:
                 return None
             lowest = value
@@ -135,7 +142,7 @@ class FoldSearch:
                 return None
             near = [(s, self.segment.at(s)) for s in (place[0] + apart, place[0] + 2 * apart)]
             values = [sense * self.rate(trial) for _, trial in near]
-            if min(values) <= 0:
+            if min(values) < -flat:
                 return near[int(np.argmin(values))]
             bend = values[1] - 2 * values[0] + value
             if not bend > 0:

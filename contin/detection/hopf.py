@@ -1,9 +1,9 @@
 """Hopf points: pairs of complex eigenvalues of F_u that cross the imaginary axis, for u' = F (AUTO's HB).
 
-Eigenvalues are counted, not multiplied: those at both ends of a piece are matched, nearest to nearest. Where just as many
-complex ones changed the side as the numbers of unstable ones differ by, the k-th largest real part vanishes in the piece for
-each k in between. Otherwise the piece is halved: one pair comes as another goes, or two real eigenvalues meet near the axis.
-Real eigenvalues that cross (folds, branch points), and two opposite real ones (neutral saddles), are no Hopf points.
+Eigenvalues at both ends of a piece are matched, nearest to nearest. Each complex one that changed the side of the axis is
+followed to the place where its real part vanishes. Where one was real at an end, or two were located at one place where only
+one pair lies on the axis, the piece is halved. Real eigenvalues that cross (folds, branch points), and two opposite real ones
+(neutral saddles), are no Hopf points.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray
+from contin.arrays import ComplexArray
 from contin.detection.root import find_zero
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.errors import ConvergenceError
@@ -28,19 +28,27 @@ _PARTS = 4
 _CUTS = 20
 #: Hopf points closer than this part of the step are one point with several pairs: round-off of eigenvalues of multiplicity two.
 _TOGETHER = 1e-7
+#: A real part below this, relative to 1 + the eigenvalue's size, is zero at a Hopf point.
+_ON_AXIS = 1e-7
 
 
 def hopf() -> TestFunction:
     """Return the test function of Hopf points: the largest real part of a complex eigenvalue. Several pairs are told apart."""
-    return _kth(1)
-
-
-def _kth(k: int) -> TestFunction:
-    """Return the test function of the Hopf point of the pair with the k-th largest real part."""
 
     def function(trial: Trial) -> float:
-        parts = _real_parts(trial)
-        return float(parts[k - 1]) if len(parts) >= k else float("nan")
+        values = _upper(trial)
+        parts = values[_is_complex(values)].real
+        return float(parts.max()) if parts.size else float("nan")
+
+    return TestFunction("HB", "Hopf", function, search=hopf_points)
+
+
+def _nearest(value: complex) -> TestFunction:
+    """Return the test function of one pair: the real part of the eigenvalue that is nearest to a value."""
+
+    def function(trial: Trial) -> float:
+        values = _upper(trial)
+        return float(values[np.argmin(np.abs(values - value))].real)
 
     return TestFunction("HB", "Hopf", function, search=hopf_points)
 
@@ -54,13 +62,6 @@ def _upper(trial: Trial) -> ComplexArray:
 
 def _is_complex(values: ComplexArray) -> Any:
     return values.imag > _REAL * (1 + np.abs(values))
-
-
-def _real_parts(trial: Trial) -> Array:
-    """Return the real parts of the complex eigenvalues, one of each pair, the largest first."""
-    values = _upper(trial)
-    parts: Array = np.sort(values[_is_complex(values)].real)[::-1]
-    return parts
 
 
 def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
@@ -93,14 +94,13 @@ def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
 def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
     """Return the Hopf points between two places."""
     first, last = _changes(left[1], right[1])
-    complex_ones = _is_complex(first) & _is_complex(last)
-    if not np.any(_is_complex(first) | _is_complex(last)):
+    one, other = _is_complex(first), _is_complex(last)
+    if not np.any(one | other):
         return []
-    ends = [_real_parts(trial) for _, trial in (left, right)]
-    before, after = (int(np.count_nonzero(parts > 0)) for parts in ends)
-    plain = np.all(complex_ones | ~(_is_complex(first) | _is_complex(last)))
-    if plain and abs(after - before) == np.count_nonzero(complex_ones):
-        return [_located(segment, left, right, k) for k in range(min(before, after) + 1, max(before, after) + 1)]
+    if np.all(one == other):
+        found = [_located(segment, left, right, pair) for pair in zip(first[one], last[one])]
+        if all(_pairs_at(point) >= _count_at(point, found, segment) for point in found):
+            return found
     if depth == _CUTS:
         return []
     middle = (left[0] + right[0]) / 2
@@ -108,32 +108,46 @@ def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[Sp
     return _between(segment, left, there, depth + 1) + _between(segment, there, right, depth + 1)
 
 
-def _located(segment: Segment, left: Place, right: Place, k: int) -> SpecialPoint:
-    """Return the place where the k-th largest real part vanishes; the second place, named "possible", where that fails."""
-    test = _kth(k)
-    ends = [test.function(trial) for _, trial in (left, right)]
+def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint:
+    """Return the place where the real part of an eigenvalue vanishes that has these values at two places.
+
+    The second place, named "possible", where that fails.
+    """
+    (a, b), (first, last) = (left[0], right[0]), pair
+
+    def real_part(s: float) -> float:
+        return _nearest(first + (last - first) * (s - a) / (b - a)).function(segment.at(s))
+
     try:
-        at = find_zero(lambda s: test.function(segment.at(s)), (left[0], ends[0]), (right[0], ends[1]), segment.precision)
-        there, name = segment.at(at), test.name
+        at = find_zero(real_part, (a, first.real), (b, last.real), segment.precision)
+        there, name = segment.at(at), "Hopf"
     except ConvergenceError:
-        at, there, name = *right, f"possible {test.name}"
-    return SpecialPoint(at, test.label, name, there, None, _details(there, k), test)
+        at, there, name = *right, "possible Hopf"
+    values = _upper(there)
+    here = first + (last - first) * (at - a) / (b - a)
+    frequency = float(values[np.argmin(np.abs(values - here))].imag)
+    test = _nearest(1j * frequency)
+    return SpecialPoint(at, test.label, name, there, None, {"frequency": frequency, "pairs": 1}, test)
 
 
-def _details(trial: Trial, k: int) -> dict[str, float]:
-    """Return the frequency of the pair with the k-th largest real part, and how many pairs cross."""
-    values = _upper(trial)
-    values = values[_is_complex(values)]
-    order = np.argsort(-values.real)
-    return {"frequency": float(values[order[k - 1]].imag) if len(order) >= k else float("nan"), "pairs": 1}
+def _pairs_at(point: SpecialPoint) -> int:
+    """Return how many pairs lie on the imaginary axis at a Hopf point."""
+    values = _upper(point.trial)
+    return int(np.count_nonzero(_is_complex(values) & (np.abs(values.real) < _ON_AXIS * (1 + np.abs(values)))))
+
+
+def _count_at(point: SpecialPoint, found: list[SpecialPoint], segment: Segment) -> int:
+    """Return how many of the points found lie at the place of one of them."""
+    return sum(abs(point.at - other.at) <= _TOGETHER * segment.step for other in found)
 
 
 def _joined(found: list[SpecialPoint], segment: Segment) -> list[SpecialPoint]:
     """Return the points, those at one place joined."""
     result: list[SpecialPoint] = []
     for point in found:
-        if result and point.at - result[-1].at <= _TOGETHER * segment.step:
-            result[-1].details["pairs"] += 1
+        if result and point.at - result[-1].at <= _TOGETHER * segment.step and point.trial is not result[-1].trial:
+            if _pairs_at(point) > result[-1].details["pairs"]:
+                result[-1].details["pairs"] += 1
         else:
             result.append(point)
     return result

@@ -55,3 +55,46 @@ def test_several_hopf_points_in_one_step(rates, places):
     branch = trace(start, free=["mu"], limits={"mu": (-2, 1)}, step=1.7, change=1.4)
     assert len(branch) <= 4 + len(places)  # really one or two steps
     assert [point["mu"] for point in branch.labelled("HB")] == pytest.approx(places, abs=1e-10)
+
+
+def test_a_double_hopf_point():
+    """Three Brusselators (A = 1) in a ring, coupled by .1, .2: b = 1 + A^2 for equal ones, 3 (.1 + .2) more for two modes."""
+
+    def cell(x, y, x1, y1, x2, y2, b):
+        return 1 - (b + 1) * x + x**2 * y + 0.1 * (x1 + x2 - 2 * x), b * x - x**2 * y + 0.2 * (y1 + y2 - 2 * y)
+
+    def ring(u, p):
+        a, b = cell(u.x1, u.y1, u.x2, u.y2, u.x3, u.y3, p.b)
+        c, d = cell(u.x2, u.y2, u.x3, u.y3, u.x1, u.y1, p.b)
+        e, f = cell(u.x3, u.y3, u.x1, u.y1, u.x2, u.y2, p.b)
+        return a, b, c, d, e, f
+
+    problem = AlgebraicProblem(ring, ["x1", "y1", "x2", "y2", "x3", "y3"], {"b": 1.0})
+    branch = trace(solve(problem, [1, 1] * 3), free=["b"], limits={"b": (1, 5)})
+    points = branch.labelled("HB")
+    assert [point["b"] for point in points] == pytest.approx([2, 2.9], abs=1e-10)
+    assert [point.details["pairs"] for point in points] == [1, 2]
+    assert branch.stop.reason == "limit"
+
+
+@pytest.mark.parametrize("gap", [0.1, 1e-3, 1e-6])
+def test_pairs_that_cross_one_after_the_other(gap):
+    """Eigenvalues mu -+ i and mu - gap -+ 3 i."""
+    problem = AlgebraicProblem(
+        lambda u, p: (p.mu * u.a - u.b, u.a + p.mu * u.b, (p.mu - gap) * u.c - 3 * u.d, 3 * u.c + (p.mu - gap) * u.d),
+        ["a", "b", "c", "d"], {"mu": -1.0},
+    )  # fmt: skip
+    points = trace(solve(problem, [0.0] * 4), free=["mu"], limits={"mu": (-1, 1)}).labelled("HB")
+    assert [point["mu"] for point in points] == pytest.approx([0, gap], abs=1e-13)
+    assert [point.details["frequency"] for point in points] == pytest.approx([1, 3], abs=1e-9)
+    assert all(abs(point["mu"] - exact) <= 10 * point.errors["mu"] < 1e-12 for point, exact in zip(points, (0, gap)))
+
+
+def test_one_pair_comes_as_another_goes():
+    """Eigenvalues mu -+ i and .05 - mu -+ 3 i: as many unstable ones before as after."""
+    problem = AlgebraicProblem(
+        lambda u, p: (p.mu * u.a - u.b, u.a + p.mu * u.b, (0.05 - p.mu) * u.c - 3 * u.d, 3 * u.c + (0.05 - p.mu) * u.d),
+        ["a", "b", "c", "d"], {"mu": -1.0},
+    )  # fmt: skip
+    points = trace(solve(problem, [0.0] * 4), free=["mu"], limits={"mu": (-1, 1)}).labelled("HB")
+    assert [point["mu"] for point in points] == pytest.approx([0, 0.05], abs=1e-12)
