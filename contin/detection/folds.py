@@ -21,7 +21,7 @@ from contin.stepping.trial import TestFunction, Trial, sign_changed
 #: A component of the unit tangent below this may be round-off: it is believed where the parameter itself changes.
 _ROUND_OFF = 1e-9
 #: A smallest rate within this part of those at the ends is zero to round-off: an inflection, not two folds.
-_FLAT = 1e-13
+_FLAT = 1e-15
 #: Units in the last place by which a parameter may differ between two points where it is the same.
 _UNITS = 16
 #: A rate that sinks to this part of its values at the ends may pass zero, ...

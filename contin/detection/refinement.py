@@ -71,7 +71,8 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
         if np.any(steps > _FAR * size) or np.max(steps / size) > last:
             break
-        errors, last = dict(zip(system.free, map(float, steps * system.free_scales))), np.max(steps / size)
+        sizes = steps[: len(system.free)] * system.free_scales  # a curve of branch points has one unknown more
+        errors, last = dict(zip(system.free, map(float, sizes))), np.max(steps / size)
         if finer is None:
             break
         trial, details = better, found
