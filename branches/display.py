@@ -12,6 +12,8 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
+from contin import exact_text
+
 if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this module before it knows what to do
     from contin import Point
 
@@ -150,7 +152,7 @@ class Display:
 def name_of(config) -> str:
     """The branch in words."""
     what = "secondary branch from " if config.origin else ""
-    return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {config.nu:g}"
+    return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {exact_text(config.nu)}"
 
 
 def _describe(config, event) -> str:
