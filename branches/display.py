@@ -12,8 +12,6 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from contin import exact_text
-
 if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this module before it knows what to do
     from contin import Point
 
@@ -151,6 +149,8 @@ class Display:
 
 def name_of(config) -> str:
     """The branch in words."""
+    from contin import exact_text  # not for --help
+
     what = "secondary branch from " if config.origin else ""
     return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {exact_text(config.nu)}"
 
