@@ -12,6 +12,8 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from contin import exact_text
+
 
 class ConfigError(Exception):
     """A scene that cannot be run; the message is one sentence that names the field, the value and what is allowed."""
@@ -49,11 +51,10 @@ class StepConfig(_Strict):
     @model_validator(mode="after")
     def _order(self):
         if self.smallest > self.largest:
-            raise ValueError(f"smallest = {self.smallest:g} must not exceed largest = {self.largest:g}")
+            raise ValueError(f"smallest = {exact_text(self.smallest)} must not exceed largest = {exact_text(self.largest)}")
         if self.first is not None and not self.smallest <= self.first <= self.largest:
-            raise ValueError(
-                f"first = {self.first:g} must lie between smallest = {self.smallest:g} and largest = {self.largest:g}"
-            )
+            bounds = f"smallest = {exact_text(self.smallest)} and largest = {exact_text(self.largest)}"
+            raise ValueError(f"first = {exact_text(self.first)} must lie between {bounds}")
         return self
 
     @property
@@ -114,7 +115,8 @@ class Config(_Strict):
         for name, (low, high) in self.limits.items():
             if name in start and not low < start[name] < high:
                 raise ValueError(
-                    f"limits: {name}: {low:g}, {high:g} must contain the start of the branch, {name} = {start[name]:.6g}"
+                    f"limits: {name}: {exact_text(low)}, {exact_text(high)} must contain the start of the branch, "
+                    f"{name} = {start[name]:.10g}"
                 )
         return self
 
@@ -209,14 +211,33 @@ def _diagram(values: dict, name: str, settings: list[str]) -> DiagramConfig:
         except ValidationError as error:
             if error.errors()[0]["loc"]:  # a field is wrong in itself, whatever the combination
                 raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
-            gamma = "" if Gamma is None else f", Gamma = {Gamma:g}"
-            absent[f"{law}{gamma}, nu = {nu:g}, ({m}, {n})"] = _sentence(error)
+            absent[_branch_name(law, Gamma, nu, m, n)] = _sentence(error)
     if not found:
         reason = next(iter(absent.values()), "n = m is a rigid rotation")
         raise ConfigError(f"{name}: none of its branches can be run ({reason})")
-    if len(set(found_keys := [(c.material, c.nu, c.m, c.n) for c in found])) < len(found_keys):
-        raise ConfigError(f"{name}: a branch stands twice in the lists")
+    _check_different(found, name)
     return DiagramConfig(str(values.get("title", "")), values, tuple(found), absent)
+
+
+def _branch_name(law: str, Gamma: float | None, nu: float, m: int, n: int) -> str:
+    """A branch of a diagram in words."""
+    from ribbon_model.laws import label
+
+    return f"{label(law, Gamma)}, nu = {exact_text(nu)}, ({m}, {n})"
+
+
+def _check_different(branches: list[Config], name: str) -> None:
+    """ConfigError where a branch stands twice, or two differ by so little in Gamma that their names would be the same."""
+    seen, Gammas = set(), {}
+    for one in branches:
+        key = one.law, one.Gamma, one.nu, one.m, one.n
+        if key in seen:
+            raise ConfigError(f"{name}: the branch {_branch_name(*key)} stands twice in the lists; give each value once")
+        seen.add(key)
+        other = Gammas.setdefault(one.material, one.Gamma)
+        if other != one.Gamma:
+            both = f"{exact_text(other)} and {exact_text(one.Gamma)}"
+            raise ConfigError(f"{name}: Gamma: {both} agree in 12 digits, which is all that names of results show; give one")
 
 
 def _families(lists: dict) -> list[tuple]:

@@ -11,6 +11,7 @@ from branches import graph as diagram_graph
 from branches.config import Config, DiagramConfig, dump
 from branches.executor import WAIT, executor, run_jobs, trouble
 from branches.files import StoreError, only_run, prepare, write_bytes
+from contin import exact_text
 
 
 def compute(text: str) -> tuple[bytes, str]:
@@ -23,11 +24,11 @@ def compute(text: str) -> tuple[bytes, str]:
 
 
 def file_name(config: Config) -> str:
-    """The file of a branch inside the folder of its diagram."""
+    """The file of a primary branch inside the folder of its diagram; different branches of a scene have different ones."""
     law = config.law.replace(" ", "_")
     if config.Gamma is not None:
         law += f"_Gamma{config.Gamma:.12g}"
-    return f"{law}_nu{config.nu:g}_m{config.m}_n{config.n}.h5"
+    return f"{law}_nu{exact_text(config.nu)}_m{config.m}_n{config.n}.h5"
 
 
 class _Plan:

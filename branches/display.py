@@ -149,8 +149,10 @@ class Display:
 
 def name_of(config) -> str:
     """The branch in words."""
+    from contin import exact_text  # not for --help
+
     what = "secondary branch from " if config.origin else ""
-    return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {config.nu:g}"
+    return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {exact_text(config.nu)}"
 
 
 def _describe(config, event) -> str:

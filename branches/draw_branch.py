@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from branches.draw_diagram import smooth
+from contin import exact_text
 from ribbon_model.laws import label as name_law
 
 # Okabe-Ito colours: told apart by the colour-blind, and in print
@@ -73,7 +74,7 @@ def curve(axes, branch, chosen) -> None:
     axes.set_xlabel(r"natural curvature $\kappa_n L/2\pi$")
     axes.set_ylabel(r"conjugate curvature $\bar\kappa^*$")
     material = name_law(config["law"], config["Gamma"])
-    axes.set_title(f"{material}, (m, n) = ({config['m']}, {config['n']}), $\\nu$ = {config['nu']:g}", fontsize=11)
+    axes.set_title(f"{material}, (m, n) = ({config['m']}, {config['n']}), $\\nu$ = {exact_text(config['nu'])}", fontsize=11)
     axes.grid(alpha=0.25)
     axes.margins(0.1)
     axes.legend(frameon=False)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from branches.graph import families, pieces, secondaries
+from contin import exact_text
 
 STABLE, UNSTABLE, FOLD, DOT, SECONDARY = "#000000", "#9a9a9a", "#D55E00", "#000000", "#CC79A7"
 #: Okabe-Ito colours and a line style for each wavenumber: told apart without colour too.
@@ -77,7 +78,7 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = 
         )
         panels[1].set_title("disentangled")
     result.legend(handles=legend(graph, law, nu), loc="outside lower center", ncols=6 if disentangle else 4, frameon=False)
-    result.suptitle(f"Equilibria of a closed strip: {law}, $\\nu$ = {nu:g}{note(graph)}", fontsize=13)
+    result.suptitle(f"Equilibria of a closed strip: {law}, $\\nu$ = {exact_text(nu)}{note(graph)}", fontsize=13)
     return result
 
 

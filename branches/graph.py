@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contin import exact_text
 from ribbon_model.laws import from_label, label
 from ribbon_model.linear import circle, covering
 
@@ -55,12 +56,13 @@ def add_branch(graph, branch, name: str) -> bool:
     if config["origin"]:
         family |= {"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"], "domain": config["domain"]}
     special = [event for event in branch.events if event["label"] in _SPECIAL]
-    nodes = [_node_of(event, family, branch.reason) for event in special]
     if config["origin"]:
-        nodes = [_known(graph, node) or node for node in nodes]
+        nodes = _nodes_of_secondary(graph, special, family, branch)
         start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
         if any(data.get("domain") == family["domain"] for _, _, data in start):
             return False
+    else:
+        nodes = [_node_of(event, family, branch.reason) for event in special]
     rows = [branch.points[first["point"] : last["point"] + 1] for first, last in pairwise(special)]
     pieces = [{column: piece[column].tolist() for column in COLUMNS} for piece in rows]
     if config["origin"]:
@@ -70,6 +72,21 @@ def add_branch(graph, branch, name: str) -> bool:
         for piece, values in zip(pieces, rows):
             piece["index"] = _common_index(values["index"])
     return connect(graph, family, nodes, pieces, file=name)
+
+
+def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str, dict]]:
+    """The nodes of a secondary branch, those that the diagram holds already among them.
+
+    The identifiers of new ones tell its origin in nine digits, or exactly where another branch has these identifiers.
+    """
+    origin = branch.config["origin"]
+    exact = f"{exact_text(origin['kappa_n'])}, {exact_text(origin['kappa_star'])}"
+    for place in (f"{origin['kappa_n']:.9g}", exact):
+        own = [_node_of(event, family, branch.reason, place) for event in special]
+        nodes = [_known(graph, node) or node for node in own]
+        if not any(node is new and node[0] in graph for node, new in zip(nodes, own)):
+            break
+    return nodes
 
 
 def _known(graph, node):
@@ -112,26 +129,32 @@ def holds_circle(graph, law: str, nu: float, covering: int, mode: int) -> bool:
 
 
 def _circle(family, covering: int) -> str:
-    return f"{family['law']} nu={family['nu']:g} circle {covering} mode {family['n']}"
+    return f"{_strip(family)} circle {covering} mode {family['n']}"
 
 
-def node(family: dict, kind: str, values: dict, number: int) -> tuple[str, dict]:
+def _strip(family) -> str:
+    """The law and nu of a branch in identifiers of nodes: exact, so that they can be looked up by them."""
+    return f"{family['law']} nu={exact_text(family['nu'])}"
+
+
+def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -> tuple[str, dict]:
     """Identifier and attributes of a special point, the ``number``-th point of its branch.
 
     A circle has one identifier whichever branch meets it there: its covering index (negative where it is curled against its
-    natural curvature) and the wavenumber. Other points name the branch (m, n) that they were found on.
+    natural curvature) and the wavenumber. Other points name the branch (m, n) that they were found on and, on a secondary
+    branch, its ``origin``.
     """
     attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
     if kind == "circle":
         index = covering(attributes["kappa_n"], attributes["kappa_star"], attributes["energy"])
         return _circle(family, index), attributes | {"covering": index, "mode": family["n"]}
     branch = f"({family['m']},{family['n']})"
-    if "origin" in family:
-        branch += f" from {family['origin']:.9g} on the {family['domain']}"
-    return f"{family['law']} nu={family['nu']:g} {branch} {kind} {number}", attributes | {"m": family["m"], "n": family["n"]}
+    if origin:
+        branch += f" from {origin} on the {family['domain']}"
+    return f"{_strip(family)} {branch} {kind} {number}", attributes | {"m": family["m"], "n": family["n"]}
 
 
-def _node_of(event, family, reason):
+def _node_of(event, family, reason, origin: str = ""):
     """The node of a labelled point of a branch file."""
     values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
     values |= {"error": float(event["error_kappa_n"]), "what": event["name"].decode()}
@@ -144,7 +167,7 @@ def _node_of(event, family, reason):
         kind = "circle"
     elif values["what"] == "primary branch":
         kind = "primary branch"
-    return node(family, kind, values, int(event["point"]))
+    return node(family, kind, values, int(event["point"]), origin)
 
 
 # --- questions ----------------------------------------------------------------------------------------------------
@@ -369,7 +392,7 @@ def _answers(graph, options) -> Iterable[str]:
         yield graph.graph["source"]
     if options.where:
         for branch in course(graph, *options.where):
-            yield f"{branch['law']}, nu = {branch['nu']:g}: " + " -> ".join(map(_describe, branch["nodes"]))
+            yield f"{branch['law']}, nu = {exact_text(branch['nu'])}: " + " -> ".join(map(_describe, branch["nodes"]))
         for branch in secondaries(graph):
             if branch["family"][2:] == tuple(options.where):
                 yield f"  {describe_secondary(branch)}"
@@ -378,15 +401,15 @@ def _answers(graph, options) -> Iterable[str]:
             what = f"{state['circle']}-covered circle" if "circle" in state else f"branch {state['branch']}"
             what = f"secondary {what}, from {state['origin']:.6f}" if "origin" in state else what
             values = f"kappa* = {state['kappa_star']:.8f}, energy = {state['energy']:.8f}"
-            yield f"{state['law']}, nu = {state['nu']:g}: {what}, {values}"
+            yield f"{state['law']}, nu = {exact_text(state['nu'])}: {what}, {values}"
     if options.folds:
         for data in folds(graph, *options.folds):
             place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
-            yield f"{data['law']}, nu = {data['nu']:g}: fold at {place}"
+            yield f"{data['law']}, nu = {exact_text(data['nu'])}: fold at {place}"
     if not options.where and options.at is None and not options.folds:
         yield f"{len(families(graph))} branches, {graph.number_of_nodes()} special points"
         for law, nu, m, n in families(graph):
-            yield f"  {law}, nu = {nu:g}, ({m}, {n}): {describe(graph, m, n, law, nu)}"
+            yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {describe(graph, m, n, law, nu)}"
 
 
 def describe(graph, m: int, n: int, law: str, nu: float) -> str:
@@ -403,7 +426,7 @@ def _describe(node) -> str:
     if node["kind"] == "circle":
         return f"circle {node['covering']} at {node['kappa_n']:.6f}"
     if node["kind"] == "leaves":
-        return f"leaves at {node['kappa_n']:g}"
+        return f"leaves at {node['kappa_n']:.10g}"
     return f"{node['kind']} at {node['kappa_n']:.6f}"
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from branches.config import Config, ConfigError, dump, parse
 from branches.files import StoreError, only_run, prepare
 from branches.store import BranchWriter, open_branch, read_state
-from contin import Continuation, ConvergenceError, MeshControl, Newton, Settings
+from contin import Continuation, ConvergenceError, MeshControl, Newton, Settings, exact_text
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 from ribbon_model.seeds import half_loop_branch, primary_branch
@@ -152,7 +152,8 @@ def _resumed(config: Config, path: Path):
     for name, (low, high) in config.limits.items():
         if state.accepted and not low < last[name] < high:
             raise ConfigError(
-                f"limits: {name}: {low:g}, {high:g} must contain the place to go on from, {name} = {last[name]:.6g}"
+                f"limits: {name}: {exact_text(low)}, {exact_text(high)} must contain the place to go on from, "
+                f"{name} = {last[name]:.10g}"
             )
     settings = settings_of(config, _monitors(config, watch))
     return (_kind(config)(state.system, state.x, settings, state=state, start=start), watch), image

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import io
 
+from contin import exact_text
 from ribbon_model.laws import label
 
 _COLUMNS = ("point", "label", "name", "kappa_n", "kappa_star", "energy")
@@ -15,7 +16,7 @@ def to_html(branch) -> str:
     config, picture = branch.config, io.StringIO()
     branch.plot(shapes=0).savefig(picture, format="svg")
     svg = picture.getvalue()[picture.getvalue().index("<svg") :]
-    about = f"{label(config['law'], config['Gamma'])}, (m, n) = ({config['m']}, {config['n']}), nu = {config['nu']:g}"
+    about = f"{label(config['law'], config['Gamma'])}, (m, n) = ({config['m']}, {config['n']}), nu = {exact_text(config['nu'])}"
     stop = html.escape(branch.stop or branch.status)
     head = "".join(f"<th>{name}</th>" for name in _COLUMNS)
     rows = "".join(f"<tr>{''.join(map(_cell, event))}</tr>" for event in branch.events[list(_COLUMNS)].tolist())

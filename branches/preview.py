@@ -13,6 +13,7 @@ import numpy as np
 
 from branches import graph as diagram
 from branches.config import Config, DiagramConfig
+from contin import exact_text
 from ribbon_model import exact
 
 SOURCE = "preview: exact quadrature"
@@ -45,7 +46,7 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
                 one.m, one.n, one.nu, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law, Gamma=one.Gamma
             )
         except (ValueError, RuntimeError) as error:
-            failed[f"{one.material}, nu = {one.nu:g}, ({one.m}, {one.n})"] = str(error)
+            failed[f"{one.material}, nu = {exact_text(one.nu)}, ({one.m}, {one.n})"] = str(error)
             continue
         _add(graph, family, points)
     graph.graph |= {"source": SOURCE, "failed": json.dumps(failed), "absent": json.dumps({} if single else config.absent)}

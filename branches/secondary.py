@@ -20,7 +20,7 @@ from branches.config import DOMAINS, Config, ConfigError, dump, parse
 from branches.display import Display, complain, write_output
 from branches.files import StoreError, prepare, write_bytes
 from branches.read import StoredBranch, read_branch
-from contin import BranchPoint, ContinError, Continuation, Stop
+from contin import BranchPoint, ContinError, Continuation, Stop, exact_text
 from ribbon_model.laws import LAWS
 from ribbon_model.secondary import breaking, force, secondary_branch
 
@@ -193,7 +193,7 @@ def _attempts(graph, branch: StoredBranch, name: str, event, folder: Path, setti
 def _attempt(graph, branch: StoredBranch, event, reversal: str, folder: Path, settings) -> dict:
     """Follow one branch, put it into the diagram: how it ended."""
     config = _scene(branch.config, event, reversal, settings)
-    file = _file_name(config)
+    file = _file_name(config, {data["file"] for _, _, data in graph.edges(data=True)})
     known = _arrived_before(graph, config)
     if known:
         return {"outcome": "known", "reason": f"the other end of {known}", "file": known}
@@ -221,11 +221,18 @@ def _scene(primary: dict, event, reversal: str, settings: list[str]) -> Config:
     return parse(text, "scene", settings)
 
 
-def _file_name(config: Config) -> str:
-    """The file of a secondary branch: that of its primary one, with the place and the domain."""
+def _file_name(config: Config, taken: set[str]) -> str:
+    """The file of a secondary branch: that of its primary one, with the place and the domain.
+
+    The place has six digits: it was computed, and the others may differ on another machine. It is told more exactly only where
+    another branch of the diagram has the name already.
+    """
     from branches.diagram import file_name
 
-    return f"{file_name(config)[:-3]}_from{config.origin.kappa_n:.6g}_{config.domain.replace(' ', '_')}.h5"
+    kappa_n, kappa_star = exact_text(config.origin.kappa_n), exact_text(config.origin.kappa_star)
+    places = (f"{config.origin.kappa_n:.6g}", kappa_n, f"{kappa_n}_{kappa_star}")
+    names = [f"{file_name(config)[:-3]}_from{place}_{config.domain.replace(' ', '_')}.h5" for place in places]
+    return next((name for name in names if name not in taken), names[-1])
 
 
 def _arrived_before(graph, config: Config) -> str:

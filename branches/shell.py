@@ -26,6 +26,7 @@ from pathlib import Path
 from branches.display import complain, survive_any_encoding, write_output
 from branches.executor import cores, run_jobs
 from branches.files import StoreError, only_run, prepare, write_bytes
+from contin import exact_text
 
 PROGRAM = "ccx"
 INSTALL = "CalculiX (the program ccx) is not installed; on Debian and Ubuntu: apt-get install calculix-ccx"
@@ -60,10 +61,11 @@ class Case:
     def __post_init__(self):
         if self.way not in TIME_LIMITS:
             raise ValueError(f"way = {self.way!r}: must be {' or '.join(map(repr, TIME_LIMITS))}")
+        search = ", ".join(f"{name} = {exact_text(getattr(self, name))}" for name in ("first", "last", "step"))
         if not (0 < self.first < self.last and self.step > 0):
-            raise ValueError(f"first = {self.first:g}, last = {self.last:g}, step = {self.step:g}: must be positive, ascending")
+            raise ValueError(f"{search}: must be positive, ascending")
         if self.way == "thermal" and self.last >= 1:
-            raise ValueError(f"last = {self.last:g}: the thermal way is for xi < 1")
+            raise ValueError(f"last = {exact_text(self.last)}: the thermal way is for xi < 1")
         _ = self.strip
 
     @property
@@ -79,8 +81,8 @@ class Case:
         return self.thinness / self.slenderness
 
     def __str__(self):
-        mesh = f"{self.along} x {self.across} elements"
-        return f"{self.way}, nu = {self.nu:g}, R/w = {self.slenderness:g}, w/h = {self.thinness:g}, {mesh}"
+        nu, slenderness, thinness = map(exact_text, (self.nu, self.slenderness, self.thinness))
+        return f"{self.way}, nu = {nu}, R/w = {slenderness}, w/h = {thinness}, {self.along} x {self.across} elements"
 
 
 @dataclass(frozen=True)

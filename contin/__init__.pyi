@@ -16,6 +16,7 @@ from .files import temporary_name, write_whole
 from .functions.batch import Batch
 from .functions.cache import cache_directory
 from .functions.gradient import gradient
+from .names import exact_text
 from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
 from .results.branch import Branch
@@ -30,6 +31,6 @@ __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
     "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "basis", "cache_directory", "correct", "curve",
-    "diagram", "follow", "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save", "sensitivities",
-    "solve", "temporary_name", "trace", "write_whole",
+    "diagram", "exact_text", "follow", "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save",
+    "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

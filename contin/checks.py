@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from contin.errors import ProblemError
+from contin.names import exact_text
 
 #: Characters of a value that a message shows: with the rest of the sentence it fits on one line.
 _SHOWN = 60
@@ -39,7 +40,7 @@ def is_number(value: object) -> bool:
 def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf) -> None:
     """Require a number strictly between ``low`` and ``high``."""
     if not (is_number(value) and low < value < high):
-        bounds = "a finite number" if math.inf == high == -low else f"a number between {low:g} and {high:g}"
+        bounds = "a finite number" if math.inf == high == -low else f"a number between {exact_text(low)} and {exact_text(high)}"
         raise ProblemError(f"{what}: {shown(value)} must be {bounds}")
 
 

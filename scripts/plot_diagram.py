@@ -55,11 +55,12 @@ def choose(graph, law, nu):
     """The law and nu to draw: those asked for, or the first that the diagram has."""
     from branches.files import StoreError
     from branches.graph import families
+    from contin import exact_text
 
     have = sorted({family[:2] for family in families(graph)}, key=lambda pair: (pair[0] != "ribbon", pair))
     found = [pair for pair in have if law in (None, pair[0]) and nu in (None, pair[1])]
     if not found:
-        known = ", ".join(f"{name} nu = {value:g}" for name, value in have)
+        known = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in have)
         raise StoreError(f"--law {law} --nu {nu}: the diagram has {known}")
     return found[0]
 

@@ -74,7 +74,8 @@ def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:
     options = {"limits": limits, "zeros": {"nu": NUS, "M2": moments[1:]}}
     up, down = (curve(fold, "nu", direction=sense, **options) for sense in (1, -1))
     points = [*reversed(down.points), *up.points[1:]]
-    values = {round(p["nu"], 9) + 0.0: p["kappa_n"] for p in points if p.name.startswith("nu = ") and p.label == "UZ"}
+    zeros = [(p["nu"], p["kappa_n"]) for p in points if p.name.startswith("nu = ") and p.label == "UZ"]
+    values = {min(NUS, key=lambda asked: abs(asked - nu)): kappa_n for nu, kappa_n in zeros}
     near = [(p["M2"], p["nu"]) for p in down.points if p.name.startswith("M2 = ")]
     assert len(near) == len(PARTS)
     birth = np.polynomial.Polynomial.fit(np.square([at for at, _ in near]), [nu for _, nu in near], len(PARTS) - 1)(0.0)

@@ -15,6 +15,7 @@ from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
 from contin.discretization.system import System
 from contin.errors import ProblemError
+from contin.names import exact_text
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.results.point import Point
@@ -61,7 +62,7 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
     elif _is_pair(guess):
         given = _numbers(guess[0])
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a or not given[-1] >= b:
-            raise ProblemError(f"guess: its t must increase and cover the domain {a:g} ... {b:g}")
+            raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
     system = Collocation(problem, mesh, degree, options.free, options.parameters)
     states = _sampled(guess, system.nodes, len(problem.state_names))
     return system, system.pack(states, {**problem.parameters, **options.parameters})

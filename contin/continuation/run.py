@@ -22,9 +22,10 @@ from contin.continuation.scaling import outgrown, scaled
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.segment import Place, Segment, SpecialPoint
-from contin.detection.test_functions import fold, limit, own_test_functions, user_zero
+from contin.detection.test_functions import fold, limits, own_test_functions, user_zeros
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
+from contin.names import exact_text, value_names
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.newton import correct
@@ -131,9 +132,7 @@ class Continuation:
     def _general_test_functions(self) -> list[TestFunction]:
         """Return those of the settings."""
         settings = self.settings
-        tests = [user_zero(name, value) for name, values in settings.zeros.items() for value in values]
-        tests += [limit(name, end, side) for name, ends in settings.limits.items() for end, side in zip(ends, (-1, 1))]
-        return [*tests, *settings.monitors, *settings.test_functions]
+        return [*user_zeros(settings.zeros), *limits(settings.limits), *settings.monitors, *settings.test_functions]
 
     # --- the first point -----------------------------------------------------------------------------------------
 
@@ -198,7 +197,8 @@ class Continuation:
         for name, (low, high) in self.settings.limits.items():
             size = min(1.0, high - low)
             if not low - _SLACK * (size + abs(low)) <= trial[name] <= high + _SLACK * (size + abs(high)):
-                return Stop("limit", f"{name} = {trial[name]:g} at the start lies outside {low:g} ... {high:g}")
+                ends = " ... ".join(value_names((low, high)).values())
+                return Stop("limit", f"{name} = {trial[name]:.10g} at the start lies outside {ends}")
         return None
 
     def _advance(self) -> Iterator[Point]:
@@ -208,7 +208,7 @@ class Continuation:
             segment, inspection, distance = self._step(self.state)
         except ConvergenceError as error:
             self.stop = Stop(
-                "no convergence", f"the step became smaller than min_step = {self.settings.min_step:g} ({error})",
+                "no convergence", f"the step became smaller than min_step = {exact_text(self.settings.min_step)} ({error})",
                 "more intervals, a smaller min_step, scales for unknowns far from one, or a start elsewhere may help",
             )  # fmt: skip
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)

@@ -3,21 +3,39 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping, Sequence
 
 from contin.detection.hopf import hopf
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.protocol import Discretization
+from contin.names import value_names
 from contin.stepping.trial import TestFunction
 
 
-def user_zero(name: str, value: float) -> TestFunction:
-    """Return the test function of points where a parameter or functional takes a value (AUTO's UZ)."""
-    return TestFunction("UZ", f"{name} = {value:g}", lambda trial: trial[name] - value)
+def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
+    """Return the test functions of points where a parameter or functional takes given values (AUTO's UZ).
+
+    A value that is given twice counts once. Different values have different names.
+    """
+    return [_user_zero(name, value, text) for name, values in zeros.items() for value, text in value_names(values).items()]
 
 
-def limit(name: str, value: float, side: int) -> TestFunction:
-    """Return the test function that ends a run where a parameter or functional rises (``side`` +1) or falls (-1) to a value."""
-    return TestFunction("EP", f"{name} = {value:g}", lambda trial: side * (trial[name] - value), terminal=True, limit=True)
+def _user_zero(name: str, value: float, text: str) -> TestFunction:
+    return TestFunction("UZ", f"{name} = {text}", lambda trial: trial[name] - value)
+
+
+def limits(intervals: Mapping[str, Sequence[float]]) -> list[TestFunction]:
+    """Return the test functions that end a run where a parameter or functional reaches an end of its interval."""
+    result = []
+    for name, (low, high) in intervals.items():
+        texts = value_names((low, high))
+        result += [_limit(name, low, texts[low], -1), _limit(name, high, texts[high], 1)]
+    return result
+
+
+def _limit(name: str, value: float, text: str, side: int) -> TestFunction:
+    """Return the one of the upper (``side`` +1) or lower (-1) end."""
+    return TestFunction("EP", f"{name} = {text}", lambda trial: side * (trial[name] - value), terminal=True, limit=True)
 
 
 def fold(name: str) -> TestFunction:

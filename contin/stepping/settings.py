@@ -10,6 +10,7 @@ from typing import Any
 from contin import checks
 from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
+from contin.names import exact_text
 from contin.stepping.newton import Newton
 from contin.stepping.trial import TestFunction
 
@@ -31,7 +32,8 @@ class Settings:
     limits : mapping of str to pair of float
         The run ends where a parameter or functional leaves its interval.
     zeros : mapping of str to sequence of float
-        Points where a parameter or functional reaches one of these values are labelled (UZ).
+        Points where a parameter or functional reaches one of these values are labelled (UZ). A value that is given twice counts
+        once.
     trivial : str, optional
         A parameter or functional that vanishes on a known trivial branch only: the run ends where it changes sign.
     test_functions : sequence of TestFunction
@@ -109,8 +111,8 @@ class Settings:
         for name in ("step", "min_step"):
             checks.number(name, getattr(self, name), 0)
         if not checks.is_number(self.max_step) or not self.min_step <= self.step <= self.max_step:
-            bounds = f"min_step = {self.min_step:g} and max_step = {checks.shown(self.max_step)}"
-            raise ProblemError(f"step: {self.step:g} must lie between {bounds}")
+            bounds = f"min_step = {exact_text(self.min_step)} and max_step = {checks.shown(self.max_step)}"
+            raise ProblemError(f"step: {exact_text(self.step)} must lie between {bounds}")
         checks.whole("max_points", self.max_points, 1, 10**9)
         for name in ("angle", "accuracy", "change"):
             checks.number(name, getattr(self, name), 0, 1.5)

@@ -61,6 +61,8 @@ BAD = {
     "zeros nan": (SCENE + "zeros: {kappa_n: [1, .nan]}\n", ["zeros.kappa_n.1", "finite", "nan"]),
     "zeros without number": (SCENE + "zeros: {kappa_n: [" + "3, " * 5000 + "]}\n", ["zeros.kappa_n", "100", "5000"]),
     "stride": (SCENE + "stride: 0\n", ["stride:", "1", "not 0"]),
+    "steps apart in the seventh digit": (SCENE + "steps: {first: 0.1, smallest: 0.1000001}\n", ["0.1 must", "= 0.1000001"]),
+    "limits apart in the seventh digit": (SCENE + "limits: {kappa_n: [2.5000001, 5]}\n", ["2.5000001, 5", "kappa_n = 2.5"]),
     "steps are a list": (SCENE + "steps: [1]\n", ["steps:", "key: value", "[1]"]),
     "steps out of order": (SCENE + "steps: {first: 5, largest: 1}\n", ["steps:", "first = 5", "largest = 1"]),
     "no step possible": (SCENE + "steps: {smallest: 0.1, largest: 0.01}\n", ["steps:", "smallest = 0.1", "largest = 0.01"]),

@@ -19,6 +19,7 @@ from branches.config import ConfigError, parse
 from branches.diagram import file_name, run_diagram
 from branches.display import Display
 from branches.executor import ExecutorError, executor
+from branches.explore.gather import gather
 from branches.files import StoreError, only_run
 from branches.preview import preview
 from branches.read import read_branch
@@ -229,7 +230,10 @@ def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
         ("{m: [1, 2.5], n: 2}", "m: "),
         ("{m: [1], n: [1]}", "none of its branches"),
         ("{m: [], n: [1]}", "m: the list is empty"),
-        ("{m: [1, 1], n: [2]}", "stands twice"),
+        ("{m: [1, 1], n: [2]}", r"ribbon, nu = 0.3, \(1, 2\) stands twice"),
+        ("{m: 1, n: 2, nu: [0.3, 0.3]}", r"ribbon, nu = 0.3, \(1, 2\) stands twice"),
+        ("{m: 1, n: 2, nu: [0, 0.0]}", "nu = 0, .* stands twice"),
+        ("{m: 1, n: 2, law: finite width, Gamma: [1.0, 1.0000000000001]}", "1 and 1.0000000000001 agree in 12 digits"),
         ("{pairs: [[1, 2]], m: 3}", "pairs"),
         ("{pairs: [[1, 2, 3]]}", "pairs: must be a list of"),
         ("{m: [1], n: [2], colour: red}", "unknown field 'colour'"),
@@ -240,6 +244,48 @@ def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
 def test_bad_scenes(text, said):
     with pytest.raises(ConfigError, match=said):
         parse(text, "scene")
+
+
+@pytest.fixture(scope="module")
+def close(tmp_path_factory):
+    """Two values of nu that agree in six digits."""
+    folder = tmp_path_factory.mktemp("close")
+    scene = parse("{m: 1, n: 2, nu: [0.3, 0.3000001], limits: {kappa_n: [0, 100]}, stride: 50}", "scene")
+    assert run_diagram(scene, folder, Display(), workers=1) == "complete"
+    return folder
+
+
+def test_values_that_agree_in_six_digits_are_two_branches(close, capsys):
+    """In files, in the graph, in its answers, and in the list of a second run."""
+    names = ["ribbon_nu0.3000001_m1_n2.h5", "ribbon_nu0.3_m1_n2.h5"]
+    assert sorted(path.name for path in close.glob("*.h5")) == names
+    assert [read_branch(close / name).config["nu"] for name in names] == [0.3000001, 0.3]
+    graph = diagram.read(close)
+    assert diagram.families(graph) == [("ribbon", 0.3, 1, 2), ("ribbon", 0.3000001, 1, 2)]
+    for nu in (0.3, 0.3000001):
+        (branch,) = diagram.course(graph, 1, 2, nu=nu)
+        assert branch["nodes"][0]["kappa_n"] == pytest.approx(exact.bifurcation(1, 2, nu), abs=1e-9)
+    assert diagram.main([str(close)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("2 branches, 6 special points\n")
+    assert "  ribbon, nu = 0.3, (1, 2): " in said and "  ribbon, nu = 0.3000001, (1, 2): " in said
+    scene = parse("{m: 1, n: 2, nu: [0.3, 0.3000001], limits: {kappa_n: [0, 100]}, stride: 50}", "scene")
+    assert diagram.families(preview(scene)) == diagram.families(graph)
+    assert run_diagram(scene, close, Display()) == "complete"
+    assert "2 of them computed before" in capsys.readouterr().out
+
+
+def test_pictures_and_pages_of_close_values_have_titles_of_their_own(close):
+    graph = diagram.read(close)
+    titles = {draw_diagram.figure(graph, "ribbon", nu, disentangle=False).get_suptitle() for nu in (0.3, 0.3000001)}
+    tables = {read_branch(path)._repr_html_().partition("nu = ")[2].partition("<")[0] for path in close.glob("*.h5")}
+    assert len(titles) == len(tables) == 2
+    assert [family["nu"] for family in gather([str(close)])["families"]] == [0.3, 0.3000001]
+
+
+def test_what_is_absent_is_named_exactly():
+    scene = parse("{nu: [-0.9, -0.9000001], law: [ribbon, flat rod], m: 1, n: 2}", "scene")
+    assert list(scene.absent) == ["ribbon, nu = -0.9, (1, 2)", "ribbon, nu = -0.9000001, (1, 2)"]
 
 
 def test_an_interrupted_diagram_leaves_no_process_and_goes_on(command, tmp_path):

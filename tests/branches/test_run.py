@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from branches.config import Config, ConfigError, load
+from branches.display import Display
 from branches.files import StoreError
 from branches.job import run_branch
 from branches.run import main
@@ -52,6 +53,19 @@ def undisturbed(tmp_path_factory, silent, tables):
 def rows(path):
     with h5py.File(path) as file:
         return file["points"][:]
+
+
+def test_zeros_that_agree_in_six_digits_have_two_names(tmp_path, capsys):
+    path = tmp_path / "x.h5"
+    run_branch(scene_of(zeros={"kappa_n": [3.0, 3.0000001]}, limits={"kappa_n": (-100.0, 3.2000001)}), path, Display())
+    with h5py.File(path) as file:
+        events = file["events"][:]
+    zeros = events[events["label"] == b"UZ"]
+    assert zeros["name"].tolist() == [b"kappa_n = 3", b"kappa_n = 3.0000001"]
+    assert zeros["kappa_n"] == pytest.approx([3.0, 3.0000001], abs=1e-11)
+    assert events["name"][-1] == b"kappa_n = 3.2000001"
+    said = capsys.readouterr().out
+    assert "user value (kappa_n = 3.0000001) at" in said and "stopped: reached kappa_n = 3.2000001" in said
 
 
 # --- the main job ---------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 """Secondary branches as a user gets them: scenes with an origin, the command, the diagram."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -10,7 +11,7 @@ from branches.config import Config, ConfigError, dump, parse
 from branches.display import Display
 from branches.job import run_branch
 from branches.read import read_branch
-from branches.secondary import main
+from branches.secondary import _file_name, main
 
 PAIR = "{m: 5, n: 2, stability: true, limits: {kappa_n: [-21, 100]}, stride: 20}"
 ORIGIN = "origin: {kappa_n: -21.62681748, kappa_star: 2.78375737, mode: wavenumber 1 even}"
@@ -73,6 +74,31 @@ def test_the_command_follows_both_kinds_of_a_pair_and_says_so(command, tmp_path)
     assert (tmp_path / "all" / mirror["file"]).exists()
     assert main([str(tmp_path / "x.h5"), "--out", str(tmp_path / "all"), "--quiet"]) == 0  # takes what is there
     assert len(diagram.secondaries(diagram.read(tmp_path / "all"))) == 2
+
+
+def test_places_that_agree_in_six_digits_have_files_of_their_own():
+    config, taken = parse(SCENE, "scene"), set()
+    for place in ("-21.6268", "-21.62681748", "-21.62681748_2.78375737"):
+        name = _file_name(config, taken)
+        assert name == f"ribbon_nu0.3_m3_n1_from{place}_half_loop.h5"
+        taken.add(name)
+
+
+def test_places_that_agree_in_nine_digits_have_nodes_of_their_own(returned):
+    """A branch like the one at hand, from a place with the same kappa_n and another kappa*."""
+    points, events = returned.points.copy(), returned.events.copy()
+    for table in (points, events):
+        table["kappa_star"] += 0.5
+    origin = returned.config["origin"] | {"kappa_star": returned.config["origin"]["kappa_star"] + 0.5}
+    other = dataclasses.replace(returned, points=points, events=events, config=returned.config | {"origin": origin})
+    graph = diagram.new_graph()
+    assert diagram.add_branch(graph, returned, "a.h5")
+    first = set(graph)
+    assert diagram.add_branch(graph, other, "b.h5") and not diagram.add_branch(graph, other, "again.h5")
+    assert len(first) == 2 and first < set(graph) and graph.number_of_nodes() == 4
+    assert [name for name in first if "(3,1) from -21.6268175 on the half loop secondary bifurcation 0" in name]
+    for branch in diagram.secondaries(graph):
+        assert branch["nodes"][0]["kappa_star"] == branch["edges"][0][2]["kappa_star"][0]
 
 
 def test_a_file_holds_its_scene(returned):
