@@ -307,7 +307,8 @@ class Continuation:
         """
         at = trial.system.parameter_index(self.primary)
         missed = abs(guess[at] - trial.x[at])
-        change = step * max(abs(state.tangent[at]), abs(trial.tangent[at]))
+        tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
+        change = step * max(abs(tangent[at]) for tangent in tangents)
         return bool(missed > _MISSED * change and missed > _NOISE * (1 + abs(trial.x[at])))
 
     def _exact_tangent(self, state: State) -> Array:
