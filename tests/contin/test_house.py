@@ -200,7 +200,7 @@ def test_no_modules_import_each_other_in_a_circle():
 
 # --- the rules themselves -------------------------------------------------------------------------------------------
 
-SAMPLE = '''
+SAMPLE = """
 #: Told.
 _A = 1
 _B = 2
@@ -224,7 +224,7 @@ class Own:
 
     def another(self, a, b, c, d, *, e, f, g, h, **i):
         import numba
-'''
+"""
 
 
 def test_the_rules_see_what_they_are_about():
