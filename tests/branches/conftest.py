@@ -1,4 +1,4 @@
-"""The command line as a user runs it, in a folder of its own: as a process, or as a call where the process makes no difference."""
+"""The command line as a user runs it, in a folder of its own: as a process, or called where a process makes no difference."""
 
 import os
 import signal
