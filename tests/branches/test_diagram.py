@@ -92,11 +92,15 @@ def test_folds_in_a_window(folder):
 
 
 def test_exports(folder):
+    """GraphML holds the same nodes and edges, with the same columns as text."""
     graph = diagram.read(folder)
     other = networkx.read_graphml(folder / "diagram.graphml", force_multigraph=True)
     assert set(other) == set(graph) and other.number_of_edges() == graph.number_of_edges()
-    _, _, data = next(iter(other.edges(data=True)))
-    assert json.loads(data["kappa_n"])[0] == pytest.approx(json.loads(data["kappa_n"])[0])
+    ours, theirs = ({data["file"]: data for _, _, data in edges.edges(data=True)} for edges in (graph, other))
+    assert ours.keys() == theirs.keys() and len(ours) == 7
+    for file, data in theirs.items():
+        for column in ("kappa_n", "kappa_star", "energy"):
+            assert json.loads(data[column]) == list(ours[file][column])
     assert graph.graph["failed"] == "{}"
 
 
