@@ -13,8 +13,7 @@ import numpy as np
 
 from contin.errors import ConvergenceError
 
-#: Steps up to so many tolerances may be round-off of the function. At 1e4 the search could end early where the function is
-#: flat.
+#: Steps up to so many tolerances may be round-off of the function: it is known to about a thousand times that of the place.
 _IDLE = 1e3
 #: A zero takes 4 evaluations on average; where as many as bisection to round-off would need do not do, the function jumps.
 _MOST_EVALUATIONS = 60

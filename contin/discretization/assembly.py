@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from contin.arrays import Array
-from contin.functions.compiler import Matrix, ReadOnlyVector, Vector, kernel, njit
+from contin.functions.compiler import IndexMatrix, Matrix, ReadOnlyVector, Stack, Vector, helper, kernel
+from contin.linalg.layout import Blocks, Layout
 from contin.linalg.vector import scale_into
 
 
@@ -51,61 +51,45 @@ def collocate(
         residual[field.shape[0] * n + q] = boundary[0, q]
 
 
-@njit(
-    "void(UniTuple(i8[::1], 9), f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1],"
-    "f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1])",
-    cache=True, error_model="numpy", nogil=True,
-)  # fmt: skip
-def assemble(
-    layout: Any,
-    value: Array,
-    slope: Array,
-    weights: Array,
-    h: Array,
-    jacobian: Array,
-    at_ends: Array,
-    columns: Array,
-    rows: Array,
-    local: Array,
-    border: Array,
-    corner: Array,
-    start: Array,
-    end: Array,
-) -> None:
-    """Fill the blocks that `contin.condensation.Factorization` takes.
+class Tables(NamedTuple):
+    """The tables of a `Basis` that an assembly takes."""
 
-    ``jacobian`` (points, n + n_int, n + k) of rhs and integrands is by the states in the layout's order, ``at_ends`` (1,
-    n_bc, 2 n + k) of the boundary conditions by those at both ends as they are. ``columns`` (c, equations) and ``rows`` (r,
-    unknowns) are the extra ones; ``start`` and ``end`` are filled with the coefficients of the boundary conditions.
-    Equations are scaled by h. Interior columns of states that do not occur in a row are left as they are: nobody looks at
-    them.
-    """
-    order, offsets, follows, equations, inside, ends, left, right, remaining = layout
-    d, n, groups = weights.size, order.size, offsets.size - 1
-    intervals = h.size
-    n_int = jacobian.shape[1] - n
-    k = jacobian.shape[2] - n
-    c, r = columns.shape[0], rows.shape[0]
-    inner = n * (d - 1)
-    rest = inner + 2 * n
-    size = (intervals * d + 1) * n
-    starts = np.empty((groups, d + 1), np.int64)  # where a group's states at a node begin
+    value: Matrix
+    slope: Matrix
+    weights: Vector
+
+
+@helper(inline=True)
+def _first_columns(layout: Layout, d: int) -> IndexMatrix:
+    """Return the first column of each group's states at each node, shape (groups, d + 1)."""
+    offsets, groups, n = layout.offsets, layout.offsets.size - 1, layout.order.size
+    starts = np.empty((groups, d + 1), np.int64)
     for g in range(groups):
-        first = offsets[g]
-        for node in range(d + 1):
-            starts[g, node] = (d - 1) * first + (node - 1) * (offsets[g + 1] - first)
-        starts[g, 0], starts[g, d] = left[order[first]], right[order[first]]
-    for q in range(n_int + r):
-        for b in range(k + c):
-            corner[q, b] = rows[q - n_int, size + b] if q >= n_int else 0.0
-    for j in range(intervals):
+        first, last = offsets[g], offsets[g + 1]
+        for node in range(1, d):
+            starts[g, node] = (d - 1) * first + (node - 1) * (last - first)
+        starts[g, 0] = (d + 1) * n - 2 * last
+        starts[g, d] = starts[g, 0] + last - first
+    return starts
+
+
+@helper(inline=True)
+def _fill_collocation(
+    layout: Layout, tables: Tables, starts: IndexMatrix, h: Vector, jacobian: Stack, columns: Matrix, local: Stack
+) -> None:
+    """Fill the collocation rows of all intervals."""
+    offsets, follows, value, slope = layout.offsets, layout.follows, tables.value, tables.slope
+    d, n, groups, c = tables.weights.size, layout.order.size, layout.offsets.size - 1, columns.shape[0]
+    inner, rest, k = n * (d - 1), n * (d + 1), jacobian.shape[2] - n
+    for j in range(h.size):
         for g in range(groups):
             first, last = offsets[g], offsets[g + 1]
             for place in range(d * first, d * last):
-                row, equation = local[j, place], equations[place]
+                row, equation = local[j, place], layout.rows[place]
                 i, a = equation // n, equation % n
-                point, target, source = jacobian[j * d + i, a], row.ctypes.data, jacobian[j * d + i, a].ctypes.data
-                if place >= d * first + (d - 1) * (last - first):  # a row that remains: its zeros are looked at, too
+                point = jacobian[j * d + i, a]
+                target, source = row.ctypes.data, point.ctypes.data
+                if i == d - 1:  # the row remains, and all of its ends are read
                     for b in range(inner, rest):
                         row[b] = 0.0
                 for f in range(g + 1):
@@ -127,7 +111,32 @@ def assemble(
                     row[rest + b] = -h[j] * point[n + b]
                 for b in range(c):
                     row[rest + k + b] = columns[b, j * d * n + equation]
-        for q in range(n_int):
+
+
+@helper(inline=True)
+def _fill_corner(boundary_end: int, columns: Matrix, rows: Matrix, corner: Matrix) -> None:
+    """Fill the corner: no parameters yet and the extra columns in rows of integrals, then the extra rows."""
+    integrals, c = corner.shape[0] - rows.shape[0], columns.shape[0]
+    k, unknowns = corner.shape[1] - c, rows.shape[1]
+    for q in range(integrals):
+        for b in range(k):
+            corner[q, b] = 0.0
+        for b in range(c):
+            corner[q, k + b] = columns[b, boundary_end + q]
+    for q in range(rows.shape[0]):
+        for b in range(k + c):
+            corner[integrals + q, b] = rows[q, unknowns - k - c + b]
+
+
+@helper(inline=True)
+def _fill_integrals(
+    layout: Layout, tables: Tables, starts: IndexMatrix, h: Vector, jacobian: Stack, border: Stack, corner: Matrix
+) -> None:
+    """Fill each interval's share of the integral conditions, and add up their derivatives by the parameters."""
+    offsets, groups, value, weights = layout.offsets, layout.offsets.size - 1, tables.value, tables.weights
+    n, d = layout.order.size, weights.size
+    for j in range(h.size):
+        for q in range(jacobian.shape[1] - n):
             for b in range(border.shape[2]):
                 border[j, q, b] = 0.0
             for i in range(d):
@@ -137,25 +146,80 @@ def assemble(
                         first = starts[g, node]
                         for b in range(offsets[g + 1] - offsets[g]):
                             border[j, q, first + b] += share * value[i, node] * point[offsets[g] + b]
-                for b in range(k):
+                for b in range(jacobian.shape[2] - n):
                     corner[q, b] += share * point[n + b]
-        for q in range(r):
-            target, source = border[j, n_int + q], rows[q, j * d * n :]
+
+
+@helper(inline=True)
+def _fill_rows(layout: Layout, rows: Matrix, border: Stack) -> None:
+    """Fill each interval's share of the extra rows: its nodes without the right end, which only the last interval has."""
+    n, inner, intervals = layout.order.size, layout.inside.size, border.shape[0]
+    d = inner // n + 1
+    integrals = border.shape[1] - rows.shape[0]
+    for j in range(intervals):
+        for q in range(rows.shape[0]):
+            target, source = border[j, integrals + q], rows[q, j * d * n :]
             for b in range(inner):
-                target[b] = source[inside[b]]
+                target[b] = source[layout.inside[b]]
             for b in range(2 * n):
-                at_end = ends[b] >= n * d
-                target[inner + b] = source[ends[b]] if not at_end or j == intervals - 1 else 0.0
-            for b in range(k + c):
-                target[rest + b] = 0.0
-    conditions = start.shape[0]
+                at_end = layout.ends[b] >= n * d
+                target[inner + b] = source[layout.ends[b]] if not at_end or j == intervals - 1 else 0.0
+            for b in range(inner + 2 * n, target.size):
+                target[b] = 0.0
+
+
+@helper(inline=True)
+def _fill_boundary(boundary_start: int, derivatives: Matrix, columns: Matrix, first: Matrix, last: Matrix) -> None:
+    """Fill the coefficients of the boundary conditions."""
+    conditions, n = first.shape
+    c, k = columns.shape[0], derivatives.shape[1] - 2 * n
     for q in range(conditions):
         for b in range(n):
-            start[q, b], end[q, b] = at_ends[0, q, b], at_ends[0, q, n + b]
+            first[q, b], last[q, b] = derivatives[q, b], derivatives[q, n + b]
         for b in range(k):
-            end[q, n + b] = at_ends[0, q, 2 * n + b]
+            last[q, n + b] = derivatives[q, 2 * n + b]
         for b in range(c):
-            end[q, n + k + b] = columns[b, intervals * d * n + q]
-    for b in range(c):
-        for q in range(n_int):
-            corner[q, k + b] = columns[b, intervals * d * n + conditions + q]
+            last[q, n + k + b] = columns[b, boundary_start + q]
+
+
+@kernel(reorder=False)
+def assemble(
+    layout: Layout, tables: Tables, h: Vector, jacobian: Stack, at_ends: Stack, columns: Matrix, rows: Matrix, blocks: Blocks
+) -> None:
+    """Fill the blocks of the matrix [[F_x, columns^T], [rows]], with the differential equations scaled by h.
+
+    Parameters of the `Blocks` are the k free ones and the multipliers of the columns; border rows are the integral conditions
+    and then the rows. For example, an interval's block of degree 2, with two groups of states of which the second depends on
+    the first::
+
+                            interior       both ends             parameters   multipliers
+        Gauss               1      2       2         1
+        point 1, group 1 [  S-A    .       .    .    S-A  S-A    -h J_p       columns^T   ]
+        point 2, group 1 [  S-A    .       0    0    S-A  S-A    -h J_p       columns^T   ]   a row that remains
+        point 1, group 2 [  -A     S-A     S-A  S-A  -A   -A     -h J_p       columns^T   ]
+        point 2, group 2 [  -A     S-A     S-A  S-A  -A   -A     -h J_p       columns^T   ]   a row that remains
+        integrals        [   Q      Q       Q    Q    Q    Q      0            0          ]
+        rows             [              as they are               0            0          ]
+
+    For node m and a Gauss point with weight w, A is ``h * value[m] * J``, S is ``slope[m]`` on the diagonal, and Q is the sum
+    over the Gauss points of ``w * h * value[m] * J``. Places with a dot are left as they are: elimination does not read them.
+
+    Parameters
+    ----------
+    layout : Layout
+    tables : Tables
+    h : ndarray, shape (N,)
+    jacobian : ndarray, shape (N d, n + n_int, n + k)
+        Derivatives of rhs and integrands at the Gauss points, by the states in the layout's order and the free parameters.
+    at_ends : ndarray, shape (1, n_bc, 2 n + k)
+        Derivatives of the boundary conditions by the states, in their own order, at both ends and the free parameters.
+    columns, rows : ndarray, shapes (c, equations) and (r, unknowns + c)
+    blocks : Blocks
+        Filled.
+    """
+    starts, collocation = _first_columns(layout, tables.weights.size), h.size * layout.rows.size
+    _fill_collocation(layout, tables, starts, h, jacobian, columns, blocks.local)
+    _fill_corner(collocation + blocks.first.shape[0], columns, rows, blocks.corner)
+    _fill_integrals(layout, tables, starts, h, jacobian, blocks.border, blocks.corner)
+    _fill_rows(layout, rows, blocks.border)
+    _fill_boundary(collocation, at_ends[0], columns, blocks.first, blocks.last)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.discretization.assembly import assemble, at_points, collocate
+from contin.discretization.assembly import Tables, assemble, at_points, collocate
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier, Discretization
@@ -24,7 +24,7 @@ from contin.errors import ProblemError
 from contin.functions.colouring import Colouring
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
-from contin.linalg.layout import Layout, layout
+from contin.linalg.layout import Blocks, Layout, layout
 from contin.problems.boundary_value import BoundaryValueProblem
 
 
@@ -167,7 +167,7 @@ class Collocation(System):
 
     def _blocks(
         self, x: Array, rows: Array, columns: Array, new: Callable[[tuple[int, ...]], Array] = np.empty
-    ) -> tuple[Array, tuple[Array, Array, Array, Array, Array]]:
+    ) -> tuple[Array, Blocks]:
         """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as `Factorization` takes them."""
         problem, n, d, k = self.problem, self._n, self._d, len(self.free)
         p, u = self._scaled_parameters(x), self._scaled_states(x)
@@ -177,12 +177,12 @@ class Collocation(System):
         boundary, ends = self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
         c, r = len(columns), len(rows) + problem.integral_size
         conditions, width = problem.boundary_size, n * (d + 1) + k + c
-        blocks = (
+        blocks = Blocks(
             new((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k + c)),
             np.empty((conditions, n)), np.empty((conditions, n + k + c)),
         )  # fmt: skip
-        tables = (self.basis.value, self.basis.slope, self.basis.weights)
-        assemble(tuple(self._layout), *tables, self._h, jacobian, ends, columns, rows, *blocks)
+        tables = Tables(self.basis.value, self.basis.slope, self.basis.weights)
+        assemble(self._layout, tables, self._h, jacobian, ends, columns, rows, blocks)
         return self._residual(x, field, boundary), blocks
 
     def linearize(
@@ -196,7 +196,7 @@ class Collocation(System):
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
         residual, blocks = self._blocks(x, rows, columns)
-        return residual, Factorization(self._layout, *blocks)
+        return residual, Factorization(self._layout, blocks)
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""

@@ -7,7 +7,8 @@ Nothing outside contin/functions imports numba. A kernel is a Python function wh
         for i in range(x.size):
             x[i] *= factor
 
-It is compiled where it is defined, or read from the cache. A `helper` is compiled when the first kernel that calls it is.
+It is compiled where it is defined, or read from the cache. A `helper` is compiled when the first kernel that calls it is. An
+`instruction` is a function for kernels to call that is written in LLVM's language.
 The cache can only help: a file that cannot be read, written or trusted costs time, never an answer.
 """
 
@@ -15,14 +16,16 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints, overload
+from typing import Annotated, Any, Concatenate, ParamSpec, TypeVar, get_args, get_origin, get_type_hints, overload
 
 import numba
-from numba.core import sigutils
+from llvmlite import ir
+from numba.core import cgutils, sigutils
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from contin.arrays import Array, Indices
@@ -85,6 +88,65 @@ def helper(function: Any = None, *, inline: bool = False) -> Any:
     if function is None:
         return functools.partial(helper, inline=inline)
     return njit(cache=True, inline="always" if inline else "never", **_OPTIONS)(function)
+
+
+_Parameters = ParamSpec("_Parameters")
+_Result = TypeVar("_Result")
+
+# For the bodies of instructions: a loop, ``with for_range(builder, count) as loop``, and a place on the stack.
+for_range = cgutils.for_range
+variable = cgutils.alloca_once_value
+
+
+def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Callable[_Parameters, _Result]:
+    """Let kernels call a function that writes its own machine code, in LLVM's language.
+
+    ``write(builder, *arguments)`` appends the body of the function with an ``llvmlite.ir.IRBuilder`` and returns its value. Its
+    annotations (``int``, ``float``, named tuples of them, ``None``) are the types that kernels see; the ``arguments`` are LLVM
+    values, and named tuples of LLVM values. For example, a rounded sum of two numbers::
+
+        @instruction
+        def sum(builder: Any, x: float, y: float) -> float:
+            return builder.fadd(x, y)
+
+    The body is written once in each module of machine code, as a function that all calls in it share.
+    """
+    hints = get_type_hints(write)
+    hints.pop("builder", None)
+    result, parameters = _compiler_type(hints.pop("return")), list(hints.values())
+    signature, nothing = result(*map(_compiler_type, parameters)), result is numba.types.void
+    body: Any = write
+
+    def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        values: list[Any] = []
+        for argument, parameter in zip(arguments, parameters):
+            values += cgutils.unpack_tuple(builder, argument) if hasattr(parameter, "_fields") else [argument]
+        value = builder.call(_function(context, builder.module, values), values)
+        return context.get_dummy_value() if nothing else value
+
+    def _function(context: Any, module: Any, values: list[Any]) -> Any:
+        options = sorted(getattr(context.fastmath, "flags", ()))  # numba gives them to all sums and products of the module
+        name = ".".join([write.__module__, write.__qualname__, *options])
+        if name in module.globals:
+            return module.globals[name]
+        returned = ir.VoidType() if nothing else context.get_value_type(result)
+        function = ir.Function(module, ir.FunctionType(returned, [value.type for value in values]), name)
+        function.linkage = "linkonce_odr"  # one copy where modules are linked
+        builder, given = ir.IRBuilder(function.append_basic_block()), iter(function.args)
+        arguments = [
+            kind(*itertools.islice(given, len(kind._fields))) if hasattr(kind, "_fields") else next(given)
+            for kind in parameters
+        ]
+        value = body(builder, *arguments)
+        builder.ret_void() if nothing else builder.ret(value)
+        return function
+
+    def typed(context: Any, *types: Any) -> Any:
+        return signature, call
+
+    intrinsic: Any = numba.extending.intrinsic
+    compiled: Callable[_Parameters, _Result] = intrinsic(functools.wraps(write)(typed))
+    return compiled
 
 
 def _compiler_type(hint: Any) -> Any:

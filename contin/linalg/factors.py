@@ -13,7 +13,7 @@ class Factors(Protocol):
     sign: float
 
     def solve(self, b: Array) -> Array:
-        """The x with J x = b."""
+        """Return the x with J x = b."""
 
     def solve_transposed(self, c: Array) -> Array:
-        """The y with J^T y = c."""
+        """Return the y with J^T y = c."""

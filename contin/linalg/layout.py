@@ -1,80 +1,132 @@
-"""Which states couple to which: groups of states to be eliminated one after the other, and their order in a block.
+"""The matrix of a collocation step: its blocks, and the order of rows and columns inside an interval's block.
 
-An interval's block of the collocation matrix holds, for states in the order of elimination (each group together), rows and
-interior columns group by group, then the columns of both ends of the interval, the last group's first, then the parameters:
-
-    [ interior of group 1 | ... | interior of group G | ends of group G | ... | ends of group 1 | parameters ]
-
-so that a group's rows, once freed of the groups before, fill its interior columns and one range at the end of the row.
+States that depend on each other mutually form a group. Groups are eliminated one after the other, each after those that its
+equations contain, so that the states of a frame that turns at given rates, or of a position that is an integral, cost little.
 """
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 
-from contin.arrays import Indices, Pattern
+from contin.arrays import Pattern
+from contin.functions.compiler import IndexVector, Matrix, Stack
 
-#: Larger problems are taken as one group.
-_MOST = 500
+#: Problems of more states are one group. For 500 states the search for groups takes 40 ms; the time grows with the square.
+_MOST_STATES = 500
+
+
+class Blocks(NamedTuple):
+    """The matrix of a collocation step.
+
+    It has N intervals, n states, degree d, k parameters, n_bc boundary conditions and r border rows. For N = 3, with mesh
+    points p0 ... p3 (n columns each) and the interior nodes i1 ... i3 between them (n (d - 1) columns each)::
+
+                       p0   i1   p1     i2   p2     i3   p3   parameters
+        interval 1  [  L1   L1   L1                           L1  ]   n d rows
+        interval 2  [            L2     L2   L2               L2  ]   n d rows
+        interval 3  [                        L3     L3   L3   L3  ]   n d rows
+        boundary    [  F                                 E    E   ]   n_bc rows
+        border      [  B1   B1   B1+B2  B2   B2+B3  B3   B3   C   ]   r rows
+
+    It is square: n + n_bc + r = 2 n + k.
+
+    Attributes
+    ----------
+    local : ndarray, shape (N, n d, n (d + 1) + k)
+        L: collocation rows; rows and columns of each block are in the order of its `Layout`. Factoring overwrites it.
+    border : ndarray, shape (N, r, n (d + 1) + k)
+        B: each interval's share of the border rows (integral conditions, arclength, ...), in the same columns. The last k
+        columns are work space. Factoring overwrites it.
+    corner : ndarray, shape (r, k)
+        C: border rows, by the parameters. Factoring overwrites it.
+    first, last : ndarray, shapes (n_bc, n) and (n_bc, n + k)
+        F and E: boundary conditions, by the first mesh point, and by [the last one | parameters].
+    """
+
+    local: Stack
+    border: Stack
+    corner: Matrix
+    first: Matrix
+    last: Matrix
 
 
 class Layout(NamedTuple):
-    """The places in an interval's block, for n states and degree d.
+    """The order of rows and columns in an interval's block, for n states in G groups and degree d.
 
-    ``order`` (n,): states in the order of elimination. ``offsets`` (G + 1,): where groups begin in it. ``follows`` (G G,):
-    entry g G + h says whether the equations of group h contain states of group g. ``rows`` (n d,): the equation in each row,
-    i n + a for Gauss point i and state a. ``inside`` (n (d - 1),): the unknown in each interior column, i n + a for node i.
-    ``ends`` (2 n,): the same for the columns of both ends, nodes 0 and d. ``left``, ``right`` (n,): the columns of a state's
-    values at both ends. ``remaining`` (n,): the rows that no interior unknown is eliminated by.
+    For example, three groups of which the second depends on the first, and the third on the second; a dot is a zero::
+
+                    interior         both ends        parameters
+                    1    2    3      3    2    1
+        group 1  [  x    .    .      .    .    x      x  ]
+        group 2  [  x    x    .      .    x    x      x  ]
+        group 3  [  .    x    x      x    x    .      x  ]
+
+    When the groups before it are eliminated, the rows of a group have entries in its own interior columns, and in one range
+    of columns that begins with its own ends.
+
+    Attributes
+    ----------
+    order : ndarray, shape (n,)
+        States in the order of elimination, group by group.
+    offsets : ndarray, shape (G + 1,)
+        First places of the groups in ``order``, and n.
+    follows : ndarray, shape (G G,)
+        Entry g G + h is 1 if equations of group h contain states of group g.
+    rows : ndarray, shape (n d,)
+        Equation of each row, as i n + a for Gauss point i and state a. The rows of a group stand together, by Gauss points.
+        Those of its last Gauss point remain when its interior unknowns are eliminated.
+    inside : ndarray, shape (n (d - 1),)
+        Unknown of each interior column, as i n + a for node i and state a.
+    ends : ndarray, shape (2 n,)
+        Unknown of each column of the ends (nodes 0 and d), likewise.
     """
 
-    order: Indices
-    offsets: Indices
-    follows: Indices
-    rows: Indices
-    inside: Indices
-    ends: Indices
-    left: Indices
-    right: Indices
-    remaining: Indices
+    order: IndexVector
+    offsets: IndexVector
+    follows: IndexVector
+    rows: IndexVector
+    inside: IndexVector
+    ends: IndexVector
 
 
 def layout(depends: Pattern, degree: int) -> Layout:
-    """The layout for a degree where ``depends`` (n, n) says which state's equation contains which states."""
-    groups, d = coupled_groups(depends), degree
+    """Return the layout for a degree; ``depends`` (n, n) is true at (a, b) if the equation of state a contains state b."""
+    return _layout(np.ascontiguousarray(depends).tobytes(), len(depends), degree)
+
+
+@functools.lru_cache(maxsize=32)  # each new mesh of a problem asks for its layout again
+def _layout(pattern: bytes, n: int, degree: int) -> Layout:
+    depends, d = np.frombuffer(pattern, dtype=bool).reshape(n, n), degree
+    groups = coupled_groups(depends)
     order = np.concatenate([np.array(group, dtype=np.int64) for group in groups])
-    n, offsets = order.size, np.cumsum([0, *map(len, groups)])
+    offsets = np.cumsum([0, *map(len, groups)])
     parts = [order[a:b] for a, b in zip(offsets, offsets[1:])]
     rows = np.concatenate([(n * np.arange(d)[:, None] + part).ravel() for part in parts])
     inside = np.concatenate([(n * np.arange(1, d)[:, None] + part).ravel() for part in parts])
     ends = np.concatenate([np.concatenate([part, n * d + part]) for part in parts[::-1]])
-    remaining = np.concatenate([np.arange(d * b - (b - a), d * b) for a, b in zip(offsets, offsets[1:])])
-    column = np.empty(n * (d + 1), dtype=np.int64)
-    column[ends] = n * (d - 1) + np.arange(2 * n)
-    member = np.zeros((len(parts), n), dtype=bool)
-    member[np.repeat(np.arange(len(parts)), np.diff(offsets)), order] = True
-    follows = _product(_product(member, depends), member.T).T
-    return Layout(*(np.array(a, dtype=np.int64) for a in (
-        order, offsets, follows.ravel(), rows, inside, ends, column[:n], column[n * d :], remaining,
-    )))  # fmt: skip
-
-
-def _product(a: Pattern, b: Pattern) -> Pattern:
-    """a @ b of truth values, by the fast product of numbers."""
-    product: Pattern = a.astype(np.float32) @ b.astype(np.float32) > 0
-    return product
+    member = np.zeros((len(parts), n), dtype=np.float32)
+    member[np.repeat(np.arange(len(parts)), np.diff(offsets)), order] = 1
+    follows = (member @ depends @ member.T).T > 0
+    return Layout(*(np.array(a, dtype=np.int64) for a in (order, offsets, follows.ravel(), rows, inside, ends)))
 
 
 def coupled_groups(depends: Pattern) -> list[list[int]]:
-    """The smallest groups of states that depend on each other mutually, each after those that it depends on."""
+    """Return the strongly connected components of a dependency graph, each after those that it depends on.
+
+    They are sorted by the number of states that can be reached from them, those of one number by their states.
+    """
     n = len(depends)
-    if n > _MOST or np.all(depends):
+    if n > _MOST_STATES or np.all(depends):
         return [list(range(n))]
-    reach = np.eye(n, dtype=bool) | depends
-    for _ in range(n.bit_length()):
-        reach = _product(reach, reach)
-    mutual = reach & reach.T
-    groups = {tuple(map(int, np.flatnonzero(row))) for row in mutual}
-    return [list(group) for group in sorted(groups, key=lambda group: (np.count_nonzero(reach[group[0]]), group))]
+    # Imported here because it takes 45 ms of start-up time (networkx: 150 ms), and problems of one group do without it.
+    from scipy.sparse import csr_array  # type: ignore[import-untyped]
+    from scipy.sparse.csgraph import breadth_first_order, connected_components  # type: ignore[import-untyped]
+
+    graph = csr_array(depends)
+    count, label = connected_components(graph, connection="strong")
+    groups = [np.flatnonzero(label == g).tolist() for g in range(count)]
+    reachable = [len(breadth_first_order(graph, group[0], return_predecessors=False)) for group in groups]
+    return [group for _, group in sorted(zip(reachable, groups))]

@@ -1,10 +1,11 @@
-"""The command line as a user runs it: a process of its own, in a folder of its own."""
+"""The command line as a user runs it, in a folder of its own: as a process, or called where a process makes no difference."""
 
 import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import pytest
@@ -70,6 +71,23 @@ def tables_of(path) -> dict[str, bytes]:
 @pytest.fixture
 def command(tmp_path):
     return Command(tmp_path)
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    """A function that calls the ``main`` of a program with arguments, in ``tmp_path``: its exit code, and what it printed."""
+
+    def call(main, *arguments):
+        monkeypatch.chdir(tmp_path)
+        capsys.readouterr()
+        try:
+            code = main([*map(str, arguments)])
+        except SystemExit as stop:
+            code = stop.code
+        printed = capsys.readouterr()
+        return SimpleNamespace(returncode=code, out=printed.out, err=printed.err)
+
+    return call
 
 
 @pytest.fixture(scope="session")

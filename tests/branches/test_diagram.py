@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import runpy
 import signal
 import threading
 import time
@@ -92,11 +93,15 @@ def test_folds_in_a_window(folder):
 
 
 def test_exports(folder):
+    """GraphML holds the same nodes and edges, with the same columns as text."""
     graph = diagram.read(folder)
     other = networkx.read_graphml(folder / "diagram.graphml", force_multigraph=True)
     assert set(other) == set(graph) and other.number_of_edges() == graph.number_of_edges()
-    _, _, data = next(iter(other.edges(data=True)))
-    assert json.loads(data["kappa_n"])[0] == pytest.approx(json.loads(data["kappa_n"])[0])
+    ours, theirs = ({data["file"]: data for _, _, data in edges.edges(data=True)} for edges in (graph, other))
+    assert ours.keys() == theirs.keys() and len(ours) == 7
+    for file, data in theirs.items():
+        for column in ("kappa_n", "kappa_star", "energy"):
+            assert json.loads(data[column]) == list(ours[file][column])
     assert graph.graph["failed"] == "{}"
 
 
@@ -112,16 +117,28 @@ def test_a_second_run_computes_what_is_missing_only(folder, capsys):
     assert "computed before" in capsys.readouterr().out
 
 
-def test_where_it_runs_makes_no_difference(tmp_path):
-    """One process, several, and a Dask cluster: the same bits."""
+PAIR = "{m: [3], n: [4, 5], stride: 20}"
+
+
+@pytest.fixture(scope="module")
+def computed_here(tmp_path_factory):
+    """Two branches, computed by this process: their points."""
+    folder, scene = tmp_path_factory.mktemp("one"), parse(PAIR, "scene")
+    run_diagram(scene, folder, Display(silent=True), workers=1)
+    return [read_branch(folder / file_name(config)).points for config in scene.branches]
+
+
+def points_of(folder):
+    return [read_branch(folder / file_name(config)).points for config in parse(PAIR, "scene").branches]
+
+
+def test_a_cluster_makes_no_difference(computed_here, tmp_path):
+    """One process and a Dask cluster: the same bits."""
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
-    scene = parse("{m: [3], n: [4, 5], stride: 20}", "scene")
-    run_diagram(scene, tmp_path / "one", Display(silent=True), workers=1)
+    scene = parse(PAIR, "scene")
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         run_diagram(scene, tmp_path / "dask", Display(silent=True), scheduler=cluster.scheduler_address)
-    for config in scene.branches:
-        a, b = (read_branch(tmp_path / place / file_name(config)).points for place in ("one", "dask"))
-        assert np.array_equal(a, b)
+    assert all(map(np.array_equal, computed_here, points_of(tmp_path / "dask")))
 
 
 def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
@@ -179,20 +196,16 @@ def test_a_process_killed_while_it_sends_its_result():
         assert "odd" in str(odd.exception())
 
 
-def test_where_processes_cannot_be_forked(tmp_path, monkeypatch):
-    """As on Windows and macOS: each process starts from nothing; the same bits come out, also of one process."""
-    scene = parse("{m: [3], n: [4, 5], stride: 20}", "scene")
-    run_diagram(scene, tmp_path / "one", Display(silent=True), workers=1)
-    run_diagram(scene, tmp_path / "fork", Display(silent=True), workers=2)
-    monkeypatch.setattr(executors, "_start_method", lambda: "spawn")
-    run_diagram(scene, tmp_path / "spawn", Display(silent=True), workers=2)
-    for config in scene.branches:
-        a, *others = (read_branch(tmp_path / place / file_name(config)).points for place in ("one", "fork", "spawn"))
-        assert all(np.array_equal(a, other) for other in others)
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_how_processes_start_makes_no_difference(computed_here, tmp_path, monkeypatch, method):
+    """Forked, or each from nothing as on Windows and macOS: the same bits as from one process."""
+    monkeypatch.setattr(executors, "_start_method", lambda: method)
+    run_diagram(parse(PAIR, "scene"), tmp_path, Display(silent=True), workers=2)
+    assert all(map(np.array_equal, computed_here, points_of(tmp_path)))
 
 
 def test_two_runs_into_one_folder(tmp_path):
-    scene = parse("{m: [3], n: [4, 5], stride: 20}", "scene")
+    scene = parse(PAIR, "scene")
     with only_run(tmp_path / "diagram.json"), pytest.raises(StoreError, match="another run"):
         run_diagram(scene, tmp_path, Display(silent=True))
     assert list(tmp_path.iterdir()) == []
@@ -342,11 +355,12 @@ def test_crossings_of_polylines():
 
 
 @pytest.mark.parametrize("source", ["diagram", "scene"])
-def test_the_pictures(folder, command, tmp_path, root, source):
+def test_the_pictures(folder, call, tmp_path, root, source):
     (tmp_path / "scene.yaml").write_text(SCENE)
     what = folder if source == "diagram" else "scene.yaml"
-    done = command(what, "--out", "x.svg", program=(str(root / "scripts" / "plot_diagram.py"),))
+    main = runpy.run_path(str(root / "scripts" / "plot_diagram.py"))["main"]
+    done = call(main, what, "--out", "x.svg")
     assert done.returncode == 0, done.err
     assert (tmp_path / "x.svg").stat().st_size > 10_000
-    refused = command(what, "--out", "x.gif", program=(str(root / "scripts" / "plot_diagram.py"),))
+    refused = call(main, what, "--out", "x.gif")
     assert refused.returncode == 2 and "must end in .pdf, .svg or .png" in refused.err

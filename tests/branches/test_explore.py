@@ -43,6 +43,12 @@ def pages(results):
     return results
 
 
+def data_of(page):
+    """What a page holds, as the browser reads it."""
+    text = page.read_text(encoding="utf-8").partition('<script type="application/json" id="data">')[2]
+    return json.loads(text.partition("</script>")[0])
+
+
 def numbers(text, kind="<f8"):
     return np.frombuffer(base64.b64decode(text), kind)
 
@@ -65,10 +71,10 @@ def test_page_is_whole_and_small(pages):
     assert "<h1>&lt;/script&gt; &amp; &lt;b&gt;</h1>" in (pages / "m1_n2.html").read_text(encoding="utf-8")
 
 
-def test_columns_are_those_of_the_file(results):
-    (family,) = gather([str(results / "m1_n2.h5")])["families"]
+def test_columns_are_those_of_the_file(pages):
+    (family,) = data_of(pages / "m1_n2.html")["families"]
     (branch,) = family["branches"]
-    with h5py.File(results / "m1_n2.h5") as file:
+    with h5py.File(pages / "m1_n2.h5") as file:
         points = file["points"][:]
     for name in ("kappa_n", "kappa_star", "energy", "index"):
         assert np.array_equal(numbers(branch["columns"][name]), points[name])
@@ -77,16 +83,15 @@ def test_columns_are_those_of_the_file(results):
     assert [circle["m"] for circle in family["circles"]] == [1, 3]
 
 
-def test_shapes_are_the_kept_solutions(results):
+def test_shapes_are_the_kept_solutions(pages):
     """Every kept solution of Fig. 12: integrated from S = 0, and packed, within 2e-5 of the collocation.
 
-    At the end of the domain, a node of both. The error allowed is what packing alone may cost: half of a 32767th of the
-    largest value of a channel.
+    At the end of the domain, a node of both; packing may cost half of a 32767th of the largest value of a channel.
     """
-    (family,) = gather([str(results / "fig12")])["families"]
+    (family,) = data_of(pages / "fig12.html")["families"]
     assert len(family["branches"]) == 18
     for about in family["branches"]:
-        branch = read_branch(results / "fig12" / about["file"])
+        branch = read_branch(pages / "fig12" / about["file"])
         found = decoded(about)
         assert len(found) == len(branch.points)
         for point in branch.kept():
@@ -97,9 +102,10 @@ def test_shapes_are_the_kept_solutions(results):
             assert np.abs(found[point, -1, 5:] - shape.centreline[last]).max() < 2e-5 * (1 + parameters["length"])
 
 
-def test_packing_error(results):
-    branch = read_branch(results / "m1_n2.h5")
-    exact, (family,) = shapes(branch), gather([str(results / "m1_n2.h5")])["families"]
+def test_packing_error(pages):
+    """Half of a 32767th of the largest value of a channel."""
+    branch = read_branch(pages / "m1_n2.h5")
+    exact, (family,) = shapes(branch), data_of(pages / "m1_n2.html")["families"]
     error = np.abs(decoded(family["branches"][0]) - exact).max(axis=1)
     assert (error <= np.abs(exact).max(axis=1) / 65534 * (1 + 1e-9) + 1e-300).all()
 

@@ -11,10 +11,8 @@ from branches.files import StoreError
 from branches.job import run_branch
 
 hypothesis = pytest.importorskip("hypothesis", reason="hypothesis is not installed")
-from hypothesis import HealthCheck, example, given, settings  # noqa: E402
+from hypothesis import example, given, settings  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
-
-MANY = settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 
 FIELDS = [*Config.model_fields, "pairs", "strip", "origin"]
 LAWS = ["ribbon", "flat rod", "isotropic rod", "finite width"]
@@ -49,7 +47,6 @@ def scene_or_sentence(text, changes=()):
         assert time.monotonic() - began < 10  # a bomb would take years
 
 
-@MANY
 @given(st.one_of(st.text(), st.binary().map(lambda data: data.decode("latin-1"))))
 @example("a: &a [x, x]\nb: &b [*a, *a, *a]\nm: *b\n")
 @example("!!python/object/apply:os.system ['touch executed']")
@@ -62,7 +59,6 @@ def test_any_text(text):
     assert not os.path.exists("executed")
 
 
-@MANY
 @given(scenes)
 def test_any_value_of_any_field(values):
     """What is accepted can be written down and is the same scene again."""
@@ -71,7 +67,6 @@ def test_any_value_of_any_field(values):
         assert parse(dump(config), "again") == config
 
 
-@MANY
 @given(st.lists(st.one_of(st.text(max_size=12), st.builds("{}={}".format, names, st.text(max_size=8))), max_size=3))
 @example(["__class__.__init__=1"])
 @example(["m=!!python/name:os.system"])
@@ -81,7 +76,7 @@ def test_any_setting(changes):
     scene_or_sentence("m: 1\nn: 2\n", changes)
 
 
-@settings(MANY, max_examples=25)
+@settings(max_examples=settings().max_examples // 12)
 @given(st.data())
 def test_what_is_accepted_runs(tmp_path_factory, silent, data):
     """Scenes within the bounds of every field: to an end, or a sentence, and never half a file."""

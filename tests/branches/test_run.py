@@ -213,28 +213,28 @@ def disk(tmp_path):
     subprocess.run(["umount", folder], capture_output=True)
 
 
-def test_a_disk_full_from_the_start(command, scene, disk):
+def test_a_disk_full_from_the_start(call, scene, disk):
     folder = disk("size=64k")
-    done = command(scene, "--out", folder / "x.h5", "--quiet")
+    done = call(main, scene, "--out", folder / "x.h5", "--quiet")
     assert (done.returncode, done.out) == (2, "") and list(folder.iterdir()) == []
     assert done.err == f"error: cannot write '{folder}/x.h5': No space left on device\n"
 
 
-def test_a_disk_that_fills_up(command, scene, disk, tables):
+def test_a_disk_that_fills_up(call, scene, disk, tables):
     """Room for a first result, not for the second one that is to take its place, until there is."""
     folder = disk("size=1m")
     path = folder / "x.h5"
-    assert command(scene, "--out", path, "--quiet").returncode == 0
+    assert call(main, scene, "--out", path, "--quiet").returncode == 0
     before = path.read_bytes()
     (folder / "ballast").write_bytes(bytes(2**20 - len(before) - 100_000))
-    done = command(scene, "--out", path, "--overwrite", "--quiet", *LONG_SETTINGS)
+    done = call(main, scene, "--out", path, "--overwrite", "--quiet", *LONG_SETTINGS)
     assert (done.returncode, done.err) == (2, f"error: cannot write '{path}': No space left on device\n")
     assert path.read_bytes() == before and sorted(os.listdir(folder)) == ["ballast", "x.h5"]
 
 
-def test_a_disk_that_is_read_only(command, scene, disk):
+def test_a_disk_that_is_read_only(call, scene, disk):
     folder = disk("size=64k,ro")
-    done = command(scene, "--out", folder / "new" / "x.h5", "--quiet")
+    done = call(main, scene, "--out", folder / "new" / "x.h5", "--quiet")
     assert (done.returncode, done.err) == (2, f"error: cannot write '{folder}/new/x.h5': Read-only file system\n")
 
 
@@ -318,14 +318,14 @@ def test_killed_again_and_again(command, scene, undisturbed, tables):
 
 
 @pytest.mark.parametrize("option", ["--resume", "--overwrite", "--quiet"])
-def test_a_second_run_on_the_same_file_is_refused(command, scene, undisturbed, tables, option):
+def test_a_second_run_on_the_same_file_is_refused(command, call, scene, undisturbed, tables, option):
     """Whatever it wants to do with the file; the first one loses nothing."""
     path = command.folder / "x.h5"
     first = command.start(scene, "--out", path, "--quiet", *LONG_SETTINGS)
     while not path.exists() and first.poll() is None:
         time.sleep(0.01)
     first.send_signal(signal.SIGSTOP)  # it must not end while the second one starts
-    second = command(scene, "--out", path, *LONG_SETTINGS, option)
+    second = call(main, scene, "--out", path, *LONG_SETTINGS, option)
     first.send_signal(signal.SIGCONT)
     assert (second.returncode, second.out) == (2, "")
     assert second.err.startswith(f"error: another run (process {first.pid} on ") and second.err.count("\n") == 1

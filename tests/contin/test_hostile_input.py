@@ -9,10 +9,11 @@ import pytest
 import contin
 
 hypothesis = pytest.importorskip("hypothesis", reason="hypothesis is not installed")
-from hypothesis import HealthCheck, given, settings  # noqa: E402
+from hypothesis import given, settings  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
-FEW = settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+#: A part of what the profile has (tests/conftest.py): 5, and 25 with --full.
+FEW = settings(max_examples=settings().max_examples // 12)
 
 numbers = st.one_of(
     st.integers(), st.floats(), st.booleans(), st.sampled_from([10**400, -(10**400), np.float64(math.nan), np.int64(2), 1 + 2j])
@@ -122,7 +123,7 @@ def test_the_others(start, value):
         _one_sentence(call)
 
 
-@settings(FEW, max_examples=60)
+@settings(max_examples=settings().max_examples // 5)
 @given(st.data())
 def test_a_stored_branch_cut_or_garbled(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "stored.npz"

@@ -9,7 +9,7 @@ import contin
 from contin.functions.batch import Batch
 from contin.functions.signature import Signature
 from contin.functions.sparsity import sparsity_pattern
-from contin.linalg.layout import coupled_groups, layout
+from contin.linalg.layout import coupled_groups
 
 
 def rod(t, u, p):
@@ -56,23 +56,6 @@ def test_functions_of_functions_and_arrays_are_followed():
 def test_nothing_is_claimed_of_a_function_that_decides(function):
     """A comparison could send it another way for other numbers: everything counts as depending on everything."""
     assert np.all(sparsity_pattern([function], [3], Signature(("a", "b", "c"), ("k",))))
-
-
-def test_groups_come_after_those_that_they_depend_on():
-    depends = np.zeros((5, 5), bool)
-    for row, column in ((0, 1), (1, 0), (2, 2), (0, 2), (3, 0), (4, 4), (4, 3)):
-        depends[row, column] = True
-    assert coupled_groups(depends) == [[2], [0, 1], [3], [4]]
-    assert coupled_groups(np.ones((3, 3), bool)) == [[0, 1, 2]]
-
-
-def test_every_place_of_a_block_is_used_once():
-    random = np.random.default_rng(0)
-    for n, degree in ((1, 2), (4, 3), (9, 8)):
-        places = layout(random.random((n, n)) < 0.3, degree)
-        assert sorted(places.rows) == list(range(n * degree))
-        assert sorted([*places.inside, *places.ends]) == list(range(n * (degree + 1)))
-        assert sorted([*places.left, *places.right]) == list(range(n * (degree - 1), n * (degree + 1)))
 
 
 def problem():

@@ -124,7 +124,7 @@ def test_stability_is_exchanged(law, m, n, kappa_n, reversal, more):
     point = leave(law, m, n, kappa_n, reversal).points[-1]
     found = index(from_solution(law, *solution(point)))
     assert found.decided
-    assert found.index == after + more if point["kappa_n"] < kappa_n else before - more
+    assert found.index == (after + more if point["kappa_n"] < kappa_n else before - more)
 
 
 def test_both_ways_along_the_kernel_are_images():

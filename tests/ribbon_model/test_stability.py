@@ -121,7 +121,9 @@ def test_a_hard_state():
 
 
 def test_more_resolution_changes_nothing():
-    for point in between_ends(branch(1, 4))[24:64:8]:
+    points = between_ends(branch(1, 4))[24:64:8]
+    assert len(points) == 5
+    for point in points:
         coarse, fine = index(equilibrium(point)), index(equilibrium(point), accuracy=1e-10)
         assert fine.cutoff >= 2 * coarse.cutoff
         assert fine.index == coarse.index
@@ -134,7 +136,9 @@ def test_more_resolution_changes_nothing():
 
 def test_the_shift_of_phase_is_a_null_vector():
     """Its residual falls to the accuracy of the state itself."""
-    for point in between_ends(branch(1, 2))[5::9]:
+    points = between_ends(branch(1, 2))
+    assert len(points) > 20
+    for point in points[5::9]:
         assert index(equilibrium(point), accuracy=1e-13).defect < 1e-7
 
 

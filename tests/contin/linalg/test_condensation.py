@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contin.linalg.condensation import Factorization
-from contin.linalg.layout import layout
+from contin.linalg.layout import Blocks, layout
 
 
 def random_blocks(n, degree, intervals, k, r, seed=0, depends=None):
@@ -45,7 +45,7 @@ def random_blocks(n, degree, intervals, k, r, seed=0, depends=None):
     dense[at : at + boundary_count, :n] = first
     dense[at : at + boundary_count, size - k - n :] = last
     dense[size - r :, size - k :] = corner
-    return (places, local, border, corner, first, last), dense
+    return places, Blocks(local, border, corner, first, last), dense
 
 
 @pytest.mark.parametrize(
@@ -53,12 +53,35 @@ def random_blocks(n, degree, intervals, k, r, seed=0, depends=None):
     [(1, 2, 1, 1, 1), (2, 4, 7, 1, 1), (3, 3, 5, 4, 2), (4, 7, 12, 3, 1), (5, 8, 2, 2, 2), (13, 4, 6, 4, 1), (2, 2, 30, 0, 1)],
 )
 def test_solves_agree_with_dense(n, degree, intervals, k, r):
-    blocks, dense = random_blocks(n, degree, intervals, k, r)
-    factors = Factorization(*blocks)
+    places, blocks, dense = random_blocks(n, degree, intervals, k, r)
+    factors = Factorization(places, blocks)
     b = np.random.default_rng(1).standard_normal(len(dense))
     tolerance = 1e-14 * np.linalg.cond(dense)
     assert np.allclose(factors.solve(b), np.linalg.solve(dense, b), atol=tolerance, rtol=tolerance)
     assert np.allclose(factors.solve_transposed(b), np.linalg.solve(dense.T, b), atol=tolerance, rtol=tolerance)
+
+
+@pytest.mark.parametrize("count", range(10))
+def test_right_hand_sides_do_not_depend_on_their_number(count):
+    places, blocks, dense = random_blocks(3, 4, 5, 2, 1)
+    factors = Factorization(places, blocks)
+    b = np.random.default_rng(2).standard_normal((count, len(dense)))
+    for solve in (factors.solve, factors.solve_transposed):
+        assert np.array_equal(solve(b), np.reshape([solve(row) for row in b], b.shape))
+
+
+def test_the_length_of_a_right_hand_side_is_checked():
+    places, blocks, dense = random_blocks(2, 3, 4, 2, 1)
+    factors = Factorization(places, blocks)
+    with pytest.raises(ValueError, match="reshape"):
+        factors.solve(np.ones(len(dense) + 1))
+
+
+def test_a_singular_matrix_gives_no_finite_solution():
+    places, blocks, dense = random_blocks(2, 3, 4, 2, 1)
+    blocks.local[1, :, :2] = 0.0
+    factors = Factorization(places, blocks)
+    assert np.isnan(factors.sign) or factors.sign == 0 or not np.all(np.isfinite(factors.solve(np.ones(len(dense)))))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -67,8 +90,8 @@ def test_solves_with_states_that_do_not_depend_on_each_other(seed):
     random = np.random.default_rng(seed)
     n, degree = int(random.integers(1, 10)), int(random.integers(2, 9))
     depends = random.random((n, n)) < 0.25
-    blocks, dense = random_blocks(n, degree, 4, 2, 1, seed, depends)
-    factors = Factorization(*blocks)
+    places, blocks, dense = random_blocks(n, degree, 4, 2, 1, seed, depends)
+    factors = Factorization(places, blocks)
     b = random.standard_normal((6, len(dense)))
     tolerance = 1e-14 * np.linalg.cond(dense)
     assert np.allclose(factors.solve(b), np.linalg.solve(dense, b.T).T, atol=tolerance, rtol=tolerance)
@@ -80,12 +103,12 @@ def test_determinant_changes_sign_with_the_dense_one():
     """Up to one factor for the shape: products of signs over random matrices agree."""
     signs = []
     for seed in range(20):
-        blocks, dense = random_blocks(2, 3, 4, 2, 1, seed)
-        signs.append(Factorization(*blocks).sign * np.sign(np.linalg.det(dense)))
+        places, blocks, dense = random_blocks(2, 3, 4, 2, 1, seed)
+        signs.append(Factorization(places, blocks).sign * np.sign(np.linalg.det(dense)))
     assert len(set(signs)) == 1
 
 
 def test_the_count_must_be_square():
-    blocks, _ = random_blocks(2, 3, 4, 2, 1)
+    places, blocks, _ = random_blocks(2, 3, 4, 2, 1)
     with pytest.raises(ValueError, match="2 states and 2 parameters"):
-        Factorization(*blocks[:4], blocks[4][:-1], blocks[5][:-1])
+        Factorization(places, blocks._replace(first=blocks.first[:-1], last=blocks.last[:-1]))

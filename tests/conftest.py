@@ -1,0 +1,53 @@
+"""What all tests share: one thread each, kernels compiled once, the option ``--full``, workers, and the order of modules."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+# Set before numpy is imported, and for the processes that tests start: there is a test for every core, and where threads of
+# linear algebra wait for a busy one, matrices as small as these take thirty times as long.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+ROOT = Path(__file__).parent.parent
+#: The modules that take longest, ten seconds or more, in order. They are handed out first: what comes last must be short, or
+#: one worker ends long before the other.
+FIRST = (
+    "branches/test_paper", "test_docs", "branches/test_run", "branches/test_strip", "ribbon_model/test_stability",
+    "branches/test_diagram", "test_torture", "branches/test_stability", "branches/test_explore", "contin/functions/test_cache",
+    "ribbon_model/test_exact_rods", "ribbon_model/test_descent", "ribbon_model/test_finite_width", "ribbon_model/test_exact",
+    "branches/test_shell",
+)  # fmt: skip
+#: Each worker imports everything and needs up to a gigabyte.
+MOST_WORKERS = 8
+
+
+def pytest_addoption(parser):
+    parser.addoption("--full", action="store_true", help="all examples of random input, and every fault of the torture")
+
+
+def pytest_configure(config):
+    try:
+        from hypothesis import HealthCheck, settings
+    except ImportError:  # its tests are skipped
+        pass
+    else:
+        common = {"deadline": None, "derandomize": True, "suppress_health_check": list(HealthCheck)}
+        settings.register_profile("quick", max_examples=60, **common)
+        settings.register_profile("full", max_examples=300, **common)
+        settings.load_profile("full" if config.getoption("--full") else "quick")
+    from contin import solve, trace  # noqa: F401  compiles the kernels, before there are workers that would all compile them
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config):
+    """One worker a core for folders of tests; none for a test or a file, which start sooner without."""
+    if all("::" in argument or argument.endswith(".py") for argument in config.args):
+        return 0
+    return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, MOST_WORKERS)
+
+
+def pytest_collection_modifyitems(items):
+    places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(FIRST)}
+    items.sort(key=lambda item: places.get(item.path, len(places)))

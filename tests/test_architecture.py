@@ -1,0 +1,51 @@
+"""docs/architecture.md and docs/reference.md name what there is; the picture of the rooms shows the imports that there are."""
+
+import html
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+import contin
+
+PROJECT = Path(__file__).resolve().parent.parent
+DOCS, PACKAGE = PROJECT / "docs", PROJECT / "contin"
+PAGE = (DOCS / "architecture.md").read_text()
+NAMED = set(re.findall(r"[\w/]+\.pyi?\b", PAGE))
+#: Steps of the run: a file and what is defined in it.
+STEPS = re.findall(r" ([\w/]+\.py): ([\w.]+)$", PAGE, re.M)
+
+
+def test_every_file_that_the_page_names_exists():
+    assert not [name for name in NAMED if not (PROJECT / name).exists() and not (PACKAGE / name).exists()]
+
+
+def test_every_file_of_the_engine_is_in_the_table():
+    listed = set(re.findall(r"^\| `([\w/]+\.py)` \|", PAGE, re.M))
+    files = {file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if file.name != "__init__.py"}
+    assert files == listed
+
+
+@pytest.mark.parametrize("file, name", STEPS)
+def test_every_step_is_where_the_page_says(file, name):
+    text = (PACKAGE / file).read_text()
+    for part in name.split("."):
+        assert re.search(rf"^ *(def|class) {part}\b", text, re.M)
+
+
+def test_there_are_steps():
+    assert len(STEPS) > 20
+
+
+def test_the_picture_is_true():
+    rooms = runpy.run_path(str(PROJECT / "scripts" / "draw_rooms.py"))
+    picture = (DOCS / "images" / "rooms.svg").read_text()
+    drawn = html.unescape(re.search("<dc:description>(.*)</dc:description>", picture)[1]).split("; ")
+    assert drawn == rooms["edges"](rooms["imports"]()[0]), "run: python scripts/draw_rooms.py"
+
+
+def test_the_reference_lists_all_public_names():
+    listed = re.findall(r"^::: contin\.(\w+)$", (DOCS / "reference.md").read_text(), re.M)
+    # Monitor, the first name of TestFunction, is an attribute without a docstring: the page mentions it in a sentence
+    assert sorted([*listed, "Monitor"]) == sorted(contin.__all__)
