@@ -145,8 +145,10 @@ class Algebraic(System):
         return other, other.pack(self.states(x), values)
 
 
+#: The t of functions that do not take it.
 _NO_TIME = np.zeros(1)
 
 
 def _none(n: int) -> Array:
+    """Return the absent second state of a function of one point."""
     return np.empty((0, n))

@@ -115,7 +115,7 @@ class Collocation(System):
 
     @property
     def nodes(self) -> Array:
-        """All nodes, shape (N d + 1,)."""
+        """Values of t at all nodes, shape (N d + 1,)."""
         inner = (self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel()
         return np.append(inner, self.mesh[-1])
 
@@ -129,7 +129,7 @@ class Collocation(System):
         return x[: self.state_size].reshape(-1, self._n)
 
     def _local(self, states: Array) -> Array:
-        """States by interval, shape (N, d + 1, n)."""
+        """Return the states by interval, shape (N, d + 1, n)."""
         local: Array = states[self._by_interval]
         return local
 
@@ -159,7 +159,7 @@ class Collocation(System):
         return residual
 
     def residual(self, x: Array) -> Array:
-        """Residual of the discrete equations at x, shape (equations,)."""
+        """Return the residual of the discrete equations at x, shape (equations,)."""
         p, u = self._scaled_parameters(x), self._scaled_states(x)
         field = self._field.values(self._times, self.at_gauss_points(x), _NONE(self._n), p)
         boundary = self._boundary.values(_TIME, u[:1], u[-1:], p)
@@ -188,7 +188,7 @@ class Collocation(System):
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
-        """Residual at x, and the factored matrix [[F_x, columns^T], [rows]].
+        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]].
 
         ``rows`` (r, size + c) and ``columns`` (c, equations) make it square: size + c = equations + r. Equations of
         the result are ordered [residual | rows], unknowns [x | multipliers of the columns].
@@ -199,7 +199,7 @@ class Collocation(System):
         return residual, Factorization(self._layout, blocks)
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
+        """Return the derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
         n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
         of_field, of_boundary = self._colourings_for(self._indices(names))
         field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, :, n:]
@@ -208,7 +208,7 @@ class Collocation(System):
         return np.concatenate([collocation, ends, np.einsum("p,pqk->qk", self._quadrature, field[:, n:])])
 
     def transposed_product(self, x: Array, w: Array) -> Array:
-        """F_x^T w, shape (size,), for w (equations,)."""
+        """Return F_x^T w, shape (size,), for w (equations,)."""
         n = self._n
         _, (local, border, corner, first, last) = self._blocks(
             x, np.empty((0, self.size)), np.empty((0, self.equations)), np.zeros
@@ -228,7 +228,7 @@ class Collocation(System):
         return result
 
     def functionals(self, x: Array) -> Array:
-        """Values of the problem's functionals, in their order, by the same quadrature."""
+        """Return the values of the problem's functionals, in their order, by the same quadrature."""
         if not self.problem.functionals:
             return np.empty(0)
         batch = self.problem.batch("functionals")
@@ -268,35 +268,36 @@ class Collocation(System):
         return Collocation(self.problem, degree=self.degree, **{**kept, **changes})
 
     def on_mesh(self, mesh: Array) -> tuple[Collocation, Carrier]:
-        """The same problem on another mesh, and the function that carries vectors of unknowns over to it."""
+        """Return the same problem on another mesh, and the function that carries vectors of unknowns over to it."""
         other = self._with(mesh=mesh)
         return other, self.carrier(other)
 
     def refined(self) -> tuple[Collocation, Carrier]:
-        """The same problem with every interval halved, and the carrier."""
+        """Return the same problem with every interval halved, and the carrier."""
         return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
-        """The same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
+        """Return the same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
         mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control) if control.every else None
         return None if mesh is None else self.on_mesh(mesh)
 
     def with_parameters(self, values: Mapping[str, float]) -> Collocation:
-        """The same problem with other values of parameters that are not free."""
+        """Return the same problem with other values of parameters that are not free."""
         names = dict(zip(self.problem.parameters, self.parameters)) | dict(values)
         return self._with(parameters=names)
 
     def with_free(self, free: Sequence[str], x: Array) -> tuple[Collocation, Array]:
-        """The same problem with other free parameters (values from x), on the same mesh, and x for it."""
+        """Return the same problem with other free parameters (values from x), on the same mesh, and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
         other = self._with(free=free, parameters=values)
         return other, other.pack(self.states(x), values)
 
 
+#: The t of boundary conditions, which do not take it.
 _TIME = np.zeros(1)
 
 
 @functools.cache
 def _NONE(n: int) -> Array:
-    """The absent second state of a function of one point."""
+    """Return the absent second state of a function of one point."""
     return np.empty((0, n))

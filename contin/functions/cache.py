@@ -11,6 +11,7 @@ from pathlib import Path
 from contin.errors import ContinError
 from contin.files import write_whole
 
+#: The end of every message about a cache that cannot be written.
 _ADVICE = "set CONTIN_CACHE_DIR to a folder that can be written"
 
 

@@ -205,6 +205,7 @@ def _compare(function, plain):
     return function
 
 
+#: Operators whose meaning for complex numbers spoils the complex step, and the functions called in their place.
 _STAND_INS = {
     operator.pow: power,
     operator.ipow: power,

@@ -24,7 +24,9 @@ from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.state import Stop
 
+#: First entry of every file; another number where an older version could not read it.
 _FORMAT = "contin branch 1"
+#: Arrays of a branch point that are stored besides its tangents.
 _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 
 
