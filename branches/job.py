@@ -90,7 +90,7 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
         display.note(f"{path} is complete already ({done}); nothing to do")
         return "complete"
     prepare(path)
-    (run, watch), image = _resumed(config, path) if resume else (_begun(config), None)
+    (run, watch), image = _resumed(config, path) if resume else (begun(config), None)
     with contextlib.closing(_writer(path, config, run, watch, image)) as writer:
         display.begin(config, writer.count, len(writer.events()))
         outcome = _follow(run, writer, display)
@@ -101,7 +101,7 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
 
 def compute_branch(config: Config, display) -> tuple[bytes, str]:
     """The branch of ``config`` as the image of its file, and how it ended; nothing touches a disk here."""
-    run, watch = _begun(config)
+    run, watch = begun(config)
     with contextlib.closing(_writer(None, config, run, watch)) as writer:
         outcome = _follow(run, writer, display)
         return writer.image(), outcome
@@ -135,7 +135,7 @@ def _monitors(config: Config, watch) -> list:
     return [*(watch.monitors if watch else ()), *convexity.monitors(LAWS[config.law])]
 
 
-def _begun(config: Config):
+def begun(config: Config):
     """The run from the branch's first point, and its watch."""
     system, x, tangent = seed(config)
     watch = _watch(config, system, x)
