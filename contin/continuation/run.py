@@ -22,6 +22,7 @@ from contin.continuation.scaling import scaled
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.detection.trivial import crossed, jumped
 from contin.detection.test_functions import fold, limit, own_test_functions, user_zero
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
@@ -277,7 +278,19 @@ class Continuation:
             trial = sharpened(state, trial)
         if self._fold is not None and self._jumped(state, guess, trial, step):
             raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
-        return Segment(state, self._before(state, step), trial, step, settings.newton), distance
+        low, before = self._before(state, step)
+        self._stay_off_trivial(state, before, trial)
+        return Segment(state, (low, before), trial, step, settings.newton), distance
+
+    def _stay_off_trivial(self, state: State, before: Trial, trial: Trial) -> None:
+        """Raise ConvergenceError where the corrected point lies on the trivial branch, or where the first step passes it."""
+        name, newton = self.settings.trivial, self.settings.newton
+        if name is None:
+            return
+        if jumped(before, trial, name, newton):
+            raise ConvergenceError(f"the corrected point lies on the trivial branch, {name} = {trial[name]:.1e}")
+        if state.singular and crossed(before, trial, name, newton):
+            raise ConvergenceError(f"{name} changes its sign in the first step")
 
     def _before(self, state: State, step: float) -> Place:
         """Return where a step's test functions start from.
