@@ -140,7 +140,8 @@ def differences(points: list[Point], stop: Stop, expected: list, config: Config)
         difference = _wrong_end(points[-1], stop, expected[-1], config)
         if difference:
             return difference, "", values
-        pairs.append((points[-1], expected[-1].kappa_n))
+        if expected[-1].label != "MX":
+            pairs.append((points[-1], expected[-1].kappa_n))
     for point, known in pairs:
         size, estimate = 1 + abs(known), point.errors.get("kappa_n", math.nan)
         error = abs(point["kappa_n"] - known)
