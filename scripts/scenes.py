@@ -34,11 +34,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from pydantic import ValidationError  # noqa: E402
 
 from branches.config import Config, ConfigError  # noqa: E402
+from branches.ends import checked, is_threshold  # noqa: E402
 from branches.job import begun  # noqa: E402
 from contin import ConvergenceError, Point, Stop  # noqa: E402
 from ribbon_model import exact  # noqa: E402
-from ribbon_model.laws import LAWS  # noqa: E402
-from ribbon_model.linear import thresholds  # noqa: E402
 
 NAMES = ("ribbon", "flat rod", "isotropic rod")
 #: A value further off than ten times its error estimate is wrong, if the difference is above round-off of the quadrature: this,
@@ -98,7 +97,7 @@ def compare(config: Config) -> Result:
     limits = config.limits["kappa_n"]
     try:
         run = begun(config)[0]
-        points = [point for point in run if point.label]
+        points = [checked(point, run, config) for point in run if point.label]
     except (ConfigError, ConvergenceError) as error:
         return Result(name, "", str(error), 0.0, 0.0, time.perf_counter() - began)
     assert run.stop is not None
@@ -166,11 +165,8 @@ def _wrong_end(last: Point, stop: Stop, expected, config: Config) -> str:
         return ends
     if abs(last["kappa_star"] - expected.kappa_star) > 1e-6 * (1 + abs(expected.kappa_star)):
         return ends
-    if circle and expected.kappa_star > 0 and abs(last["kappa_n"] - expected.kappa_n) < 1e-3:
-        covering = round(expected.kappa_star)
-        known = thresholds(LAWS[config.law], covering, config.n, config.nu) if covering != config.n else ()
-        if known and min(abs(expected.kappa_n - value) for value in known) > 1e-9 * (1 + abs(expected.kappa_n)):
-            return f"the quadrature's end {expected.kappa_n:.12g} is none of the linear theory"
+    if circle and not is_threshold(config, round(expected.kappa_star), expected.kappa_n, 0.0):
+        return f"the quadrature's end {expected.kappa_n:.12g} is none of the linear theory"
     return ""
 
 

@@ -22,8 +22,8 @@ from contin.continuation.scaling import scaled
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.segment import Place, Segment, SpecialPoint
-from contin.detection.trivial import crossed, jumped
 from contin.detection.test_functions import fold, limit, own_test_functions, user_zero
+from contin.detection.trivial import crossed, jumped
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
 from contin.results.branch import Branch
@@ -209,16 +209,13 @@ class Continuation:
         try:
             segment, inspection, distance = self._step(self.state)
         except ConvergenceError as error:
-            self.stop = Stop(
-                "no convergence", f"the step became smaller than min_step = {self.settings.min_step:g} ({error})",
-                "more intervals, a smaller min_step, or a start elsewhere may help",
-            )  # fmt: skip
+            self.stop = self._failure(error)
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
         for point in inspection.special_points(self._tests):
+            self.stop = point.stop
             yield self._point(point, segment.state)
-            if point.stop is not None:
-                self.stop = point.stop
+            if self.stop is not None:
                 return
         self.state = self._accept(segment, distance)
         self._end = segment.trial
@@ -226,6 +223,19 @@ class Continuation:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
         label, name = ("EP", "max points") if self.stop else ("", "")
         yield self._point(SpecialPoint(segment.step, label, name, segment.trial), segment.state)
+
+    def _failure(self, error: ConvergenceError) -> Stop:
+        """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
+        state, least = self.state, self.settings.min_step
+        if not np.all(np.isfinite(state.system.residual(predict(state, least)))):
+            return Stop(
+                "no convergence", f"the equations have no finite value a step of min_step = {least:g} further on",
+                "look for what they divide by, or take a root or logarithm of: their domain ends there",
+            )  # fmt: skip
+        return Stop(
+            "no convergence", f"the step became smaller than min_step = {least:g} ({error})",
+            "more intervals, a smaller min_step, or a start elsewhere may help",
+        )  # fmt: skip
 
     # --- one step ------------------------------------------------------------------------------------------------
 
@@ -370,6 +380,8 @@ class Continuation:
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):
             return  # a special point would fall between the meshes; the next point will do as well
+        if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, self.settings.newton):
+            return
         self._end = end
         self.state = dataclasses.replace(
             state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, sign=end.sign
