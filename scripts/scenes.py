@@ -46,6 +46,8 @@ ESTIMATES, ROUND_OFF = 10, 1e-11
 #: Largest arclength between points of the exact branch, and the one with which it is walked again where a scene differs: the
 #: exact folds are bracketed, and two of them could lie between two points.
 STEP, FINE_STEP = 0.05, 0.005
+#: Largest m and n of a scene, and of a wide one.
+NARROW, WIDE = 14, 40
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,6 +87,13 @@ def draw(seed: int, number: int, largest: int, laws=NAMES, interval=(-0.99, 0.5)
             return Config(law=law, nu=nu, m=m, n=n)
         except ValidationError:
             continue
+
+
+def is_wide(number: int, count: int, wide: int) -> bool:
+    """Return whether the scene of this number is one of the ``wide``, evenly spread, among ``count``."""
+    if wide == 0:
+        return False
+    return math.floor(math.ceil(number * wide / count) * count / wide) == number
 
 
 # --- comparing ------------------------------------------------------------------------------------------------------
@@ -195,10 +204,10 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if min(options.count, options.workers) < 1 or min(options.wide, options.first) < 0:
         parser.error("count and workers must be at least 1, wide and first at least 0")
-    laws, every = tuple(options.law or NAMES), options.count / max(1, options.wide)
-    wide = {options.first + math.floor(i * every) for i in range(min(options.wide, options.count))}
+    laws = tuple(options.law or NAMES)
     numbers = range(options.first, options.first + options.count)
-    configs = (draw(options.seed, i, 40 if i in wide else 14, laws, tuple(options.nu)) for i in numbers)
+    sizes = (WIDE if is_wide(i, options.count, options.wide) else NARROW for i in numbers)
+    configs = (draw(options.seed, i, size, laws, tuple(options.nu)) for i, size in zip(numbers, sizes))
     wrong = unfinished = 0
     worst, began = (0.0, 0.0), time.monotonic()
     moving = sys.stderr.isatty()

@@ -1,9 +1,9 @@
 """The quantity that vanishes on a trivial branch (``settings.trivial``): its round-off, and what its values at two points say.
 
 A branch ends on the trivial one where the quantity crosses zero with a slope: at both ends of the step it is well above its
-round-off, and its signs differ. Where it falls from well above to round-off Newton's method has left for the trivial branch:
-the step is refused. Where it is round-off at the beginning already (it can decay along a branch that runs on, beside a
-homoclinic orbit), its sign says nothing.
+round-off, and its signs differ. Where it falls from well above its round-off to next to nothing Newton's method has left for
+the trivial branch: the step is refused. Where it is round-off at the beginning already (it can decay along a branch that runs
+on, beside a homoclinic orbit), its sign says nothing.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from contin.stepping.trial import Trial, sign_changed
 _TOLERANCES = 10
 #: The tolerance counts as no less than this: round-off of residuals is not below it however small the tolerance is.
 _LEAST = 1e-13
-#: A value this many times its round-off falls to it in one step only by a jump; a decay is then taken in shorter steps. At 10 a
-#: decay beside a homoclinic orbit would be cut into many steps, at 1e6 a jump from a branch of small amplitude would pass.
+#: A value this many times its round-off that falls by this factor in one step has jumped, or the step ends right at a zero, or
+#: a decay is fast: all are then taken in shorter steps. At 10 a decay beside a homoclinic orbit would be cut into many steps, at
+#: 1e6 a jump from a branch of small amplitude would pass.
 _CLEAR = 1e3
 
 
@@ -36,12 +37,9 @@ def round_off(trial: Trial, name: str, newton: Newton) -> float:
 
 
 def jumped(before: Trial, trial: Trial, name: str, newton: Newton) -> bool:
-    """Return whether the quantity falls, from one end of a step to the other, from well above its round-off to it."""
+    """Return whether the quantity, well above its round-off at one end of a step, is next to nothing at the other."""
     value, after = abs(before[name]), abs(trial[name])
-    if after * _CLEAR >= value:
-        return False
-    noise = round_off(trial, name, newton)
-    return after <= noise and value > _CLEAR * noise
+    return after * _CLEAR < value and value > _CLEAR * round_off(trial, name, newton)
 
 
 def crossed(before: Trial, trial: Trial, name: str, newton: Newton) -> bool:
