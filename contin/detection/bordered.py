@@ -78,7 +78,7 @@ class BorderedMatrix:
         F(x(s)) + beta(s) psi = 0 with Phi.x = s is differentiated twice and multiplied by w.
         """
         w = self.multipliers()
-        here = w @ self._system.residual(x)
+        here = float(w @ self._system.residual(x))
         length = _DIFFERENCE
         hessian, rough = self._differences(x, w, here, length)
         for _ in range(_SHORTEST):

@@ -23,7 +23,7 @@ from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
 from contin.stepping.settings import Settings
 from contin.stepping.state import Stop
-from contin.stepping.trial import Linearization, TestFunction, Trial, sign_changed
+from contin.stepping.trial import Linearization, TestFunction, Trial
 
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
 #: labelled already. At 1e-5 a run that starts near a fold would miss it.

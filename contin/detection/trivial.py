@@ -19,8 +19,8 @@ _TOLERANCES = 10
 #: The tolerance counts as no less than this: round-off of residuals is not below it however small the tolerance is.
 _LEAST = 1e-13
 #: A value this many times its round-off that falls by this factor in one step has jumped, or the step ends right at a zero, or
-#: a decay is fast: all are then taken in shorter steps. At 10 a decay beside a homoclinic orbit would be cut into many steps, at
-#: 1e6 a jump from a branch of small amplitude would pass.
+#: a decay is fast: all are then taken in shorter steps. At 10 a decay beside a homoclinic orbit would be cut into many steps,
+#: at 1e6 a jump from a branch of small amplitude would pass.
 _CLEAR = 1e3
 
 

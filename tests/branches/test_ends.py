@@ -7,8 +7,8 @@ import pytest
 from branches.config import Config
 from branches.ends import checked
 from branches.job import begun
-from ribbon_model.linear import thresholds
 from ribbon_model.laws import LAWS
+from ribbon_model.linear import thresholds
 
 
 def points_of(config):

@@ -1,4 +1,4 @@
-"""Ends of branches that were once wrong. Every number is from the exact quadrature; ends are those of the linear theory, too."""
+"""Ends of branches that were once wrong. Every number is from the exact quadrature; ends are the linear theory's, too."""
 
 import pytest
 

@@ -38,9 +38,7 @@ def test_a_quantity_that_decays_to_round_off_ends_no_branch():
 
 def test_a_change_of_sign_without_a_zero_is_no_end():
     """The quantity jumps from 1 to -1 at mu = 2."""
-    problem = AlgebraicProblem(
-        lambda u, p: (u.x - p.mu,), ["x"], {"mu": 0.0}, {"X": lambda u, p: (2 - u.x) / abs(2 - u.x)}
-    )
+    problem = AlgebraicProblem(lambda u, p: (u.x - p.mu,), ["x"], {"mu": 0.0}, {"X": lambda u, p: (2 - u.x) / abs(2 - u.x)})
     branch = trace(solve(problem, [0.0]), free=["mu"], limits={"mu": (-1, 4)}, trivial="X")
     last = branch.points[-1]
     assert (last.label, last.name) == ("MX", "possible trivial branch")
