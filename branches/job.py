@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from branches.config import Config, ConfigError, dump, parse
+from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
 from branches.store import BranchWriter, open_branch, read_state
 from contin import Continuation, ConvergenceError, MeshControl, Newton, Settings, exact_text
@@ -90,10 +91,10 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
         display.note(f"{path} is complete already ({done}); nothing to do")
         return "complete"
     prepare(path)
-    (run, watch), image = _resumed(config, path) if resume else (_begun(config), None)
+    (run, watch), image = _resumed(config, path) if resume else (begun(config), None)
     with contextlib.closing(_writer(path, config, run, watch, image)) as writer:
         display.begin(config, writer.count, len(writer.events()))
-        outcome = _follow(run, writer, display)
+        outcome = _follow(config, run, writer, display)
         seconds = time.perf_counter() - began
         display.summary(config, writer.events(), writer.count, seconds, path, outcome, run.stop)
     return outcome
@@ -101,9 +102,9 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
 
 def compute_branch(config: Config, display) -> tuple[bytes, str]:
     """The branch of ``config`` as the image of its file, and how it ended; nothing touches a disk here."""
-    run, watch = _begun(config)
+    run, watch = begun(config)
     with contextlib.closing(_writer(None, config, run, watch)) as writer:
-        outcome = _follow(run, writer, display)
+        outcome = _follow(config, run, writer, display)
         return writer.image(), outcome
 
 
@@ -135,8 +136,8 @@ def _monitors(config: Config, watch) -> list:
     return [*(watch.monitors if watch else ()), *convexity.monitors(LAWS[config.law])]
 
 
-def _begun(config: Config):
-    """The run from the branch's first point, and its watch."""
+def begun(config: Config):
+    """The run from the branch's first point, and its watch; its points are to pass `branches.ends.checked`."""
     system, x, tangent = seed(config)
     watch = _watch(config, system, x)
     return _kind(config)(system, x, settings_of(config, _monitors(config, watch)), tangent), watch
@@ -159,11 +160,11 @@ def _resumed(config: Config, path: Path):
     return (_kind(config)(state.system, state.x, settings, state=state, start=start), watch), image
 
 
-def _follow(run: Continuation, writer: BranchWriter, display) -> str:
+def _follow(config: Config, run: Continuation, writer: BranchWriter, display) -> str:
     """Take all points of a run to the file; how it ended."""
     with _Interruption() as interruption:
         for point in run:
-            number = writer.count
+            point, number = checked(point, run, config), writer.count
             writer.append(point)
             display.point(point, number, run.state.step)
             if point.label and point.name != "start":

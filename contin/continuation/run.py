@@ -23,6 +23,7 @@ from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.detection.test_functions import fold, limits, own_test_functions, user_zeros
+from contin.detection.trivial import crossed, jumped
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
 from contin.names import exact_text, value_names
@@ -207,16 +208,13 @@ class Continuation:
         try:
             segment, inspection, distance = self._step(self.state)
         except ConvergenceError as error:
-            self.stop = Stop(
-                "no convergence", f"the step became smaller than min_step = {exact_text(self.settings.min_step)} ({error})",
-                "more intervals, a smaller min_step, scales for unknowns far from one, or a start elsewhere may help",
-            )  # fmt: skip
+            self.stop = self._failure(error)
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
         for point in inspection.special_points(self._tests):
+            self.stop = point.stop
             yield self._point(point, segment.state)
-            if point.stop is not None:
-                self.stop = point.stop
+            if self.stop is not None:
                 return
         self.state = self._accept(segment, distance)
         self._end = segment.trial
@@ -224,6 +222,19 @@ class Continuation:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
         label, name = ("EP", "max points") if self.stop else ("", "")
         yield self._point(SpecialPoint(segment.step, label, name, segment.trial), segment.state)
+
+    def _failure(self, error: ConvergenceError) -> Stop:
+        """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
+        state, least = self.state, self.settings.min_step
+        if not np.all(np.isfinite(state.system.residual(predict(state, least)))):
+            return Stop(
+                "no convergence", f"the equations have no finite value a step of min_step = {exact_text(least)} further on",
+                "look for what they divide by, or take a root or logarithm of: their domain ends there",
+            )  # fmt: skip
+        return Stop(
+            "no convergence", f"the step became smaller than min_step = {exact_text(least)} ({error})",
+            "more intervals, a smaller min_step, scales for unknowns far from one, or a start elsewhere may help",
+        )  # fmt: skip
 
     # --- one step ------------------------------------------------------------------------------------------------
 
@@ -276,7 +287,19 @@ class Continuation:
             trial = sharpened(state, trial)
         if self._fold is not None and self._jumped(state, guess, trial, step):
             raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
-        return Segment(state, self._before(state, step), trial, step, settings.newton), distance
+        low, before = self._before(state, step)
+        self._stay_off_trivial(state, before, trial)
+        return Segment(state, (low, before), trial, step, settings.newton), distance
+
+    def _stay_off_trivial(self, state: State, before: Trial, trial: Trial) -> None:
+        """Raise ConvergenceError where the corrected point lies on the trivial branch, or where the first step passes it."""
+        name, newton = self.settings.trivial, self.settings.newton
+        if name is None:
+            return
+        if jumped(before, trial, name, newton):
+            raise ConvergenceError(f"the corrected point lies on the trivial branch, {name} = {trial[name]:.1e}")
+        if state.singular and crossed(before, trial, name, newton):
+            raise ConvergenceError(f"{name} changes its sign in the first step")
 
     def _before(self, state: State, step: float) -> Place:
         """Return where a step's test functions start from.
@@ -360,6 +383,8 @@ class Continuation:
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):
             return  # a special point would fall between the meshes; the next point will do as well
+        if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, self.settings.newton):
+            return
         self._end = end
         self.state = dataclasses.replace(
             state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign

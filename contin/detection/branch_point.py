@@ -26,8 +26,9 @@ _LINEAR = 0.1
 _ROUND_OFF, _SHRINKING = 1e-9, 0.3
 #: An update is followed by a new Hessian where it is more than this part of the one before.
 _SLOW = 0.05
-#: The Hessian is taken anew for the tangents where x has moved by more since: they are wanted right at the branch point.
-_MOVED = 1e-3
+#: The Hessian is taken anew for the tangents where x has moved by more since: they are wanted right at the branch point, to
+#: well below what counts as stationary (`contin.detection.inspection`). At 1e-5 folds at pitchforks would be missed.
+_MOVED = 1e-6
 #: An update larger than this, relative to 1 + |x|, leaves the neighbourhood for good.
 _GONE = 10
 #: Where the Hessian explains less of the gradient than one half it does not lead to a zero.

@@ -77,9 +77,8 @@ class BranchPointSearch:
             try:
                 found = locate_branch_point(state.system, segment.guess(middle), segment.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
-                gap = found.x - segment.guess(at)
-                off = np.sqrt(inner(state.system, gap, gap))
-                if segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE) and off < _OFF * step:
+                inside = segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
+                if inside and segment.distance(found.x, at) < _OFF * step:
                     found = found.along(state.system, trial.x - state.x)
                     return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:

@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.detection.branch_point import BranchPoint
 from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
+from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
 from contin.stepping.settings import Settings
 from contin.stepping.state import Stop
-from contin.stepping.trial import Linearization, TestFunction, Trial, sign_changed
+from contin.stepping.trial import Linearization, TestFunction, Trial
 
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
 #: labelled already.
@@ -43,6 +45,9 @@ _BESIDE = 1e-4
 #: The branch point where a branch ends on the trivial one has the trivial quantity at zero to this part of its values at the
 #: ends of the step; another branch point inside the step has not.
 _TRIVIAL = 1e-6
+#: It lies no further off the cubic through both ends of the step than this part of the step, as other branch points.
+_OFF = 0.1
+_ADVICE = "a smaller max_step or accuracy, or more intervals may help"
 #: A branch can close on its first point after this many regular points.
 _FEWEST = 3
 #: A closing branch comes back to its first point along its tangent there: with this cosine at least, ...
@@ -78,13 +83,14 @@ class Inspection:
     def is_simple(self) -> bool:
         """Return whether the step stays on its branch, and passes one point at most, simple or multiple, where others cross.
 
-        A change of the determinant's sign without a branch point means that Newton's method left the branch.
+        A change of the determinant's sign without a branch point means that Newton's method left the branch; so does one of the
+        trivial quantity without a zero of it on the branch.
         """
-        if not self.settings.branch_points:
-            return self._is_steady()
-        count, clear = self._branch_points.count
-        if not clear or not self._is_steady():
+        count, clear = self._branch_points.count if self.settings.branch_points else (0, True)
+        if not clear or (self._home is not None and self._home.name.startswith("possible")) or not self._is_steady():
             return False
+        if not self.settings.branch_points:
+            return True
         if count > 1:
             return self._branch_points.multiple.name != "possible"
         return not self._branch_points.sign_changes or self._branch_points.simple.name != "possible"
@@ -108,7 +114,7 @@ class Inspection:
     def special_points(self, tests: Iterable[TestFunction]) -> list[SpecialPoint]:
         """Return the special points inside the step, in order."""
         found: list[SpecialPoint] = []
-        home = None if self.segment.state.singular else self._returned()
+        home = self._home
         if home is not None:
             found.append(home)
         elif self.settings.branch_points and self._branch_points.count[0] > 1:
@@ -143,13 +149,17 @@ class Inspection:
     def _pitchfork(self) -> SpecialPoint | None:
         """Return the fold of a pitchfork, right at the branch point inside the step; None if there is none."""
         fold: Any = self.fold
-        if not (self.settings.branch_points and self._branch_points.sign_changes):
+        if self._home is not None:
+            found = dataclasses.replace(self._home, stop=None)
+        elif self.settings.branch_points and self._branch_points.sign_changes:
+            found = self._branch_points.simple
+        else:
             return None
-        found = self._branch_points.simple
-        if found.name == "possible" or not found.details.tangents:
+        if not isinstance(found.details, BranchPoint) or not found.details.tangents:
             return None
         component = found.details.tangents[0][self.segment.trial.system.parameter_index(fold.name)]
-        return dataclasses.replace(found, label=fold.label, test=fold) if abs(component) < _STATIONARY else None
+        stationary = abs(component) < _STATIONARY
+        return dataclasses.replace(found, label=fold.label, name=fold.name, test=fold) if stationary else None
 
     # --- zeros of test functions ---------------------------------------------------------------------------------
 
@@ -223,18 +233,38 @@ class Inspection:
 
     # --- ends ----------------------------------------------------------------------------------------------------
 
-    def _returned(self) -> SpecialPoint | None:
-        """Return the end of a branch on the trivial one, where ``settings.trivial`` passes zero."""
+    @functools.cached_property
+    def _home(self) -> SpecialPoint | None:
+        """The end of a branch on the trivial one, where ``settings.trivial`` crosses zero; "possible" without a zero there.
+
+        It is the branch point inside the step if the quantity is zero there, else the quantity's zero. Either must lie on the
+        cubic through both ends of the step: elsewhere it belongs to another branch.
+        """
         segment, name = self.segment, self.settings.trivial
         before, trial = segment.before, segment.trial
-        if name is None or not sign_changed(before[name], trial[name]):
+        if name is None or not crossed(before, trial, name, segment.newton):
             return None
         stop = Stop("trivial branch", f"returned to the trivial branch ({name} = 0)")
-        point = self._branch_points.simple
-        if abs(point.trial[name]) > _TRIVIAL * max(abs(before[name]), abs(trial[name])):
-            test = TestFunction("EP", "trivial branch", lambda there: there[name], terminal=True)
-            point = segment.locate(test, (0.0, before), (segment.step, trial))
-        return dataclasses.replace(point, label="EP", name="trivial branch", stop=stop)
+        if not self.settings.branch_points or self._branch_points.sign_changes:
+            point = self._branch_points.simple
+            if self._is_home(point):
+                return dataclasses.replace(point, label="EP", name="trivial branch", stop=stop)
+        test = TestFunction("EP", "trivial branch", lambda there: there[name], terminal=True)
+        point = segment.locate(test, (segment.low, before), (segment.step, trial))
+        if self._is_home(point):
+            return dataclasses.replace(point, stop=stop)
+        stop = Stop("no convergence", f"{name} changed its sign, but no zero of it was found on the branch", _ADVICE)
+        return SpecialPoint(segment.step, "MX", "possible trivial branch", trial, stop)
+
+    def _is_home(self, point: SpecialPoint) -> bool:
+        """Return whether the trivial quantity vanishes at a point on the branch."""
+        segment, name = self.segment, self.settings.trivial
+        assert name is not None
+        largest = max(abs(segment.before[name]), abs(segment.trial[name]))
+        zero = max(_TRIVIAL * largest, round_off(point.trial, name, segment.newton))
+        if point.name.startswith("possible") or abs(point.trial[name]) > zero:
+            return False
+        return segment.distance(point.trial.x, point.at) < _OFF * segment.step
 
     def _closed(self) -> SpecialPoint | None:
         """Return the end of a branch that comes back to its first point."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from contin.arrays import Array
 from contin.detection.root import find_zero
 from contin.discretization.protocol import inner
@@ -101,6 +103,11 @@ class Segment:
         rate = step / max(inner(state.system, state.tangent, trial.tangent), _LEAST_COSINE)
         a, b = state.tangent * step, trial.tangent * rate
         return state.x + s * a + s**2 * (3 * ahead - 2 * a - b) + s**3 * (a + b - 2 * ahead)
+
+    def distance(self, x: Array, at: float) -> float:
+        """Return how far x is from the cubic at a distance along the state's tangent."""
+        gap = x - self.guess(at)
+        return float(np.sqrt(inner(self.state.system, gap, gap)))
 
     def guessed(self, distance: float) -> Trial:
         """Return the cubic at a distance as a trial, with the state's tangent."""

@@ -1,0 +1,74 @@
+"""The ends of a branch, as far as the law and the linear theory know more of them than the engine does."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from branches.config import Config
+from contin import Continuation, Point, Stop
+from contin.stepping.step import predict
+from ribbon_model import convexity
+from ribbon_model.laws import LAWS
+from ribbon_model.linear import covering, thresholds
+
+#: An end on a circle misses its value in the linear theory by no more than ten times its error estimate, or by this, relative
+#: to 1 + its size: branches that end are known to 1e-11 and better, and other bifurcations of the circle are not as near.
+_ESTIMATES, _SAME = 10, 1e-7
+#: At this margin of convexity and below a law whose equations have no value a step further has come to its end: the response
+#: is found down to some 1e-2. At 0.5 another failure could be taken for the law's end.
+_NEARLY_CONVEX = 0.1
+
+
+def checked(point: Point, run: Continuation, config: Config) -> Point:
+    """Return a point of a run, an end on a circle that the linear theory does not know named "possible".
+
+    The run's stop then says so. It also gets the reason why the law ends, where that stopped the run.
+    """
+    if point.label == "MX":
+        run.stop = _explained(run, config)
+    if point.name != "trivial branch" or config.origin is not None:
+        return point
+    index = covering(point["kappa_n"], point["kappa_star"], point["energy"])
+    if is_threshold(config, index, point["kappa_n"], point.errors.get("kappa_n", math.nan)):
+        return point
+    run.stop = Stop(
+        "no convergence",
+        f"M2 = 0 at kappa_n = {point['kappa_n']:.10g}, where the mode n = {config.n} has no bifurcation of the "
+        f"{abs(index)}-covered circle",
+        "smaller steps may help (steps.largest)",
+    )
+    return dataclasses.replace(point, label="MX", name="possible trivial branch")
+
+
+def is_threshold(config: Config, index: int, kappa_n: float, error: float) -> bool:
+    """Return whether the linear theory has a bifurcation of the scene's mode at kappa_n, within its error estimate.
+
+    ``index`` is the covering index of the circle, negative if it is curled against its natural curvature.
+    """
+    try:
+        known = thresholds(LAWS[config.law], index, config.n, config.nu, config.Gamma)
+    except (ValueError, ZeroDivisionError):
+        return False
+    allowed = max(_SAME * (1 + abs(kappa_n)), 0.0 if math.isnan(error) else _ESTIMATES * error)
+    return min(abs(value - kappa_n) for value in known) <= allowed
+
+
+def _explained(run: Continuation, config: Config) -> Stop | None:
+    """Return why a run failed: its own reason, or the end of the law."""
+    margin, state, stop = convexity.margin(LAWS[config.law]), run.state, run.stop
+    if margin is None or stop is None or stop.reason != "no convergence":
+        return stop
+    if np.all(np.isfinite(state.system.residual(predict(state, run.settings.min_step)))):
+        return stop
+    left = margin(state.system, state.x)
+    if left > _NEARLY_CONVEX:
+        return stop
+    value = state.system.all_parameters(state.x)[list(state.system.problem.parameters).index("kappa_n")]
+    return Stop(
+        "no convergence",
+        f"the law has no response beyond kappa_n = {value:.6g}: its strain energy loses its convexity close by "
+        f"(det D2U / (U_11 U_33) has fallen to {left:.2g})",
+    )
