@@ -25,6 +25,8 @@ from contin.stepping.trial import Linearization
 _NOISE = 1e4
 #: A first value smaller than this part of the limits is zero.
 _NOTHING = 1e-10
+#: A state smaller than this part of the largest may vanish but for the error of the discretization: its size counts as one.
+_FAINT = 1e-6
 #: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
 _TINY = 1e-14
 
@@ -59,9 +61,10 @@ def scaled(
     change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
     response = np.minimum(1.0, rates * change)
     size = np.maximum(size, np.where(response > noise, response, 0.0))
+    size = np.where(size > _FAINT * size.max(), size, 1.0)
     size = np.array([known.get(name, found) for name, found in zip(states, size)])
     parameters = np.array([known.get(name, value) for name, value in zip(names, system.parameters)])
-    parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, np.minimum(1.0, rate_of_free * change))
+    parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, 1.0)
     sizes = usual(size), usual(parameters)
     if all(np.all(found == 1) for found in sizes):
         return system, x

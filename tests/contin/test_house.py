@@ -18,7 +18,7 @@ MOST_ARGUMENTS = 8
 LONGER = {"kernel", "helper", "instruction"}
 #: One direction: a module imports from its own room and from those before it.
 ROOMS = [
-    ("errors", "arrays", "checks", "files"), ("functions",), ("linalg",), ("problems",), ("discretization",), ("stepping",),
+    ("errors", "arrays", "checks", "files", "names"), ("functions",), ("linalg",), ("problems",), ("discretization",), ("stepping",),
     ("detection",), ("results",), ("continuation",), ("analysis",), ("__init__",),
 ]  # fmt: skip
 #: Libraries that one room alone imports, and the files elsewhere that may.
