@@ -1,4 +1,4 @@
-"""What all tests share: one thread each, kernels compiled once, the option ``--full``, workers, and the order of modules."""
+"""Shared by all tests: one thread each, kernels compiled once, the option ``--full``, workers, and the order of modules."""
 
 import os
 from pathlib import Path

@@ -44,7 +44,7 @@ def pages(results):
 
 
 def data_of(page):
-    """What a page holds, as the browser reads it."""
+    """Return the data of a page, as the browser reads it."""
     text = page.read_text(encoding="utf-8").partition('<script type="application/json" id="data">')[2]
     return json.loads(text.partition("</script>")[0])
 
@@ -227,7 +227,7 @@ class Browser:
             self.call("Input.dispatchKeyEvent", type=kind, key=name, code=name)
 
     def colours(self, selector):
-        """How many different colours a part of the page has."""
+        """Return the number of different colours in a part of the page."""
         from io import BytesIO
 
         from matplotlib.image import imread
@@ -311,7 +311,7 @@ def test_click_shows_what_the_file_holds(pages, browser):
 
 
 def distances(strip):
-    """What neither a rigid motion nor the first station changes: distances between stations, and their largest twist."""
+    """Return invariants of rigid motions and of the first station: distances between stations, and their largest twist."""
     x, n = strip[:, :3], len(strip)
     return [np.linalg.norm(x - np.roll(x, n // k, axis=0), axis=1).max() for k in (2, 3, 5)] + [np.abs(strip[:, 12]).max()]
 

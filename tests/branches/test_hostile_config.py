@@ -1,4 +1,4 @@
-"""Whatever stands in a scene or behind ``--set``: a run, or one sentence; no other exception, no hang, no code executed."""
+"""Any text in a scene or behind ``--set`` gives a run, or one sentence; no other exception, no hang, no code executed."""
 
 import os
 import time
@@ -61,7 +61,7 @@ def test_any_text(text):
 
 @given(scenes)
 def test_any_value_of_any_field(values):
-    """What is accepted can be written down and is the same scene again."""
+    """A scene that is accepted can be written to a file and read back unchanged."""
     config = scene_or_sentence(yaml.safe_dump(values, sort_keys=False, allow_unicode=True))
     if config is not None:
         assert parse(dump(config), "again") == config

@@ -27,7 +27,7 @@ def good(tmp_path_factory, silent):
 
 
 def read_all(path):
-    """What every reader of the project does with a branch."""
+    """Read a branch as every reader of the project does."""
     branch = read_branch(path)
     for point in branch.kept():
         branch.shape(point)

@@ -319,7 +319,7 @@ def test_killed_again_and_again(command, scene, undisturbed, tables):
 
 @pytest.mark.parametrize("option", ["--resume", "--overwrite", "--quiet"])
 def test_a_second_run_on_the_same_file_is_refused(command, call, scene, undisturbed, tables, option):
-    """Whatever it wants to do with the file; the first one loses nothing."""
+    """With every option; the first run loses nothing."""
     path = command.folder / "x.h5"
     first = command.start(scene, "--out", path, "--quiet", *LONG_SETTINGS)
     while not path.exists() and first.poll() is None:

@@ -27,7 +27,7 @@ def returned(tmp_path_factory):
 
 
 def test_the_branch_of_m3_n1_returns_to_it(returned):
-    """Where the index of (3, 1) changes back, -114.309355: found on the cell, which knows nothing of the half loop."""
+    """It ends at the change of the index of (3, 1), -114.309355, which is found on the cell, independently of the half loop."""
     assert returned.reason == "primary branch"
     end = returned.events[-1]
     assert end["name"] == b"primary branch" and end["kappa_n"] == pytest.approx(-114.3093550622, abs=1e-7)

@@ -238,7 +238,7 @@ def test_a_search_that_finds_no_zero():
 
 @pytest.mark.parametrize(("nu", "number"), [(0.3, 75.0), (0.3, 200.0), (0.1, 250.0)])
 def test_the_laws_root_by_a_third_way(nu, number):
-    """What the finite elements are compared with, from the energy alone.
+    """The root that the finite elements are compared with, from the energy alone.
 
     With the rotation psi about d2 and phi about d3, omega_2 = 0 gives phi = psi'/kappa, the twist is w = psi''/kappa +
     kappa psi, and the second variation of U about omega = (kappa, 0, 0) is int U_33 w**2 - U_1 psi w dS; psi = psi' = 0 at both

@@ -1,4 +1,4 @@
-"""Whatever is handed to the library: a result, or one sentence that names the field; no other exception, no hang."""
+"""Any input gives a result, or one sentence that names the field; no other exception, no hang."""
 
 import dataclasses
 import math

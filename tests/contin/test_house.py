@@ -130,7 +130,7 @@ MODULES = {module_of(path): path for path in FILES}
 
 
 def graph():
-    """Who imports whom: edges with the file and line where they stand."""
+    """Return the imports between modules: importer, imported, file and line."""
     for path, tree in TREES.items():
         for name, line in imported(tree, MODULES):
             if name in MODULES:
@@ -138,7 +138,7 @@ def graph():
 
 
 def rank(module):
-    """Where a module's room stands in the one direction."""
+    """Return the place of a module's room in `ROOMS`."""
     room = module.split(".")[1] if "." in module else "__init__"
     (place,) = (i for i, rooms in enumerate(ROOMS) if room in rooms)
     return place

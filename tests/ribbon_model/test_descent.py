@@ -176,7 +176,7 @@ def test_a_single_loop_just_above_its_threshold_buckles(metric):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("longest", [0.1, 0.05])
 def test_beyond_the_fold_a_buckled_loop_snaps_to_three(sign, longest):
-    """Whichever way it is kicked, and with steps half as long."""
+    """Kicked either way, and with steps half as long."""
     strip = replace(discretized(buckled(RIBBON, 1, 2, "LP"), 48), kappa_n=4.15)
     rest = identify(descend(perturbed(strip, sign * 0.02), longest=longest).end)
     assert (str(rest), rest.stability.index) == ("3-covered circle", 0)

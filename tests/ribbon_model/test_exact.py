@@ -238,7 +238,7 @@ def test_solve():
 
 
 def test_refusals(monkeypatch):
-    """What cannot be computed is said, not guessed."""
+    """Input without a solution is refused with a reason."""
     with pytest.raises(ValueError, match="rigid"):
         bifurcation(2, 2, 0.3)
     with pytest.raises(ValueError, match="multiple of 2n"):

@@ -213,7 +213,7 @@ def test_refine_points_of_the_rods():
 
 
 def test_refusals():
-    """What does not exist is said."""
+    """Input without a solution is refused with a reason."""
     with pytest.raises(ValueError, match="none of"):
         curve(1, 2, law="rope")
     with pytest.raises(ValueError, match="threshold"):

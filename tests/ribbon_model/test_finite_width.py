@@ -1,5 +1,6 @@
 """The law between the flat rod and the ribbon: from plate theory, its two limits, its branches against the quadrature."""
 
+import functools
 import math
 
 import mpmath
@@ -19,9 +20,14 @@ from ribbon_model.unfolding import factors, first_root, first_zero_of_t, shootin
 NU = 0.3
 
 
-def branch(m, n, Gamma, **settings):
+def followed(m, n, Gamma, **settings):
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, NU, 10, 7, Gamma=Gamma)
     return follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, **settings), tangent)
+
+
+@functools.cache
+def branch(m, n, Gamma):
+    return followed(m, n, Gamma)
 
 
 def moments(random, Gamma):
@@ -189,7 +195,7 @@ def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
 
 def test_a_branch_stops_where_the_law_ends():
     """(3, 1) at Gamma = 10 runs off to where U loses its convexity; the quadrature is lost at the same kappa_n."""
-    found = branch(3, 1, 10.0, monitors=convexity.monitors(FINITE_WIDTH))
+    found = followed(3, 1, 10.0, monitors=convexity.monitors(FINITE_WIDTH))
     assert found.stop.reason == "event" and convexity.NAME in found.stop.message
     lost = exact_finite_width.curve(3, 1, NU, 10.0)[-1]
     assert lost.label == "MX" and lost.kappa_n == pytest.approx(found.points[-1]["kappa_n"], abs=0.05)
@@ -198,7 +204,7 @@ def test_a_branch_stops_where_the_law_ends():
 
 def test_a_flat_rod_of_no_width():
     """Gamma = 0: the branch (1, 2) of the flat rod, point by point in kappa_n and omega."""
-    found = branch(1, 2, 0.0, zeros={"kappa_n": [2.0]})
+    found = followed(1, 2, 0.0, zeros={"kappa_n": [2.0]})
     system, x, tangent = primary_branch(FLAT_ROD, 1, 2, NU, 10, 7)
     flat = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, zeros={"kappa_n": [2.0]}), tangent)
     ours, theirs = found.labelled("UZ")[0], flat.labelled("UZ")[0]

@@ -1,6 +1,7 @@
 """Secondary branches: what leaves a primary branch, in the smallest domain that holds it, against the whole loop."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ def solution(point):
     return point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
 
 
+@functools.cache
 def at(law, m, n, kappa_n):
     """The solution on the cell of the branch (m, n) at kappa_n, where it has one only."""
     system, x, tangent = primary_branch(law, m, n, NU, 10, 7)
@@ -31,6 +33,7 @@ def at(law, m, n, kappa_n):
     return point
 
 
+@functools.cache
 def leave(law, m, n, kappa_n, reversal, sense=1, zeros=()):
     """The first points of a secondary branch."""
     system, x, tangent = secondary_branch(law, *solution(at(law, m, n, kappa_n)), reversal)
@@ -129,7 +132,7 @@ def test_stability_is_exchanged(law, m, n, kappa_n, reversal, more):
 
 def test_both_ways_along_the_kernel_are_images():
     """The rotary reflection changes the sign of the mode, so the two half-branches are one up to symmetry."""
-    pair = [leave(RIBBON, 5, 1, -24.4451886, "axis", sense, [-24.5]).labelled("UZ")[0] for sense in (1, -1)]
+    pair = [leave(RIBBON, 5, 1, -24.4451886, "axis", sense, (-24.5,)).labelled("UZ")[0] for sense in (1, -1)]
     assert np.abs(pair[0]["R1"] - pair[1]["R1"]) > 0.1
     for name in ("kappa_star", "energy"):
         assert pair[0][name] == pytest.approx(pair[1][name], abs=1e-8)

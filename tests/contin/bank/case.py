@@ -1,4 +1,4 @@
-"""What a reference problem consists of: runs, and the special points that must come out, in order, none more, none fewer."""
+"""A reference problem: its runs, and the special points of each, in order; a run must find exactly these."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a coarse fixed mesh has solutions that are not there (AUTO demo ``ext``): u'' + (lam pi)^2 sin(u + u^2 + u^3) = 0.
+"""A problem with spurious solutions on a coarse fixed mesh (AUTO demo ``ext``): u'' + (lam pi)^2 sin(u + u^2 + u^3) = 0.
 
 u(0) = u(1) = 0. The branches that leave the trivial one at lam = k are made of m positive and n negative half-periods of the
 oscillator w'' = -sin(w + w^2 + w^3): lam pi = m T+ + n T-, functions of the amplitude (quadratures by Gauss's rule with mpmath,

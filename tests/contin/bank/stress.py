@@ -53,7 +53,7 @@ def modules(variant):
 
 
 def complaint(case) -> str:
-    """What is wrong with a run, in a line; empty if nothing."""
+    """Return one line that says how a run differs from its reference; empty if it does not."""
     try:
         branch = case.run()
     except contin.ContinError as error:

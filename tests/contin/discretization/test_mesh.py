@@ -13,7 +13,7 @@ DEGREES = range(2, 9)
 
 
 def nodes(degree, mesh):
-    """Where the states are given."""
+    """Return the nodes, at which the states are given."""
     inner = (mesh[:-1, None] + np.diff(mesh)[:, None] * basis(degree).nodes[:-1]).ravel()
     return np.append(inner, mesh[-1])
 

@@ -64,7 +64,7 @@ def test_files_cut_anywhere_are_replaced(kernel, tmp_path):
 
 
 def test_code_of_another_signature_under_the_same_name_is_not_taken(kernel, tmp_path):
-    """What two processes that compile at once may leave: the entry of one signature, the code of the other."""
+    """Two processes that compile at once may leave the entry of one signature with the code of the other."""
     kernel()
     one, two = (path for path in _files(tmp_path, ".nbc") if ".helper" in path.name)
     first, second = one.read_bytes(), two.read_bytes()

@@ -1,4 +1,4 @@
-"""What is known of a user's function before it is compiled."""
+"""The number of results of a user's function, found before it is compiled."""
 
 from contin.functions.signature import result_count
 

@@ -1,4 +1,4 @@
-"""What a notebook shows of a branch. The branch is that of Bratu's problem."""
+"""Tables, plots and HTML of a branch in a notebook. The branch is that of Bratu's problem."""
 
 import math
 import subprocess
