@@ -143,7 +143,7 @@ class Watch:
             return float(np.prod(values))
 
         wavenumber, parity = name
-        return TestFunction(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant, looks=3, estimated=False)
+        return TestFunction(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant, estimated=False)
 
 
 def _broken(point) -> tuple[int, str]:

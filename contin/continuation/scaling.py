@@ -85,7 +85,7 @@ def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier]
         return None
     parameters[[names.index(name) for name in system.free]] *= np.maximum(1.0, size_of_free)
     other, _ = system.with_scales(x, states * np.maximum(1.0, size), parameters)
-    return other, system.carrier(other)
+    return None if other is system else (other, system.carrier(other))
 
 
 def _given(value: float, name: str, settings: Settings) -> float:

@@ -114,7 +114,7 @@ class Algebraic(System):
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Algebraic, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
         scaled = self._with(scales=Scales(states, parameters, {"residual": np.ones(self.equations)}))
-        z = self._between_scales(scaled)(x)
+        z = self.carrier(scaled)(x)
         rows = usual(np.abs(scaled._jacobian(z)[1]).max(axis=1, initial=0.0))
         return self._with(scales=Scales(states, parameters, {"residual": rows})), z
 
@@ -124,9 +124,9 @@ class Algebraic(System):
         kept = {"free": self.free, "parameters": values, "scales": self.scales}
         return Algebraic(self.problem, **{**kept, **changes})
 
-    def _carrier(self, other: Discretization) -> Carrier:
-        """Return the function that carries vectors of unknowns to another system of this problem: a copy."""
-        return np.array
+    def carrier(self, other: Discretization) -> Carrier:
+        """Return the function that carries vectors of unknowns to another system of this problem."""
+        return self._between_scales(np.array, other)
 
     def refined(self) -> None:
         """Return None: there is no mesh."""

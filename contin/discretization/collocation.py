@@ -240,15 +240,18 @@ class Collocation(System):
 
     # --- meshes --------------------------------------------------------------------------------------------------
 
-    def _carrier(self, other: Discretization) -> Carrier:
+    def carrier(self, other: Discretization) -> Carrier:
+        """Return the function that carries vectors of unknowns from this mesh to the mesh of another system."""
         nodes = other.nodes
-        return lambda x: np.concatenate([self._interpolated(x, nodes).ravel(), x[self.state_size :]])
+        return self._between_scales(
+            lambda x: np.concatenate([self._interpolated(x, nodes).ravel(), x[self.state_size :]]), other
+        )
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Collocation, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
         rows = {"boundary": np.ones(self.problem.boundary_size), "integrals": np.ones(self.problem.integral_size)}
         scaled = self._with(scales=Scales(states, parameters, rows))
-        z = self._between_scales(scaled)(x)
+        z = self.carrier(scaled)(x)
         rows["boundary"], rows["integrals"] = scaled._row_sizes(z)
         other = self._with(scales=Scales(states, parameters, rows))
         return other, z

@@ -86,13 +86,11 @@ class System(Discretization):
         values = np.concatenate([sizes[row] for row in rows]) if rows else np.ones(batch.count)
         return ScaledBatch(batch, self.scales.states, self.scales.parameters, values)
 
-    def carrier(self, other: Any) -> Carrier:
-        """Return the function that carries vectors of unknowns to another system of this problem."""
-        return self._carrier(other) if other.scales is self.scales else self._between_scales(other)
-
-    def _between_scales(self, other: Any) -> Carrier:
+    def _between_scales(self, carry: Carrier, other: Any) -> Carrier:
+        """Return a carrier of unknowns as they are, made one to a system that may have other scales."""
+        if other.scales is self.scales:
+            return carry
         ours, theirs = self.unscaled_factors, other.unscaled_factors
-        carry = self._carrier(other)
         return lambda x: carry(x * ours) / theirs
 
     @property
@@ -103,13 +101,12 @@ class System(Discretization):
         count = self.state_size // self.scales.states.size
         return np.concatenate([np.tile(self.scales.states, count), self.free_scales])
 
-    @abstractmethod
-    def _carrier(self, other: Any) -> Carrier:
-        """Return the carrier to another system with the same scales."""
-
-    @abstractmethod
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[System, Array]:
-        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it.
+
+        Kinds of system that have no scales return themselves.
+        """
+        return self, x
 
     def parameter(self, x: Array, name: str) -> float:
         """Return the value of one parameter."""
