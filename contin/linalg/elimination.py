@@ -100,7 +100,8 @@ def whole_step(size):
 def at(matrix, i, j):
     """Return the rows of a matrix from entry (i, j) on, for vector instructions.
 
-    numba may free an array that is not used any more: ``matrix`` must be a parameter of a helper or a kernel, or a part of one.
+    numba frees an array after its last use, and does not see that an address is one: ``matrix`` must be a parameter of the
+    kernel or of a helper that is not inlined, a part of one, or used again later.
     """
     return Rows(matrix.ctypes.data + i * matrix.strides[0] + 8 * j, matrix.strides[0])
 

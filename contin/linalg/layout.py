@@ -14,7 +14,7 @@ import numpy as np
 from contin.arrays import Pattern
 from contin.functions.compiler import IndexVector, Matrix, Stack
 
-#: Problems of more states are one group. For 500 states the search for groups takes 40 ms; the time grows with the square.
+#: Problems of more states are one group. The search for groups takes up to 40 ms for 500 states, 0.6 s for 5000.
 _MOST_STATES = 500
 
 
@@ -94,7 +94,7 @@ class Layout(NamedTuple):
 
 def layout(depends: Pattern, degree: int) -> Layout:
     """Return the layout for a degree; ``depends`` (n, n) is true at (a, b) if the equation of state a contains state b."""
-    return _layout(np.ascontiguousarray(depends).tobytes(), len(depends), degree)
+    return _layout(np.ascontiguousarray(depends, dtype=bool).tobytes(), len(depends), degree)
 
 
 @functools.lru_cache(maxsize=32)  # each new mesh of a problem asks for its layout again
