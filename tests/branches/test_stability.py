@@ -23,7 +23,8 @@ def test_a_secondary_bifurcation_is_located_and_changes_the_index_by_one(branch)
     """kappa_n from the half loop, whose equations see the same point as a branch point of their own."""
     (event,) = branch.events[branch.events["label"] == b"SB"]
     assert event["kappa_n"] == pytest.approx(-21.62681748742, abs=1e-8)
-    assert event["name"] == b"wavenumber 1 even" and event["error_kappa_n"] < 1e-8
+    assert event["name"] == b"wavenumber 1 even"
+    assert np.isnan(event["error_kappa_n"])  # the index has errors of its own, which finer meshes of the state do not show
     at = int(event["point"])
     index = branch.points["index"]
     assert set(index[1:at]) == {2} and set(index[at + 1 :]) == {1} and index[0] == index[at] == -1

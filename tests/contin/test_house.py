@@ -18,8 +18,8 @@ MOST_ARGUMENTS = 8
 LONGER = {"kernel", "helper", "instruction"}
 #: One direction: a module imports from its own room and from those before it.
 ROOMS = [
-    ("errors", "arrays", "checks", "files", "names"), ("functions",), ("linalg",), ("problems",), ("discretization",), ("stepping",),
-    ("detection",), ("results",), ("continuation",), ("analysis",), ("__init__",),
+    ("errors", "arrays", "checks", "files", "names"), ("functions",), ("linalg",), ("problems",), ("discretization",),
+    ("stepping",), ("detection",), ("results",), ("continuation",), ("analysis",), ("__init__",),
 ]  # fmt: skip
 #: Libraries that one room alone imports, and the files elsewhere that may.
 KEPT = {"numba": (), "sympy": (), "llvmlite": ("linalg/vector.py",)}
