@@ -9,7 +9,6 @@ import numpy as np
 
 from branches.config import Config
 from contin import Continuation, Point, Stop
-from contin.stepping.step import predict
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import covering, thresholds
@@ -61,7 +60,7 @@ def _explained(run: Continuation, config: Config) -> Stop | None:
     margin, state, stop = convexity.margin(LAWS[config.law]), run.state, run.stop
     if margin is None or stop is None or stop.reason != "no convergence":
         return stop
-    if np.all(np.isfinite(state.system.residual(predict(state, run.settings.min_step)))):
+    if np.all(np.isfinite(state.system.residual(run.predicted(run.settings.min_step)))):
         return stop
     left = margin(state.system, state.x)
     if left > _NEARLY_CONVEX:

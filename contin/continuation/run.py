@@ -189,6 +189,10 @@ class Continuation:
         while self.stop is None:
             yield from self._advance()
 
+    def predicted(self, step: float) -> Array:
+        """Return the guess (shape (size,), of ``state.system``) from which the corrector starts at a distance ``step``."""
+        return predict(self.state, step)
+
     def _state_trial(self) -> Trial:
         """Return the state's point as a trial."""
         state = self.state
