@@ -11,6 +11,7 @@ import functools
 
 import numpy as np
 
+from contin.arrays import Array, ComplexArray
 from contin.detection.branch_point import locate_branch_point
 from contin.detection.crossings import calm, crossings, quotients
 from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
@@ -31,6 +32,10 @@ _HALVINGS = 12
 
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
 _TOGETHER = 0.1
+
+
+#: Rounds of the power method where it gives more than the one singular value that the determinant's sign tells of, or another.
+_MORE_ROUNDS = 5
 
 
 class BranchPointSearch:
@@ -55,9 +60,10 @@ class BranchPointSearch:
         before.refactor(row)
         trial.sharpen_factors(row)
         values = quotients(before.factors, trial.factors, size)
-        passing = np.abs(values[values.real < 0])
-        if len(passing):  # singular values change about evenly
-            shares = passing / (1 + passing)
+        if crossings(values)[0] != self.sign_changes:  # several, or the determinant knows better: look once more
+            values = quotients(before.factors, trial.factors, size, _MORE_ROUNDS)
+        shares = _shares(values)
+        if len(shares):
             self._share, self._spread = float(np.mean(shares)), float(np.ptp(shares))
         return crossings(values)
 
@@ -98,12 +104,33 @@ class BranchPointSearch:
         state, step = segment.state, segment.step
         count, middle = self.count[0], segment.low + self._share * (step - segment.low)
         with contextlib.suppress(ConvergenceError):
-            if self._spread < _TOGETHER:
+            if self._spread < _TOGETHER and not self._apart(middle):
                 found = locate_multiple_point(state.system, segment.guess(middle), state.row, count, segment.newton)
                 assert found.x is not None
                 at = inner(state.system, state.tangent, found.x - state.x)
                 if segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE):
                     trial = Trial.without_tangent(state.system, found.x)
                     return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
-        kernel = smallest_directions(segment.trial.factors, state.system.size)[0][:count]
+        kernel = smallest_directions(segment.trial.factors, state.system.size, count + 1)[0][:count]
         return SpecialPoint(step, "BP", "possible", segment.trial, details=MultiplePoint(count, kernel))
+
+    def _apart(self, middle: float) -> bool:
+        """Return whether the singular values pass zero at different places, as seen from halfway between the expected ones.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        segment, (count, _) = self.segment, self.count
+        there = segment.at(middle)
+        there.refactor(segment.state.row)
+        values = quotients(segment.before.factors, there.factors, segment.state.system.size)
+        passed, _ = crossings(values)
+        return 0 < passed < count or (passed == count and float(np.ptp(_shares(values))) > _TOGETHER)
+
+
+def _shares(values: ComplexArray) -> Array:
+    """Return at which part of the step singular values pass zero that change evenly, from `quotients`."""
+    passing = np.abs(values[values.real < 0])
+    shares: Array = passing / (1 + passing)
+    return shares

@@ -24,6 +24,11 @@ from contin.stepping.newton import Newton
 #: Step of the differences of G along s, and the radius on which its terms are fitted: small against one, the size of the
 #: unknowns, and large against the cube root of round-off.
 _DIFFERENCE, _RADIUS = 1e-4, 2e-2
+#: How often that radius is cut to a quarter where the coordinates do not reach as far.
+_SMALLER = 2
+#: Of a continuum of branches, G on each has a singular value of zero, found as 1e-10 and below; on a single one at the same
+#: distance it is the square of that, some 1e-4.
+_SINGULAR = 1e-7
 #: Gauss-Newton steps; it converges fast or, where there is no multiple point, not at all.
 _MOST_STEPS = 12
 #: Residual of the equations, beta and G together, above which they contradict each other: two branch points, not one.
@@ -53,7 +58,7 @@ class MultiplePoint:
     x : ndarray, shape (size,), or None
         The point, where it was located.
     tangents : tuple of ndarray
-        Unit tangents of the branches that meet there, first that of the branch it was found on; empty where none are known.
+        Unit tangents of the branches that meet there, first that of the branch it was found on; empty where it was not located.
     continuum : bool
         The branches are not isolated: a continuous symmetry turns each into a whole family.
     """
@@ -144,7 +149,7 @@ def locate_multiple_point(
 def _bordered(system: Discretization, x: Array, row: Array, dimension: int, newton: Newton) -> _Manifold:
     """Return the manifold with borders made of the null vectors at x."""
     factors = system.linearize(x, (row,))[1]
-    right, left, response = smallest_directions(factors, system.size, 3)
+    right, left, response = smallest_directions(factors, system.size, dimension + 1, 3)
     if len(right) < dimension or not np.all(np.isfinite(response)):
         raise ConvergenceError("the matrix is singular")
     u, _, vh = np.linalg.svd(response)
@@ -177,18 +182,18 @@ def _described(manifold: _Manifold, s: Array, row: Array) -> MultiplePoint:
     vectors = manifold.vectors
     basis = _orthonormal(system, vectors)
     home = row / system.weights
-    ours = np.linalg.lstsq(vectors.T, home, rcond=None)[0]
+    along = np.array([inner(system, vector, home) for vector in basis])
+    ours = along @ basis / np.linalg.norm(along)
     directions, continuum = _branch_directions(manifold, s)
     tangents = []
     for a in [] if continuum else directions:
         tangent = a @ vectors
         tangents.append(tangent / np.sqrt(inner(system, tangent, tangent)))
-    tangents.sort(key=lambda tangent: -abs(inner(system, tangent, home)))
-    if tangents:
-        tangents[0] = tangents[0] * (np.sign(inner(system, tangents[0], home)) or 1.0)
-    along = ours @ vectors
-    along = along / np.sqrt(inner(system, along, along))
-    across = _orthonormal(system, np.vstack([along, basis]))[1 : manifold.d + 1]
+    tangents.sort(key=lambda tangent: -abs(inner(system, tangent, ours)))
+    if not tangents:
+        tangents = [ours]
+    tangents[0] = tangents[0] * (np.sign(inner(system, tangents[0], ours)) or 1.0)
+    across = np.linalg.svd(along[None])[2][1:] @ basis
     return MultiplePoint(manifold.d, across, x, tuple(tangents), continuum)
 
 
@@ -200,7 +205,7 @@ def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool
     starts = random.standard_normal((_DIRECTIONS, count))
     starts = np.vstack([np.eye(count), starts / np.linalg.norm(starts, axis=1)[:, None]])
     outer, inside = (_zeros(linear, quadratic, radius, starts) for radius in _SPHERES)
-    if max(len(outer), len(inside)) > 2 * 3**manifold.d:
+    if max(len(outer), len(inside)) > 2 * 3**manifold.d or not all(_is_isolated(manifold, s, a) for a in inside):
         return [], True
     result: list[Array] = []
     for a in inside:
@@ -214,13 +219,45 @@ def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool
     return result, False
 
 
+def _is_isolated(manifold: _Manifold, s: Array, direction: Array) -> bool:
+    """Return whether the branch that leaves along a direction is a line: G has rank d on it. Without a branch, True."""
+    radius, a = _SPHERES[0], direction
+    try:
+        for _ in range(_MOST_STEPS):
+            _, beta, G = manifold.at(s + radius * a)
+            value = np.append(beta, (a @ a - 1) / 2)
+            step = np.linalg.lstsq(np.vstack([radius * G, a]), value, rcond=_ROUND_OFF)[0]
+            a = a - step
+            if np.max(np.abs(step)) < _ROUND_OFF:
+                singular = np.linalg.svd(G, compute_uv=False)
+                return bool(singular[-1] > _SINGULAR * singular[0])
+    except ConvergenceError:
+        pass
+    return True
+
+
 def _fitted(manifold: _Manifold, s: Array) -> tuple[Array, Array]:
-    """Return the terms of G of first and second order around s: shapes (d, 1 + d, 1 + d), (d, 1 + d, 1 + d, 1 + d)."""
+    """Return the terms of G of first and second order around s: shapes (d, 1 + d, 1 + d), (d, 1 + d, 1 + d, 1 + d).
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    radius = _RADIUS
+    for _ in range(_SMALLER):
+        try:
+            return _fit(manifold, s, radius)
+        except ConvergenceError:  # the coordinates do not reach as far
+            radius /= 4
+    return _fit(manifold, s, radius)
+
+
+def _fit(manifold: _Manifold, s: Array, radius: float) -> tuple[Array, Array]:
     count = len(s)
     pairs = list(itertools.combinations_with_replacement(range(count), 2))
     random = np.random.default_rng(3)
     places = random.standard_normal((2 * (count + len(pairs)), count))
-    places *= _RADIUS / np.linalg.norm(places, axis=1)[:, None]
+    places *= radius / np.linalg.norm(places, axis=1)[:, None]
     places = np.vstack([places, -places])
     values = np.array([manifold.at(s + place)[2] for place in places])
     columns = np.hstack([places, np.array([[place[i] * place[j] for i, j in pairs] for place in places])])

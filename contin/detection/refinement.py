@@ -95,8 +95,8 @@ def _again(
     """
     system, carry = finer
     if isinstance(details, MultiplePoint):
-        home = carry(details.tangents[0]) if details.tangents else carry(details.kernel[0])
-        again = locate_multiple_point(system, carry(trial.x), system.weights * home, details.dimension, newton)
+        home = system.weights * carry(details.tangents[0])
+        again = locate_multiple_point(system, carry(trial.x), home, details.dimension, newton)
         assert again.x is not None
         return Trial(system, again.x, Linearization(carry(trial.tangent), np.nan)), again
     if isinstance(details, BranchPoint) or (point.label == "BP" and point.test is None):

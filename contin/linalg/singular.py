@@ -10,19 +10,16 @@ from contin.arrays import Array
 from contin.functions.compiler import Matrix, kernel
 from contin.linalg.factors import Factors
 
-#: Singular values that are watched between two points: two that vanish together, and one more.
-_WATCHED = 3
-
-
 @functools.lru_cache(maxsize=8)
-def _random_block(count: int, size: int) -> Array:
+def random_rows(count: int, size: int) -> Array:
+    """Return rows to start an iteration from, shape (count, size), always the same: not to be written to."""
     block = np.random.default_rng(5).standard_normal((count, size))
     block.flags.writeable = False
     return block
 
 
 @kernel
-def _orthonormalize(rows: Matrix) -> None:
+def orthonormalize(rows: Matrix) -> None:
     """Make the rows orthonormal, in place: Gram-Schmidt, twice."""
     count, size = rows.shape
     for i in range(count):
@@ -40,8 +37,8 @@ def _orthonormalize(rows: Matrix) -> None:
                 rows[i, k] = rows[i, k] - product * rows[j, k] if j < i else rows[i, k] / np.sqrt(product)
 
 
-def smallest_directions(factors: Factors, size: int, rounds: int = 2) -> tuple[Array, Array, Array]:
-    """Return right and left singular vectors of the smallest singular values, as rows, by inverse iteration on a block.
+def smallest_directions(factors: Factors, size: int, count: int, rounds: int = 2) -> tuple[Array, Array, Array]:
+    """Return right and left singular vectors of the ``count`` smallest singular values, as rows, by inverse iteration on a block.
 
     It starts from random vectors, not from those of the point before: a resumed run must decide as one that was never
     interrupted.
@@ -52,11 +49,11 @@ def smallest_directions(factors: Factors, size: int, rounds: int = 2) -> tuple[A
     response : ndarray, shape (count, count)
         right J^-1 left^T: about the reciprocals of the singular values.
     """
-    right = _random_block(min(_WATCHED, size), size)
+    right = random_rows(min(count, size), size)
     for _ in range(rounds):
         left = factors.solve_transposed(right)
-        _orthonormalize(left)
+        orthonormalize(left)
         solved = factors.solve(left)
         right = solved.copy()
-        _orthonormalize(right)
+        orthonormalize(right)
     return right, left, right @ solved.T
