@@ -19,6 +19,7 @@ from .functions.gradient import gradient
 from .names import exact_text
 from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
+from .problems.variational import VariationalProblem
 from .results.branch import Branch
 from .results.point import Point, point_of
 from .results.storage import load, save
@@ -30,7 +31,7 @@ from .stepping.trial import Monitor, TestFunction, Trial
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
-    "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "basis", "cache_directory", "correct", "curve",
+    "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "VariationalProblem", "basis", "cache_directory", "correct", "curve",
     "diagram", "exact_text", "follow", "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save",
     "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

@@ -128,6 +128,11 @@ class _ExtendedStatement:
         """Functionals of the problem."""
         return self.problem.functionals
 
+    @property
+    def multipliers(self) -> tuple[str, ...]:
+        """Those of the problem."""
+        return self.problem.multipliers
+
     def batch(self, name: str) -> Batch:
         """Return functions of the problem, compiled."""
         return self.problem.batch(name)

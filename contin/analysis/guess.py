@@ -10,6 +10,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from contin import checks
+from contin.analysis.multipliers import with_guessed_multipliers
 from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
@@ -18,6 +19,7 @@ from contin.errors import ProblemError
 from contin.names import exact_text
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.variational import VariationalProblem
 from contin.results.point import Point
 
 Guess = Callable[[float], Any] | Point | Sequence[float] | tuple[Sequence[float] | Array, Any] | None
@@ -64,6 +66,8 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a or not given[-1] >= b:
             raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
     system = Collocation(problem, mesh, degree, options.free, options.parameters)
+    if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
+        return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
     states = _sampled(guess, system.nodes, len(problem.state_names))
     return system, system.pack(states, {**problem.parameters, **options.parameters})
 

@@ -14,6 +14,7 @@ from contin.discretization.mesh import MOST_INTERVALS, MeshControl
 from contin.errors import ProblemError
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.statement import with_multipliers
 from contin.results.point import Point, point_of, system_of
 from contin.stepping.newton import Newton, correct
 
@@ -64,7 +65,7 @@ def solve(
     control = MeshControl() if mesh is None else mesh
     _check_options(problem, intervals, degree, control, newton)
     _check_others(problem, others)
-    parameters, free = _checked(parameters), checks.names("free", free)
+    parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
         parameters = {**guess.parameters, **parameters}
     needed = problem.free_size - 1

@@ -13,6 +13,7 @@ not its kind.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -21,6 +22,7 @@ from contin.arrays import Array
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
+from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.detection.test_functions import fold, limits, own_test_functions, user_zeros
 from contin.detection.trivial import crossed, jumped
@@ -58,6 +60,10 @@ _NOISE = 1e-12
 _ROUNDS = 3
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
+
+
+#: The index on both sides of a special point; None where it is not defined.
+IndexChange = tuple[int | None, int | None]
 
 
 class Continuation:
@@ -112,6 +118,8 @@ class Continuation:
         general = self._general_test_functions()
         self._tests = [*general, *own]
         self._comparable = [*general, *([self._fold] if self._fold else [])]  # have the same sign on every mesh
+        self._index = index_of(self.state.system)
+        self.notes: list[str] = []
         self._resumed = state is not None
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
@@ -215,9 +223,11 @@ class Continuation:
             self.stop = self._failure(error)
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
-        for point in inspection.special_points(self._tests):
+        special = inspection.special_points(self._tests)
+        changes = self._index_changes(segment, special)
+        for point, change in zip(special, changes):
             self.stop = point.stop
-            yield self._point(point, segment.state)
+            yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return
         self.state = self._accept(segment, distance)
@@ -254,7 +264,7 @@ class Continuation:
             try:
                 segment, distance = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
-                if inspection.is_simple() or step < 2 * finest:
+                if step < 2 * finest or (inspection.is_simple() and self._is_explained(segment, inspection)):
                     return segment, inspection, distance
                 problem = ConvergenceError("several branch points in one step, or another branch at its end")
             except ConvergenceError as error:
@@ -360,6 +370,31 @@ class Continuation:
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
         )  # fmt: skip
 
+    # --- the index -----------------------------------------------------------------------------------------------
+
+    def _is_explained(self, segment: Segment, inspection: Inspection) -> bool:
+        """Return whether the special points of a step allow the change of the index over it."""
+        if self._index is None:
+            return True
+        before, after = segment.before.value(self._index), segment.trial.value(self._index)
+        return not abs(after - before) > sum(map(nullity_of, inspection.special_points(self._tests)))
+
+    def _index_changes(self, segment: Segment, special: list[SpecialPoint]) -> list[IndexChange | None]:
+        """Return the index before and after each special point of a step, and note what contradicts itself."""
+        if self._index is None or not special:
+            return [None] * len(special)
+        places = [segment.low, *(point.at for point in special), segment.step]
+        between = [segment.before, *(segment.near((a + b) / 2) for a, b in itertools.pairwise(places[1:-1])), segment.trial]
+        values = [trial.value(self._index) for trial in between]
+        whole = [None if np.isnan(value) else int(value) for value in values]
+        for point, (before, after) in zip(special, itertools.pairwise(values)):
+            if abs(after - before) > nullity_of(point) or (point.label == "LP" and after == before):
+                self.notes.append(
+                    f"the index goes from {before:g} to {after:g} at {point.label or 'a point'} {point.name} "
+                    f"({self.primary} = {point.trial[self.primary]:.10g})"
+                )
+        return [pair if nullity_of(point) else None for point, pair in zip(special, itertools.pairwise(whole))]
+
     # --- the mesh ------------------------------------------------------------------------------------------------
 
     def _adapt_mesh(self) -> None:
@@ -396,7 +431,7 @@ class Continuation:
 
     # --- results -------------------------------------------------------------------------------------------------
 
-    def _point(self, found: SpecialPoint, state: State) -> Point:
+    def _point(self, found: SpecialPoint, state: State, change: IndexChange | None = None) -> Point:
         """Return the point of a branch; a labelled one is located again on finer meshes, if errors are wanted."""
         trial, details = found.trial, found.details
         errors: Mapping[str, float] = {}
@@ -407,9 +442,11 @@ class Continuation:
             details = details if found.same_as else again.details
         system = trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
+        stability = stability_of(trial, details, found.label) if self._index is not None else Stability()
         return Point(
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
             state.arclength + found.at, trial.iterations, trial.newton_error, errors, details,
+            stability.index, stability.nullity, change, stability.breaks,
         )  # fmt: skip
 
 
@@ -417,4 +454,4 @@ def follow(system: Discretization, x: Array, settings: Settings = Settings(), ta
     """Run to the end and return the branch: `Continuation` as one call."""
     run = Continuation(system, x, settings, tangent)
     points = list(run)
-    return Branch(points, run.stop)
+    return Branch(points, run.stop, run.notes)

@@ -6,9 +6,12 @@ import functools
 from collections.abc import Mapping, Sequence
 
 from contin.detection.hopf import hopf
+from contin.detection.second_variation import legendre
 from contin.discretization.algebraic import Algebraic
+from contin.discretization.collocation import Collocation
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
+from contin.problems.variational import VariationalProblem
 from contin.stepping.trial import TestFunction
 
 
@@ -50,6 +53,11 @@ def own_test_functions(system: Discretization) -> list[TestFunction]:
     Their signs may differ between meshes.
     """
     return []
+
+
+@own_test_functions.register
+def _of_boundary_value(system: Collocation) -> list[TestFunction]:
+    return [legendre()] if isinstance(system.problem, VariationalProblem) else []
 
 
 @own_test_functions.register

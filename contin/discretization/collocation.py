@@ -119,6 +119,11 @@ class Collocation(System):
         inner = (self.mesh[:-1, None] + self._h[:, None] * self.basis.nodes[:-1]).ravel()
         return np.append(inner, self.mesh[-1])
 
+    @property
+    def gauss_times(self) -> Array:
+        """Values of t at all Gauss points, shape (N d,)."""
+        return self._times
+
     def states(self, x: Array) -> Array:
         """Return the states at the nodes, shape (N d + 1, n)."""
         states = self._scaled_states(x)

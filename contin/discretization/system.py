@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
 from contin.arrays import Array, Indices
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import ScaledBatch, Scales
 from contin.errors import ProblemError
-from contin.problems.statement import Statement
+from contin.problems.statement import Statement, with_multipliers
 
 
 class System(Discretization):
@@ -41,7 +40,7 @@ class System(Discretization):
     def __init__(
         self, problem: Statement, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None
     ) -> None:
-        self.problem, self.free = problem, checks.names("free", free)
+        self.problem, self.free = problem, with_multipliers(problem, free)
         names = tuple(problem.parameters)
         for name in (*self.free, *parameters):
             if name not in names:

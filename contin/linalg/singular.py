@@ -10,6 +10,7 @@ from contin.arrays import Array
 from contin.functions.compiler import Matrix, kernel
 from contin.linalg.factors import Factors
 
+
 @functools.lru_cache(maxsize=8)
 def random_rows(count: int, size: int) -> Array:
     """Return rows to start an iteration from, shape (count, size), always the same: not to be written to."""

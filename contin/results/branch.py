@@ -16,7 +16,7 @@ from contin.stepping.state import Stop
 
 @dataclass
 class Branch:
-    """The points of one branch in order, and why its run ended.
+    """The points of one branch in order, and why its run ended; ``notes`` tell what contradicts itself on it, if anything does.
 
     Examples
     --------
@@ -31,6 +31,7 @@ class Branch:
 
     points: list[Point] = field(default_factory=list)
     stop: Stop | None = None
+    notes: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.points)

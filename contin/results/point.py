@@ -52,6 +52,15 @@ class Point:
         location alone. NaN where the point was not found again, and at points of higher codimension.
     details : object
         What the location found besides: the `BranchPoint` of a BP, the frequency of an HB.
+    index : int or None
+        Of a state of a `VariationalProblem`: the number of independent ways to lower its energy; 0 is a minimum. None for other
+        problems, and where Legendre's condition fails.
+    nullity : int
+        At a fold or branch point, the number of ways along which the second variation vanishes; they do not count in the index.
+    index_change : pair of (int or None), optional
+        At a special point, the index before and after it, in the direction of travel.
+    breaks : tuple of str
+        At a branch point, the declared symmetries that its modes break.
     """
 
     label: str
@@ -66,6 +75,10 @@ class Point:
     newton_error: float
     errors: Mapping[str, float] = field(default_factory=dict)
     details: Any = None
+    index: int | None = None
+    nullity: int = 0
+    index_change: tuple[int | None, int | None] | None = None
+    breaks: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float:
         """Return a parameter or functional by name."""

@@ -73,6 +73,7 @@ def save(branch: Branch, path: str | Path) -> None:
             "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
             "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
             "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
+            "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
         })  # fmt: skip
     first = branch.points[0].system
     stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
@@ -139,5 +140,6 @@ def _point(row: dict[str, Any], system: Collocation | Algebraic, arrays: dict[st
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point(
         row["label"], row["name"], parameters, row["functionals"], x, arrays[f"tangent{number}"], system, row["arclength"],
-        row["iterations"], row["newton_error"], row["errors"], details,
+        row["iterations"], row["newton_error"], row["errors"], details, row.get("index"), row.get("nullity", 0),
+        None if row.get("index_change") is None else tuple(row["index_change"]), tuple(row.get("breaks", ())),
     )  # fmt: skip

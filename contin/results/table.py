@@ -22,7 +22,8 @@ def to_pandas(points: Sequence[Point]) -> Any:
     rows = [
         {
             "label": point.label, "name": point.name, "arclength": point.arclength, "intervals": point.system.intervals,
-            "iterations": point.iterations, **point.parameters, **point.functionals,
+            "iterations": point.iterations, **({} if point.index is None else {"index": point.index}), **point.parameters,
+            **point.functionals,
         }
         for point in points
     ]  # fmt: skip

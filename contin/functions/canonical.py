@@ -1,0 +1,361 @@
+"""The canonical equations of a variational problem, derived symbolically once and kept as text.
+
+With the Hamiltonian H = lambda.f - L - mu.g at the controls w that maximize it,
+
+    x' = dH/dlambda,   lambda' = -dH/dx,   0 = dH/dw,
+
+and at the ends lambda(t0) = d(Phi + sigma.e)/dx(t0), lambda(t1) = -d(Phi + sigma.e)/dx(t1). Where H is quadratic in w, the
+controls come in closed form; else from Newton's method at each point, on the convex function -H of w: with real numbers first,
+then one step with complex ones, which gives the complex step its derivative (implicit function theorem).
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from contin.arrays import Function
+from contin.errors import ProblemError
+from contin.functions import gradient
+from contin.functions.cache import cache_directory, write_source
+from contin.functions.fingerprint import contents
+
+#: Newton steps for the controls, and halvings of a step that does not lower -H. Damped steps on a convex function arrive.
+_NEWTON, _HALVINGS = 60, 40
+#: A step below this, relative to 1 + the control, is the last: the next would be its square.
+_SETTLED = 1e-9
+
+
+@dataclass(frozen=True)
+class Variation:
+    """What a variational problem is made of; as in `contin.VariationalProblem`.
+
+    ``hamiltonian`` stands instead of ``energy`` and ``kinematics``, or is None.
+    """
+
+    energy: Function | None
+    kinematics: Function | None
+    ends: Function | None
+    end_energy: Function | None
+    hamiltonian: Function | None
+    integrals: Mapping[str, Function]
+    functionals: Mapping[str, Function]
+    states: tuple[str, ...]
+    controls: tuple[str, ...]
+    parameters: tuple[str, ...]
+    starts: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Canonical:
+    """The derived functions, plain Python, and how many multipliers of end conditions there are.
+
+    ``rhs(t, u, p)``, ``boundary(u0, u1, p)``, ``integrals(t, u, p)`` or None, and ``functionals[name](t, u, p)`` take u = (x,
+    lambda) and p = (parameters, mu, sigma). ``legendre(t, u, p)`` is the smallest pivot of -d2H/dw2 (None where H is given).
+    ``fixed`` are the states that end conditions fix, at the first and at the last end.
+    """
+
+    rhs: Function
+    boundary: Function
+    integrals: Function | None
+    functionals: Mapping[str, Function]
+    legendre: Function | None
+    sigmas: int
+    fixed: tuple[tuple[int, ...], tuple[int, ...]]
+
+
+def canonical(variation: Variation) -> Canonical:
+    """Return the canonical equations of a variational problem.
+
+    Raises
+    ------
+    ProblemError
+        A function that cannot be differentiated symbolically, an energy that does not depend on a control, or end conditions
+        that repeat each other.
+    """
+    rewriter = gradient._Fingerprinted()
+    functions = [variation.energy, variation.kinematics, variation.ends, variation.end_energy, variation.hamiltonian]
+    functions += [*variation.integrals.values(), *variation.functionals.values()]
+    for function in functions:
+        rewriter.note(function is None)
+        if function is not None:
+            rewriter.function(function)
+    rewriter.note(list(variation.integrals), list(variation.functionals), variation.states, variation.controls)
+    rewriter.note(variation.parameters, variation.starts, importlib.metadata.version("sympy"))
+    rewriter.note(contents(Path(__file__), Path(str(gradient.__file__))))
+    path = cache_directory() / f"v{rewriter.fingerprint()[:32]}.py"
+    try:
+        source = path.read_text(encoding="utf-8")
+    except OSError:
+        source = _Derivation(variation).text()
+        write_source(path.name, source)
+    scope: dict[str, Any] = {"math": math, "__name__": __name__}
+    exec(compile(source, f"<canonical equations {path.stem}>", "exec"), scope)
+    return Canonical(
+        scope["rhs"], scope["boundary"], scope.get("integrals"),
+        {name: scope[f"functional{i}"] for i, name in enumerate(_columns(variation))},
+        scope.get("legendre"), scope["SIGMAS"], scope["FIXED"],
+    )  # fmt: skip
+
+
+def _columns(variation: Variation) -> list[str]:
+    """Return the names of the functionals: the energy first, unless the user states one of that name."""
+    own = list(variation.functionals)
+    return own if "energy" in own else ["energy", *own]
+
+
+class _Derivation:
+    """One derivation: symbols, expressions, and the text of the functions."""
+
+    def __init__(self, variation: Variation) -> None:
+        import sympy  # takes .3 s, and is needed the first time only
+
+        self.sympy, self.variation = sympy, variation
+        v = variation
+        self.t = sympy.Symbol("T", real=True)
+        self.x, self.y = self._symbols("X", v.states), self._symbols("Y", v.states)
+        self.lam, self.w = self._symbols("L", v.states), self._symbols("W", v.controls)
+        self.p, self.mu = self._symbols("P", v.parameters), self._symbols("M", tuple(v.integrals))
+        self.helpers: list[str] = []
+        if v.hamiltonian is not None:
+            self._from_hamiltonian()
+        else:
+            self._from_energy()
+
+    def _symbols(self, letter: str, names: Sequence[str]) -> list[Any]:
+        return [self.sympy.Symbol(f"{letter}{i}", real=True) for i in range(len(names))]
+
+    # --- the functions with symbols ------------------------------------------------------------------------------
+
+    def _called(self, what: str, function: Function, *arguments: Any) -> list[Any]:
+        """Return the values of a user's function at symbols."""
+        try:
+            result = gradient._Symbolic().function(function)(*arguments)
+            values = list(result) if isinstance(result, (tuple, list)) else [result]
+            return [self.sympy.sympify(value) for value in values]
+        except ProblemError:
+            raise
+        except Exception as error:  # sympy and a user's function may raise anything
+            reason = " ".join(str(error).split())
+            raise ProblemError(
+                f"{what} cannot be differentiated: {type(error).__name__}: {reason} (write it with arithmetic and functions of math)"
+            ) from error
+
+    def _named(self, names: Sequence[str], values: Sequence[Any]) -> Any:
+        kind: Any = namedtuple("Values", list(names))  # type: ignore[misc]  # noqa: PYI024
+        return kind(*values)
+
+    def _at(self, what: str, function: Function, count: int | None = 1) -> list[Any]:
+        """Return the values of a function of (t, x, w, p); ``count`` many of them."""
+        v = self.variation
+        values = self._called(
+            what,
+            function,
+            self.t,
+            self._named(v.states, self.x),
+            self._named(v.controls, self.w),
+            self._named(v.parameters, self.p),
+        )
+        if count is not None and len(values) != count:
+            raise ProblemError(f"{what} returns {len(values)} values, must return {count}")
+        return values
+
+    # --- H and the controls --------------------------------------------------------------------------------------
+
+    def _from_hamiltonian(self) -> None:
+        v, sympy = self.variation, self.sympy
+        named = self._named(v.states, self.x), self._named(v.states, self.lam), self._named(v.parameters, self.p)
+        assert v.hamiltonian is not None
+        (H,) = self._called("hamiltonian", v.hamiltonian, self.t, *named)
+        self.rates = [sympy.diff(H, momentum) for momentum in self.lam]
+        self.forces = [-sympy.diff(H, state) for state in self.x]
+        self.density = sum(momentum * rate for momentum, rate in zip(self.lam, self.rates)) - H
+        self.load: list[Any] = []
+        self.known = dict(zip(self.w, self.rates))  # without kinematics the controls are the rates
+
+    def _from_energy(self) -> None:
+        v, sympy = self.variation, self.sympy
+        assert v.energy is not None
+        (self.density,) = self._at("energy", v.energy)
+        rates = self.w if v.kinematics is None else self._at("kinematics", v.kinematics, len(v.states))
+        self.rates = list(rates)
+        self.load = [self._at(f"integrals: {name}", g)[0] for name, g in v.integrals.items()]
+        convex = (
+            self.density - sum(a * b for a, b in zip(self.lam, self.rates)) + sum(a * b for a, b in zip(self.mu, self.load))
+        )
+        self.forces = [sympy.diff(convex, state) for state in self.x]
+        slopes = [sympy.diff(convex, control) for control in self.w]
+        second = sympy.Matrix([[sympy.diff(slope, control) for control in self.w] for slope in slopes])
+        for name, row in zip(v.controls, second.tolist()):
+            if not any(row):
+                raise ProblemError(f"energy: its second derivative by the control {name} is zero, it must be convex in it")
+        self.pivots = self._pivots(second)
+        self.known = {}
+        if not second.free_symbols & set(self.w):
+            at_zero = sympy.Matrix(slopes).subs(dict.fromkeys(self.w, 0))
+            if second.det() == 0:
+                raise ProblemError(
+                    f"energy: it does not determine the controls {', '.join(v.controls)}: its second derivative is singular"
+                )
+            self.known = dict(zip(self.w, -second.LUsolve(at_zero)))
+        else:
+            self._newton(convex, slopes, second)
+
+    def _pivots(self, second: Any) -> list[Any]:
+        """Return the pivots of a symmetric matrix, as expressions."""
+        a, pivots = second.copy(), []
+        for i in range(a.rows):
+            pivots.append(a[i, i])
+            for j in range(i + 1, a.rows):
+                for k in range(i + 1, a.rows):
+                    a[j, k] = a[j, k] - a[j, i] * a[i, k] / a[i, i]
+        return pivots
+
+    def _newton(self, convex: Any, slopes: list[Any], second: Any) -> None:
+        """Write the helpers that find the controls."""
+        k = len(self.w)
+        pairs = [(i, j) for i in range(k) for j in range(i + 1)]
+        given = [self.t, *self.x, *self.lam, *self.p, *self.mu]
+        names = ", ".join(map(str, given))
+        values = [convex, *slopes, *(second[i, j] for i, j in pairs)]
+        self.helpers.append(self._function("pointwise", [*given, *self.w], [], values))
+        real = ", ".join(f"{name}.real" for name in map(str, given))
+        outputs = ", ".join(["E", *(f"G{i}" for i in range(k)), *(f"A{i}_{j}" for i, j in pairs)])
+        solve = _elimination(k)
+        trial = ", ".join(f"V{i}" for i in range(k))
+        lines = [f"def controls({names}):"]
+        lines += [f"    W{i} = {start!r}" for i, start in enumerate(self.variation.starts)]
+        call = f"pointwise({real}, {', '.join(map(str, self.w))})"
+        lines += [f"    {outputs} = {call}", f"    for iteration in range({_NEWTON}):", *("        " + line for line in solve)]
+        lines += [f"        slope = {' + '.join(f'G{i} * D{i}' for i in range(k))}", "        part, lower = 1.0, E"]
+        lines += [f"        for halving in range({_HALVINGS}):"]
+        lines += [f"            V{i} = W{i} + part * D{i}" for i in range(k)]
+        lines += [
+            f"            F = pointwise({real}, {trial})[0]",
+            "            if F <= E + 1e-4 * part * slope + 1e-14 * (1.0 + E * E) ** 0.5:",
+            "                break",
+            "            part = part * 0.5",
+        ]
+        lines += [f"        W{i} = W{i} + part * D{i}" for i in range(k)]
+        settled = " and ".join(f"D{i} * D{i} <= {_SETTLED**2!r} * (1.0 + W{i} * W{i})" for i in range(k))
+        lines += [f"        {outputs} = {call}", f"        if {settled}:", "            break"]
+        lines += [f"    {outputs} = pointwise({names}, {', '.join(map(str, self.w))})", *("    " + line for line in solve)]
+        lines += [f"    return ({', '.join(f'W{i} + D{i}' for i in range(k))},)", ""]
+        self.helpers.append("\n".join(lines))
+        self.search = f"{', '.join(map(str, self.w))}, = controls({names})"
+
+    # --- text ----------------------------------------------------------------------------------------------------
+
+    def _function(
+        self, name: str, arguments: Sequence[Any], head: Sequence[str], values: Sequence[Any], single: bool = False
+    ) -> str:
+        """Return the text of a function of these values, common subexpressions shared."""
+        sympy = self.sympy
+        shared, reduced = sympy.cse(list(values), symbols=sympy.numbered_symbols("Z"), optimizations="basic")
+        lines = [f"def {name}({', '.join(map(str, arguments))}):", *("    " + line for line in head)]
+        lines += [f"    {symbol} = {sympy.pycode(term)}" for symbol, term in shared]
+        result = sympy.pycode(reduced[0]) if single else "(" + ", ".join(sympy.pycode(term) for term in reduced) + ",)"
+        return "\n".join([*lines, f"    return {result}", ""])
+
+    def _of_point(self, name: str, values: Sequence[Any], single: bool = False) -> str:
+        """Return the text of a function of (t, u, p), with the controls where the values need them."""
+        v = self.variation
+        values = [value.subs(self.known, simultaneous=True) for value in map(self.sympy.sympify, values)]
+        if single and not values[0].free_symbols:
+            values[0] = values[0] + 0.0
+        head = ["T = t"]
+        head += [f"{symbol} = u.{state}" for symbol, state in zip(self.x, v.states)]
+        head += [f"{symbol} = u.lam_{state}" for symbol, state in zip(self.lam, v.states)]
+        head += self._parameters()
+        if any(value.free_symbols & set(self.w) for value in values):
+            head.append(self.search)
+        return self._function(name, ["t", "u", "p"], head, values, single)
+
+    def _parameters(self) -> list[str]:
+        v = self.variation
+        lines = [f"{symbol} = p.{name}" for symbol, name in zip(self.p, v.parameters)]
+        return lines + [f"{symbol} = p.mu_{name}" for symbol, name in zip(self.mu, v.integrals)]
+
+    def text(self) -> str:
+        """Return the module."""
+        v = self.variation
+        parts = ['"""Generated by contin; safe to delete."""', "import math", "", "", *self.helpers]
+        parts.append(self._of_point("rhs", [*self.rates, *self.forces]))
+        if self.load:
+            parts.append(self._of_point("integrals", self.load, len(self.load) == 1))
+        columns = {"energy": self.density} | {name: self._at(f"functionals: {name}", f)[0] for name, f in v.functionals.items()}
+        parts += [self._of_point(f"functional{i}", [columns[name]], single=True) for i, name in enumerate(_columns(v))]
+        if v.hamiltonian is None:
+            parts.append(self._of_point("legendre", [self._least(self.pivots)], single=True))
+        parts.append(self._boundary())
+        return "\n".join(parts)
+
+    def _least(self, values: list[Any]) -> Any:
+        return values[0] if len(values) == 1 else self.sympy.Min(*values, evaluate=False)
+
+    # --- the ends ------------------------------------------------------------------------------------------------
+
+    def _boundary(self) -> str:
+        """Return the text of the boundary conditions, with the numbers that say how they were made."""
+        v, sympy = self.variation, self.sympy
+        first, last = self._named(v.states, self.x), self._named(v.states, self.y)
+        p = self._named(v.parameters, self.p)
+        ends = [] if v.ends is None else self._called("ends", v.ends, first, last, p)
+        phi = 0 if v.end_energy is None else self._called("end_energy", v.end_energy, first, last, p)[0]
+        fixed: tuple[list[int], list[int]] = ([], [])
+        sigmas, potential = [], sympy.sympify(phi)
+        for number, value in enumerate(ends):
+            place = self._fixes(value)
+            if place is None:
+                sigma = sympy.Symbol(f"S{len(sigmas)}", real=True)
+                sigmas.append(sigma)
+                potential = potential + sigma * value
+            elif place[1] in fixed[place[0]]:
+                end, state = ("first", "last")[place[0]], v.states[place[1]]
+                raise ProblemError(f"ends: condition {number + 1} fixes {state} at the {end} end, which another one does")
+            else:
+                fixed[place[0]].append(place[1])
+        starting = [sympy.Symbol(f"K{i}", real=True) for i in range(len(v.states))]
+        ending = [sympy.Symbol(f"N{i}", real=True) for i in range(len(v.states))]
+        values = list(ends)
+        values += [starting[i] - sympy.diff(potential, x) for i, x in enumerate(self.x) if i not in fixed[0]]
+        values += [ending[i] + sympy.diff(potential, y) for i, y in enumerate(self.y) if i not in fixed[1]]
+        head = []
+        for state, a, b, k, n in zip(v.states, self.x, self.y, starting, ending):
+            head += [f"{a} = a.{state}", f"{b} = b.{state}", f"{k} = a.lam_{state}", f"{n} = b.lam_{state}"]
+        head += [*self._parameters(), *(f"{sigma} = p.sigma_{i + 1}" for i, sigma in enumerate(sigmas))]
+        facts = [f"SIGMAS = {len(sigmas)}", f"FIXED = {tuple(map(tuple, fixed))!r}", ""]
+        return "\n".join([self._function("boundary", ["a", "b", "p"], head, values), *facts])
+
+    def _fixes(self, value: Any) -> tuple[int, int] | None:
+        """Return the end and the state that a condition fixes: it has a constant slope in that one, and none in the others."""
+        own = [(end, i) for end, group in enumerate((self.x, self.y)) for i, x in enumerate(group) if value.has(x)]
+        if len(own) != 1:
+            return None
+        end, i = own[0]
+        slope = self.sympy.diff(value, (self.x, self.y)[end][i])
+        return own[0] if slope.is_number and slope != 0 else None
+
+
+def _elimination(k: int) -> list[str]:
+    """Return the lines that solve A D = -G, for a symmetric positive definite A of size k, without pivoting."""
+    lines = []
+    for i in range(k):
+        for j in range(i + 1):
+            lines.append(f"B{i}_{j} = A{i}_{j}")
+        lines.append(f"D{i} = -G{i}")
+    for i in range(k):
+        for j in range(i + 1, k):
+            lines.append(f"Q = B{j}_{i} / B{i}_{i}")
+            lines += [f"B{l}_{j} = B{l}_{j} - Q * B{l}_{i}" for l in range(j, k)]
+            lines.append(f"D{j} = D{j} - Q * D{i}")
+    for i in reversed(range(k)):
+        for j in range(i + 1, k):
+            lines.append(f"D{i} = D{i} - B{j}_{i} * D{j}")
+        lines.append(f"D{i} = D{i} / B{i}_{i}")
+    return lines
