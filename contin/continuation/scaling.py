@@ -61,7 +61,7 @@ def scaled(
     change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
     response = np.minimum(1.0, rates * change)
     size = np.maximum(size, np.where(response > noise, response, 0.0))
-    size = np.where(size > _FAINT * size.max(), size, 1.0)
+    size, free = _with_faint(system, x, size, free)
     size = np.array([known.get(name, found) for name, found in zip(states, size)])
     parameters = np.array([known.get(name, value) for name, value in zip(names, system.parameters)])
     parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, 1.0)
@@ -69,6 +69,50 @@ def scaled(
     if all(np.all(found == 1) for found in sizes):
         return system, x
     return system.with_scales(x, *sizes)
+
+
+def _with_faint(system: System, x: Array, size: Array, free: Array) -> tuple[Array, Array]:
+    """Return sizes of the states and free parameters, those of vanishing ones found from the others by the derivatives.
+
+    ``size`` (n,) and ``free`` (number of free parameters,) are 0 where nothing is known.
+    """
+    faint = size <= _FAINT * size.max()
+    if not faint.any() and free.all():
+        return size, free
+    states = x[: system.state_size].reshape(-1, len(size)) * ~faint
+    z, known = np.concatenate([states.ravel(), x[system.state_size :]]), np.concatenate([np.where(faint, 0.0, size), free])
+    found = _balanced(system, z, known)
+    balanced = found[: len(size)]
+    return np.where(faint & (size <= _FAINT * balanced), balanced, size), found[len(size) :]
+
+
+def _balanced(system: System, x: Array, sizes: Array) -> Array:
+    """Return sizes of states and free parameters with which the terms of every linearized equation are alike.
+
+    Alike in the mean of logarithms. Unknowns of the least squares are the logarithms of the sizes that are 0, and of those of
+    the equations that are no rates of states. Of unknowns that are coupled to nothing known only the ratios are determined:
+    their sizes are as near to one as they can be.
+    """
+    entries, owners = system.couplings(x)
+    unknown = np.flatnonzero(sizes == 0)
+    place = {int(j): i for i, j in enumerate(unknown)}
+    rows, values = [], []
+    for i, (row, owner) in enumerate(zip(entries, owners)):
+        for j in np.flatnonzero((row > 0) & np.isfinite(row)):
+            term, value = np.zeros(len(unknown) + len(entries)), -np.log(row[j])
+            for sign, which in ((1.0, int(j)), (-1.0, int(owner))):
+                if which < 0:
+                    term[len(unknown) + i] = sign
+                elif which in place:
+                    term[place[which]] += sign
+                else:
+                    value -= sign * np.log(sizes[which])
+            rows.append(term)
+            values.append(value)
+    found = sizes.copy()
+    if rows:
+        found[unknown] = np.exp(np.linalg.lstsq(np.array(rows), np.array(values))[0][: len(unknown)])
+    return np.where(found > 0, found, 1.0)
 
 
 def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier] | None:
