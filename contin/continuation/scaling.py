@@ -27,6 +27,8 @@ _NOISE = 1e4
 _NOTHING = 1e-10
 #: A state smaller than this part of the largest may vanish but for the error of the discretization: its size counts as one.
 _FAINT = 1e-6
+#: States without any known size are looked for within so many powers of ten around one.
+_DECADES = 12
 #: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
 _TINY = 1e-14
 
@@ -83,6 +85,8 @@ def _with_faint(system: System, x: Array, size: Array, free: Array) -> tuple[Arr
     z, known = np.concatenate([states.ravel(), x[system.state_size :]]), np.concatenate([np.where(faint, 0.0, size), free])
     found = _balanced(system, z, known)
     balanced = found[: len(size)]
+    if not np.any(known[: len(size)]):
+        balanced = balanced * _amplitude(system, z, found)
     return np.where(faint & (size <= _FAINT * balanced), balanced, size), found[len(size) :]
 
 
@@ -113,6 +117,24 @@ def _balanced(system: System, x: Array, sizes: Array) -> Array:
     if rows:
         found[unknown] = np.exp(np.linalg.lstsq(np.array(rows), np.array(values))[0][: len(unknown)])
     return np.where(found > 0, found, 1.0)
+
+
+def _amplitude(system: System, x: Array, sizes: Array) -> float:
+    """Return the power of ten by which states of these sizes must be multiplied to change the derivatives by about themselves.
+
+    One where the functions are linear. ``sizes`` are those of states and free parameters.
+    """
+    count, entries = len(sizes) - len(system.free), system.couplings(x)[0] * sizes
+    largest = entries.max(axis=1)
+    powers = 10.0 ** np.arange(-_DECADES, _DECADES + 1)
+    for factor in powers:
+        states = x[: system.state_size].reshape(-1, count) + factor * sizes[:count]
+        with np.errstate(all="ignore"):
+            there = system.couplings(np.concatenate([states.ravel(), x[system.state_size :]]))[0] * sizes
+            change = np.abs(there - entries).max(axis=1)
+        if not np.all(change[largest > 0] <= largest[largest > 0]):
+            return float(factor)
+    return 1.0
 
 
 def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier] | None:
