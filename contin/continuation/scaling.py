@@ -27,6 +27,9 @@ _NOISE = 1e4
 _NOTHING = 1e-10
 #: A state smaller than this part of the largest may vanish but for the error of the discretization: its size counts as one.
 _FAINT = 1e-6
+#: A term that the balance leaves smaller than this, relative to the others, is what cancellation has left of zero: the balance
+#: is made again without it, in so many passes.
+_CANCELLED, _PASSES = 1e-5, 3
 #: States without any known size are looked for within so many powers of ten around one.
 _DECADES = 12
 #: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
@@ -114,8 +117,12 @@ def _balanced(system: System, x: Array, sizes: Array) -> Array:
             rows.append(term)
             values.append(value)
     found = sizes.copy()
-    if rows:
-        found[unknown] = np.exp(np.linalg.lstsq(np.array(rows), np.array(values))[0][: len(unknown)])
+    matrix, wanted = np.array(rows), np.array(values)
+    for _ in range(_PASSES if rows else 0):
+        logarithms = np.linalg.lstsq(matrix, wanted)[0]
+        kept = matrix @ logarithms - wanted > np.log(_CANCELLED)
+        matrix, wanted = matrix[kept], wanted[kept]
+        found[unknown] = np.exp(logarithms[: len(unknown)])
     return np.where(found > 0, found, 1.0)
 
 
