@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray
+from contin.arrays import Array, ComplexArray, Indices
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual

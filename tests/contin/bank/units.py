@@ -8,8 +8,6 @@ functions are compiled once for all seeds. Guesses, limits, zeros and the wanted
 from __future__ import annotations
 
 import argparse
-import dataclasses
-import functools
 import importlib.util
 import sys
 import time
@@ -19,7 +17,6 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-
 from bank import case as cases
 from bank.case import TOLERANCE, Case
 

@@ -3,12 +3,12 @@
 import pytest
 from bank import units
 
-#: A boundary value problem that starts from rest, and equilibria with folds, Hopf points and branch switching. Those that compile
-#: in a second or two.
+#: A boundary value problem that starts from rest, and equilibria with folds, Hopf points and branch switching: those that
+#: compile in a second or two.
 QUICK = "exp", "dd2", "lrz", "pp2"
 SEEDS = 3
 #: Restated cases that fail: the cusp test function of this fold curve is of no one scale.
-KNOWN = "opt: folds",
+KNOWN = ("opt: folds",)
 
 
 def complaints(name, seed, stated=False):
