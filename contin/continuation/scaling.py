@@ -2,8 +2,9 @@
 
 The size of a parameter is that of its first value; where that is zero, of its smallest limit or labelled value. The size of a
 state is its largest value. For what is zero at the first point the tangent says whether it is small: a parameter, by the change
-that moves some state by its size; a state, by its response to such a change. States that do not respond get sizes from the derivatives of the functions, with which
-the terms of an equation are alike. Only sizes far from one count (`contin.discretization.scales`).
+that moves some state by its size; a state, by its response to such a change. States that do not respond get sizes from the
+derivatives of the functions, with which the terms of an equation are alike. Only sizes far from one count
+(`contin.discretization.scales`).
 """
 
 from __future__ import annotations
