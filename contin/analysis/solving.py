@@ -75,7 +75,7 @@ def solve(
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
     for _ in range(_ROUNDS):
-        done = correct_away(system, x, others, newton) if others else correct(system, x, newton=newton)
+        done = correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, unscaled=True)
         adapted = system.adapted(done.x, control)
         if adapted is None:
             break

@@ -178,10 +178,10 @@ class Continuation:
         fixed[system.parameter_index(self.primary)] = 1.0
         across = np.random.default_rng(3).standard_normal(system.size) * np.sqrt(system.weights)
         try:
-            return correct(system, x, fixed, fixed @ x, self.settings.newton).x, fixed
+            return correct(system, x, fixed, fixed @ x, self.settings.newton, unscaled=True).x, fixed
         except ConvergenceError as error:
             try:
-                return correct(system, x, across, across @ x, self.settings.newton).x, across
+                return correct(system, x, across, across @ x, self.settings.newton, unscaled=True).x, across
             except ConvergenceError:
                 raise error from None
 

@@ -2,7 +2,8 @@
 
 The size of a parameter is that of its first value; where that is zero, of its smallest limit or labelled value. The size of a
 state is its largest value. For what is zero at the first point the tangent says whether it is small: a parameter, by the change
-that moves some state by its size; a state, by its response to such a change. Only sizes far from one count
+that moves some state by its size; a state, by its response to such a change. States that do not respond get sizes from the
+derivatives of the functions, with which the terms of an equation are alike. Only sizes far from one count
 (`contin.discretization.scales`).
 """
 
@@ -27,6 +28,11 @@ _NOISE = 1e4
 _NOTHING = 1e-10
 #: A state smaller than this part of the largest may vanish but for the error of the discretization: its size counts as one.
 _FAINT = 1e-6
+#: A term that the balance leaves smaller than this, relative to the others, is what cancellation has left of zero: the balance
+#: is made again without it, in so many passes.
+_CANCELLED, _PASSES = 1e-5, 3
+#: States without any known size are looked for within so many powers of ten around one.
+_DECADES = 12
 #: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
 _TINY = 1e-14
 
@@ -61,7 +67,7 @@ def scaled(
     change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
     response = np.minimum(1.0, rates * change)
     size = np.maximum(size, np.where(response > noise, response, 0.0))
-    size = np.where(size > _FAINT * size.max(), size, 1.0)
+    size, free = _with_faint(system, x, size, free)
     size = np.array([known.get(name, found) for name, found in zip(states, size)])
     parameters = np.array([known.get(name, value) for name, value in zip(names, system.parameters)])
     parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, 1.0)
@@ -69,6 +75,74 @@ def scaled(
     if all(np.all(found == 1) for found in sizes):
         return system, x
     return system.with_scales(x, *sizes)
+
+
+def _with_faint(system: System, x: Array, size: Array, free: Array) -> tuple[Array, Array]:
+    """Return sizes of the states and free parameters, those of vanishing ones found from the others by the derivatives.
+
+    ``size`` (n,) and ``free`` (number of free parameters,) are 0 where nothing is known.
+    """
+    faint = size <= _FAINT * size.max()
+    if not faint.any() and free.all():
+        return size, free
+    states = x[: system.state_size].reshape(-1, len(size)) * ~faint
+    z, known = np.concatenate([states.ravel(), x[system.state_size :]]), np.concatenate([np.where(faint, 0.0, size), free])
+    found = _balanced(system, z, known)
+    balanced = found[: len(size)]
+    if not np.any(known[: len(size)]):
+        balanced = balanced * _amplitude(system, z, found)
+    return np.where(faint & (size <= _FAINT * balanced), balanced, size), found[len(size) :]
+
+
+def _balanced(system: System, x: Array, sizes: Array) -> Array:
+    """Return sizes of states and free parameters with which the terms of every linearized equation are alike.
+
+    Alike in the mean of logarithms. Unknowns of the least squares are the logarithms of the sizes that are 0, and of those of
+    the equations that are no rates of states. Of unknowns that are coupled to nothing known only the ratios are determined:
+    their sizes are as near to one as they can be.
+    """
+    entries, owners = system.couplings(x)
+    unknown = np.flatnonzero(sizes == 0)
+    place = {int(j): i for i, j in enumerate(unknown)}
+    rows, values = [], []
+    for i, (row, owner) in enumerate(zip(entries, owners)):
+        for j in np.flatnonzero((row > 0) & np.isfinite(row)):
+            term, value = np.zeros(len(unknown) + len(entries)), -np.log(row[j])
+            for sign, which in ((1.0, int(j)), (-1.0, int(owner))):
+                if which < 0:
+                    term[len(unknown) + i] = sign
+                elif which in place:
+                    term[place[which]] += sign
+                else:
+                    value -= sign * np.log(sizes[which])
+            rows.append(term)
+            values.append(value)
+    found = sizes.copy()
+    matrix, wanted = np.array(rows), np.array(values)
+    for _ in range(_PASSES if rows else 0):
+        logarithms = np.linalg.lstsq(matrix, wanted)[0]
+        kept = matrix @ logarithms - wanted > np.log(_CANCELLED)
+        matrix, wanted = matrix[kept], wanted[kept]
+        found[unknown] = np.exp(logarithms[: len(unknown)])
+    return np.where(found > 0, found, 1.0)
+
+
+def _amplitude(system: System, x: Array, sizes: Array) -> float:
+    """Return the power of ten by which states of these sizes must be multiplied to change the derivatives by about themselves.
+
+    One where the functions are linear. ``sizes`` are those of states and free parameters.
+    """
+    count, entries = len(sizes) - len(system.free), system.couplings(x)[0] * sizes
+    largest = entries.max(axis=1)
+    powers = 10.0 ** np.arange(-_DECADES, _DECADES + 1)
+    for factor in powers:
+        states = x[: system.state_size].reshape(-1, count) + factor * sizes[:count]
+        with np.errstate(all="ignore"):
+            there = system.couplings(np.concatenate([states.ravel(), x[system.state_size :]]))[0] * sizes
+            change = np.abs(there - entries).max(axis=1)
+        if not np.all(change[largest > 0] <= largest[largest > 0]):
+            return float(factor)
+    return 1.0
 
 
 def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier] | None:

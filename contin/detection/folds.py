@@ -28,6 +28,11 @@ _UNITS = 16
 _SHALLOW = 0.5
 #: ... and the search for a smallest rate goes on while it lowers it to this part at least.
 _DEEPER = 0.5
+#: The rate right beside a pitchfork's fold is taken at this part of the step from it. Closer, tangents are blurred; further
+#: away, another fold would be between.
+_ASIDE = 1e-2
+#: A branch point may be located this part of the step outside of it (as in `contin.detection.branch_points`).
+_OUTSIDE = 1e-6
 #: A rate at one end below this part of what it would be at the other, were the parabola's vertex at this one, is near zero.
 _BESIDE = 0.05
 
@@ -61,6 +66,7 @@ class FoldSearch:
     def __init__(self, segment: Segment, fold: TestFunction, pitchfork: Callable[[], SpecialPoint | None]) -> None:
         self.segment, self.fold, self.pitchfork = segment, fold, pitchfork
         self._index = segment.trial.system.parameter_index(fold.name)
+        self._outside = _OUTSIDE * segment.step
 
     def find(self) -> list[SpecialPoint]:
         """Return the folds inside the step, in order.
@@ -96,10 +102,28 @@ class FoldSearch:
         ends = [trial.value(self.fold) for _, trial in (left, right)]
         if max(map(abs, ends)) < _ROUND_OFF and not self._differs(left[1], right[1]):
             return []
+        fork = self.pitchfork()
+        if fork is not None and left[0] - self._outside <= fork.at <= right[0] + self._outside:
+            return self._around(fork, left, right)
         if sign_changed(*ends):
-            return [self.pitchfork() or self.segment.locate(self.fold, left, right, self.estimate(left, right))]
+            return [self.segment.locate(self.fold, left, right, self.estimate(left, right))]
         dip = self._dip(left, right)
         return [] if dip is None else self.between(left, dip) + self.between(dip, right)
+
+    def _around(self, fork: SpecialPoint, left: Place, right: Place) -> list[SpecialPoint]:
+        """Return the fold of a pitchfork between two places, and the folds before and behind it.
+
+        The rate is odd around it: where another fold is close, its mirror image is, too, and the rate at the two places has
+        the signs that it would have without both.
+        """
+        aside = _ASIDE * self.segment.step
+        sides = [s for s in (fork.at - aside, fork.at + aside) if left[0] < s < right[0]]
+        near = [(s, self.segment.at(s)) for s in sides]
+        before, behind = (near[0] if fork.at - aside > left[0] else left), (near[-1] if fork.at + aside < right[0] else right)
+        found = [fork] if sign_changed(before[1].value(self.fold), behind[1].value(self.fold)) else []
+        if before is not left:
+            found = self.between(left, before) + found
+        return found if behind is right else found + self.between(behind, right)
 
     def rate(self, trial: Trial) -> float:
         """Return the rate of the primary parameter along the state's tangent."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray
+from contin.arrays import Array, ComplexArray, Indices
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
@@ -117,6 +117,16 @@ class Algebraic(System):
         z = self.carrier(scaled)(x)
         rows = usual(np.abs(scaled._jacobian(z)[1]).max(axis=1, initial=0.0))
         return self._with(scales=Scales(states, parameters, {"residual": rows})), z
+
+    def without_scales(self, x: Array) -> tuple[Algebraic, Array]:
+        """Return the same problem in the user's units, and x for it."""
+        other = self._with(scales=None)
+        return other, self.carrier(other)(x)
+
+    def couplings(self, x: Array) -> tuple[Array, Indices]:
+        """Return sizes of derivatives of the residual; its values are no rates of states here, -1."""
+        jacobian = np.abs(self._jacobian(x)[1])
+        return jacobian, np.full(len(jacobian), -1)
 
     def _with(self, **changes: Any) -> Algebraic:
         """Return the same with other free parameters, parameters or scales."""

@@ -269,6 +269,28 @@ class Collocation(System):
         field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, n:]
         return usual(np.abs(ends).max(axis=1, initial=0.0)), usual(np.abs(field).max(axis=(0, 2), initial=0.0))
 
+    def without_scales(self, x: Array) -> tuple[Collocation, Array]:
+        """Return the same problem in the user's units, and x for it."""
+        other = self._with(scales=None)
+        return other, self.carrier(other)(x)
+
+    def couplings(self, x: Array) -> tuple[Array, Indices]:
+        """Return sizes of derivatives of the functions, and whose rate each function is.
+
+        Rows are the right-hand sides times the length of the domain, integrands, and boundary conditions, there the larger
+        derivative of both ends.
+        """
+        n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
+        of_field, of_boundary = self._colourings
+        field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1]
+        ends = np.abs(self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0])
+        field = np.abs(field).max(axis=0)
+        field[:n] *= self.mesh[-1] - self.mesh[0]
+        ends = np.concatenate([np.maximum(ends[:, :n], ends[:, n : 2 * n]), ends[:, 2 * n :]], axis=1)
+        owners = np.full(len(field) + len(ends), -1)
+        owners[:n] = np.arange(n)
+        return np.concatenate([field, ends]), owners
+
     def _with(self, **changes: Any) -> Collocation:
         """Return the same with other mesh, free parameters, parameters or scales."""
         values = dict(zip(self.problem.parameters, self.parameters))

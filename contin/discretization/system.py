@@ -107,6 +107,17 @@ class System(Discretization):
         """
         return self, x
 
+    def without_scales(self, x: Array) -> tuple[System, Array]:
+        """Return the same problem in the user's units, and x for it."""
+        return self, x
+
+    def couplings(self, x: Array) -> tuple[Array, Indices]:
+        """Return sizes of derivatives of the functions, and whose rate each function is.
+
+        Shapes (functions, states + free parameters) and (functions,): the place of a state, or -1. Without scales.
+        """
+        return np.empty((0, 0)), np.empty(0, dtype=np.int64)
+
     def parameter(self, x: Array, name: str) -> float:
         """Return the value of one parameter."""
         return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])

@@ -31,6 +31,11 @@ _ROUND_OFF = 1e-9
 #: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: then a
 #: few steps reach round-off, where slower ones would take as long as a factorization.
 _CLOSE = 0.03
+#: Where Newton's method fails, the last update counts as round-off below so many times what one unit in the last place of x
+#: makes, in so many draws of its signs. Ten times fewer would not suffice on meshes of many intervals.
+_UNITS, _DRAWS = 30, 3
+#: A larger update is not taken for round-off in any case. Ten times larger, a matrix that is singular could pass.
+_COARSE = 1e-3
 #: An update of a few units in the last place: with it x solves the equations as well as any number can.
 _EXACT = 1e-15
 
@@ -80,6 +85,7 @@ def correct(
     target: Any = 0.0,
     newton: Newton = Newton(),
     factors: Factors | None = None,
+    unscaled: bool = False,
 ) -> Corrected:
     """Solve F(x) = 0 and row.x = target, starting from ``guess``.
 
@@ -92,6 +98,8 @@ def correct(
         The linear condition; without it F = 0 must be square.
     factors : optional
         A factorization from near by: tried first, for as long as it converges fast.
+    unscaled : bool
+        The sizes of the unknowns are not known yet: updates that are as small as round-off of x allows count as converged.
 
     Raises
     ------
@@ -108,10 +116,12 @@ def correct(
     if factors is not None:
         with contextlib.suppress(ConvergenceError):
             return _chords(system, guess, row, target, newton, factors)
-    return _newton(system, guess, row, target, newton)
+    return _newton(system, guess, row, target, newton, unscaled)
 
 
-def _newton(system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton) -> Corrected:
+def _newton(
+    system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, unscaled: bool
+) -> Corrected:
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
     rows = () if row is None else (row,)
     x, progress = np.array(guess, dtype=float), _Progress(newton.tolerance)
@@ -142,7 +152,26 @@ def _newton(system: Equations, guess: Sequence[float] | Array, row: Array | None
                 break
             if progress.wants_jacobian:
                 factors = None
+        if unscaled and _is_noise(system, x, update, rows):
+            return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), progress.sizes[-1])
     raise _failure(progress.sizes)
+
+
+def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...]) -> bool:
+    """Return whether an update is no larger than round-off of x makes it.
+
+    With unknowns of very different sizes, round-off of the large ones reaches the small ones.
+    """
+    residual, factors = system.linearize(x, rows)
+    if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(update))):
+        return False
+    random, noise = np.random.default_rng(5), np.zeros_like(x)
+    for _ in range(_DRAWS):
+        rounded = x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), x.size))
+        change = np.append(system.residual(rounded) - residual, np.zeros(len(rows)))
+        noise = np.maximum(noise, np.abs(factors.solve(change)))
+    level = float(np.max(noise / (1 + np.abs(x))))
+    return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(_UNITS * level, _COARSE))
 
 
 class _Progress:

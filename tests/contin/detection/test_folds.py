@@ -106,3 +106,21 @@ def test_one_cubic_inflection_is_no_fold():
     system = cubic(-1e-10)
     start = solve(system.problem, [-1.0], {"mu": -1 / 3 - 1e-10, "square": -1e-10})
     assert labels(trace(start, free=["mu"], limits={"mu": (-1, 1)})) == ["EP"]
+
+
+@pytest.mark.parametrize("apart", [0.003, 0.01, 0.026, 0.0485, 0.1, 0.3])
+@pytest.mark.parametrize("step", [0.05, 0.3, 1.0])
+def test_folds_on_both_sides_of_a_pitchfork(apart, step):
+    """a = 2 d^2 x^2 - x^4 crosses x = 0 between folds at x = -+d: all three turning points may lie in one step."""
+    problem = AlgebraicProblem(
+        lambda u, p: (u.x * (p.a - 2 * p.d**2 * u.x**2 + u.x**4),), ["x"], {"a": 0.0, "d": 0.1},
+        functionals={"X": lambda u, p: u.x}, dynamics=False,
+    )  # fmt: skip
+    start = solve(problem, [1.0], {"a": 2 * apart**2 - 1, "d": apart})
+    through = trace(start, free=["a"], step=step, limits={"X": (-1.01, 2)})
+    assert labels(through) == ["LP", "BP", "LP", "EP"]
+    ended = trace(start, free=["a"], step=step, trivial="X")
+    assert labels(ended) == ["LP", "EP"]
+    for point in (*through.labelled("LP"), *ended.labelled("LP")):
+        assert point["a"] == pytest.approx(apart**4, abs=1e-12)
+        assert abs(point["X"]) == pytest.approx(apart, abs=1e-7)
