@@ -8,7 +8,7 @@ from bank.case import SELDOM, bank, check
 
 BOUNDARY_VALUE_PROBLEMS = "exp", "int", "bvp", "lin", "non", "ezp", "ext", "spb", "kar", "bru", "pd2"
 ALGEBRAIC_PROBLEMS = "cusp", "ab", "abc", "enz", "dd2", "lrz", "pp2", "opt"
-#: Fewer estimates than these say nothing about how many are far too large (another worker has the others, or one test was chosen).
+#: Fewer estimates say nothing about how many are far too large (another worker has the others, or one test was chosen).
 ENOUGH = 100
 
 
