@@ -18,11 +18,11 @@ def follow(problem, start, free, limits, **more):
     return trace(solve(problem, start, more.pop("at", None)), free=[free], limits=limits, **more)
 
 
-def switch(trunk, which, free, limits, sign=1):
-    """The half of a branch that leaves branch point number ``which`` of a run; ``sign`` is that of its first state's change."""
+def switch(trunk, which, free, limits, state=0, sign=1):
+    """The half of a branch that leaves branch point number ``which`` of a run with this sign of a state's change."""
     point = trunk().labelled("BP")[which]
-    first = point.details.tangents[1][0]
-    return trace(point, branch=1, direction=1 if first * sign > 0 else -1, free=[free], limits=limits)
+    change = point.details.tangents[1][state]
+    return trace(point, branch=1, direction=1 if change * sign > 0 else -1, free=[free], limits=limits)
 
 
 # --- FitzHugh & Nagumo (AUTO demo ``fhn``): a = x (1 - b) ... Hopf points where the trace vanishes ---------------------
@@ -175,7 +175,6 @@ def gray(y, f=0.03):
 
 
 # --- oxidation of CO (Bykov, Yablonskii & Kim 1978; the tutorial example of MatCont) ------------------------------------
-# Published there: folds at 1.050992 and 1.042405, Hopf points at 1.051556 and 1.040... (q2)
 
 
 def bykov_residual(u, p):
@@ -265,7 +264,7 @@ def lake(x):
     return (x, y), (0.24 * x / (0.6 + x) - 0.15) * (y**2 + 0.25) / y
 
 
-# --- Chua's circuit (AUTO demo ``chu``), smooth diode; Hopf points of the origin in closed form --------------------------
+# --- Chua's circuit (AUTO demo ``chu``), smooth diode: at alpha = 0 every x is an equilibrium --------------------------------
 
 
 def diode(x):
@@ -274,7 +273,7 @@ def diode(x):
 
 
 CHUA = AlgebraicProblem(
-    lambda u, p: (p.alpha * (u.y - diode(u.x)), u.x - u.y + u.z, -p.beta * u.y), ["x", "y", "z"], {"alpha": 1.0, "beta": 14.3}
+    lambda u, p: (p.alpha * (u.y - diode(u.x)), u.x - u.y + u.z, -p.beta * u.y), ["x", "y", "z"], {"alpha": -1.0, "beta": 14.3}
 )
 
 
@@ -317,17 +316,17 @@ def control(x):
 
 LAYER = AlgebraicProblem(
     lambda u, p: (
-        p.s0 - u.s - p.rho * u.s * u.a / (1 + u.s + 0.1 * u.s**2),
-        0.2 * (500 - u.a) - p.rho * u.s * u.a / (1 + u.s + 0.1 * u.s**2),
+        p.s0 - u.s - p.rho * u.s * u.a / (1 + u.s + u.s**2),
+        0.2 * (500 - u.a) - p.rho * u.s * u.a / (1 + u.s + u.s**2),
     ),
     ["s", "a"],
-    {"s0": 0.0, "rho": 0.1},
+    {"s0": 0.0, "rho": 0.5},
     functionals={"s": lambda u, p: u.s},
 )
 
 
-def layer(s, rho=0.1):
-    rate = rho * s / (1 + s + 0.1 * s**2)
+def layer(s, rho=0.5):
+    rate = rho * s / (1 + s + s**2)
     a = 100 / (0.2 + rate)
     return (s, a), s + rate * a
 
@@ -412,9 +411,6 @@ def langford(z):
     return (0 * z, 0 * z, z), z**3 / 3 - z
 
 
-# --- heat and mass waves (AUTO demo ``wav``) without diffusion: equilibria in a --------------------------------------------
-
-
 CASES = [
     Case("FitzHugh-Nagumo", lambda: follow(FITZHUGH, [0.0, 0.0], "a", {"a": (-1, 2)}),
          equilibria(FITZHUGH, "a", fitzhugh, 0.0, zeros(lambda x: fitzhugh(x)[1] - 2, 0, 4)[0])),
@@ -432,8 +428,9 @@ CASES = [
     Case("Gray-Scott", lambda: follow(GRAY, [0.03, 0.97], "k", {"k": (-0.02, 0.1)}),
          equilibria(GRAY, "k", gray, *(zeros(lambda y, k=k: gray(y)[1] - k, *ends)[0]
                                        for k, ends in ((0, (0.5, 1)), (-0.02, (0.001, 0.1)))))),
-    Case("CO oxidation", lambda: follow(BYKOV, [0.003, 0.7, 0.2], "q2", {"q2": (0.4, 2)}, direction=1),
-         []),
+    Case("CO oxidation", lambda: follow(BYKOV, [0.23, 0.05, 0.52], "q2", {"q2": (0.4, 2)}),
+         equilibria(BYKOV, "q2", bykov, *(zeros(lambda x, q=q: bykov(x)[1] - q, *ends)[0]
+                                          for q, ends in ((0.5, (0.2, 0.3)), (2, (0.001, 0.01)))))),
     Case("prey alone", prey, [Special("BP", {"K": 1.0, "x": 1.0, "y": 0.0}), Special("EP", {"K": 5.0, "x": 5.0, "y": 0.0})]),
     Case("prey and predator", lambda: switch(prey, 0, "K", {"K": (0.2, 5), "y": (-0.5, 3)}, sign=1),
          [Special("HB", {"K": 3.0, "x": 1.0, "y": 4 / 3, "frequency": 3 ** -0.5}, ERROR),
@@ -441,16 +438,19 @@ CASES = [
     Case("food chain: 1", first_of_chain, [Special("BP", {"p1": 0.75, "x": 1.0, "z": 0.0}), Special("EP", {"p1": 1.0})]),
     Case("food chain: 2", second_of_chain,
          equilibria(CHAIN, "p1", two_of_chain, 1e-9, zeros(lambda y: two_of_chain(y)[1], 0.2, 0.25)[0])),
-    Case("food chain: 3", lambda: switch(second_of_chain, 0, "p1", {"p1": (0, 1.2), "z": (-0.1, 1)}), []),
-    Case("lake", lambda: follow(LAKE, [5.7, 0.5], "gf", {"gf": (0.0, 0.2)}), []),
-    Case("Chua's origin", lambda: follow(CHUA, [0.0, 0.0, 0.0], "alpha", {"alpha": (0.5, 12)}),
-         equilibria(CHUA, "alpha", origin_of_chua, 1.0, 12.0)),
+    Case("food chain: 3", lambda: switch(second_of_chain, 1, "p1", {"p1": (0, 1.2), "z": (-0.1, 1)}, state=2),
+         equilibria(CHAIN, "p1", three_of_chain, 1e-9, 13 / 36)),
+    Case("lake", lambda: follow(LAKE, [6.0, 0.17], "gf", {"gf": (-0.1, 0.2)}, direction=-1, at={"gf": 0.11}),
+         equilibria(LAKE, "gf", lake, *(zeros(lambda x, g=g: lake(x)[1] - g, *ends)[0]
+                                        for g, ends in ((0.11, (5.9, 6)), (-0.1, (0.3, 0.6)))))),
+    Case("Chua's origin", lambda: follow(CHUA, [0.0, 0.0, 0.0], "alpha", {"alpha": (-2, 5)}),
+         equilibria(CHUA, "alpha", origin_of_chua, -1.0, 5.0)),
     Case("tor's origin", lambda: follow(OSCILLATOR, [0.0, 0.0, 0.0], "nu", {"nu": (-1, 1)}),
          equilibria(OSCILLATOR, "nu", origin_of_oscillator, -0.95, 1.0)),
     Case("vibration control", lambda: follow(CONTROL, [1.5, 0.75, 1.5], "p3", {"p3": (0, 2)}, direction=-1),
          equilibria(CONTROL, "p3", control, 1.5, 0.0)),
-    Case("substrate and oxygen", lambda: follow(LAYER, [0.0, 500.0], "s0", {"s0": (-10, 150)}),
-         equilibria(LAYER, "s0", layer, 0.0, zeros(lambda s: layer(s)[1] - 150, 0, 150)[0])),
+    Case("substrate and oxygen", lambda: follow(LAYER, [0.0, 500.0], "s0", {"s0": (-10, 80)}),
+         equilibria(LAYER, "s0", layer, 0.0, zeros(lambda s: layer(s)[1] - 80, 0, 80)[0])),
     Case("genetic switch", even, [Special("BP", {"alpha": 2.0, "u": 1.0}), Special("EP", {"alpha": 5.0}, ERROR)]),
     Case("genetic switch: on", lambda: switch(even, 0, "alpha", {"alpha": (0, 5), "u": (0.01, 10)}),
          [Special("EP", {"alpha": 5.0, "u": (5 + 21**0.5) / 2}, ERROR)]),
