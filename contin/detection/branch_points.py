@@ -1,7 +1,7 @@
 """Branch points inside a step: how many there are, and where.
 
 A branch point changes the sign of the determinant of [F_x; row]; more of them are seen in how the smallest singular values
-change (`contin.detection.crossings`). Both must agree: a sign that stays while one singular value passes is a second one unseen.
+change (`contin.detection.crossings`). Both must agree: where the sign stays and one value passes, another did unseen.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _OUTSIDE = 1e-6
 _OFF = 0.1
 #: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is "possible".
 _HALVINGS = 12
-#: Rounds of inverse iteration where the determinant's sign contradicts the count after two: singular values of similar size were
-#: mixed. An error shrinks by their ratio squared in a round; ten times more cost a second, and steps are divided instead.
+#: Rounds of inverse iteration where the determinant's sign contradicts the count after two: singular values of similar size
+#: were mixed. A round reduces the error by their ratio squared; ten times as many would save few of the divided steps.
 _MORE_ROUNDS = 8
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
 _TOGETHER = 0.1
