@@ -82,7 +82,7 @@ PLATES = AlgebraicProblem(
 
 
 def pull_in():
-    return trace(solve(PLATES, [0.0]), free=["lam"], limits={"lam": (-0.01, 1)})
+    return trace(solve(PLATES, [0.0]), free=["lam"], limits={"lam": (-0.01, 1), "x": (-0.1, 0.9)})
 
 
 # --- outbreaks of the budworm (Ludwig, Jones & Holling 1978): folds r = 2 x^3 / (1 + x^2)^2, q = 2 x^3 / (x^2 - 1) -------
@@ -105,8 +105,13 @@ def outbreak():
 
 
 def refuge():
-    """From the fold at x = 1.23 towards the cusp at x = sqrt(3), q = 3 sqrt(3), and on to q = 10 at the other fold."""
-    return curve(outbreak().labelled("LP")[0], "q", direction=1, limits={"q": (1, 10.5)})
+    """From the fold at q = 10 to the cusp at x = sqrt(3), q = 3 sqrt(3), and on to q = 10.5 with the other fold."""
+    return curve(outbreak().labelled("LP")[0], "q", direction=-1, limits={"q": (1, 10.5)})
+
+
+def other_fold(q):
+    (x,) = zeros(lambda x: 2 * x**3 / (x**2 - 1) - q, 3**0.5 + 0.1, 20.0)
+    return 2 * x**3 / (1 + x**2) ** 2
 
 
 # --- a ring of four bistable cells: from zero, modes with 0, 1 (twice) and 2 waves at 0, 2 d, 4 d; d = 1/2 ---------------
@@ -244,11 +249,12 @@ CASES = [
         Special("EP", {"eps": 0.2, "load": buckling_load(0.2)}, ERROR),
     ]),
     Case("switch", pull_in, [
-        Special("LP", {"lam": 4 / 27, "x": 1 / 3}), Special("LP", {"lam": 0.0, "x": 1.0}),
-        Special("EP", {"lam": 1.0}),
+        Special("LP", {"lam": 4 / 27, "x": 1 / 3}), Special("EP", {"lam": 0.9 * 0.1**2, "x": 0.9}),
     ]),
     Case("budworm", outbreak, equilibria(BUDWORM, "r", budworm, 0.0, zeros(lambda x: budworm(x)[1] - 1, 0, 9.9)[-1])),
-    Case("budworm: folds", refuge, []),
+    Case("budworm: folds", refuge, [
+        Special("CP", {"q": 27**0.5, "r": 27**0.5 / 8}, ERROR), Special("EP", {"q": 10.5, "r": other_fold(10.5)}, ERROR),
+    ]),
     Case("ring of four", ring, [*(Special("BP", {"lam": x}) for x in (0.0, 1.0, 2.0)), Special("EP", {"lam": 3.0})]),
     Case("Duffing's resonance", resonance, [*resonance_folds(), Special("EP", {"w": 5.0})]),
     Case("grid of 3 x 3", grid, coarse()),

@@ -5,9 +5,8 @@ The true errors of the same runs are compared with the error estimates.
 
 import pytest
 from bank.case import SELDOM, bank, check
+from bank.table import BANK, OUTSIDE
 
-BOUNDARY_VALUE_PROBLEMS = "exp", "int", "bvp", "lin", "non", "ezp", "ext", "spb", "kar", "bru", "pd2"
-ALGEBRAIC_PROBLEMS = "cusp", "ab", "abc", "enz", "dd2", "lrz", "pp2", "opt"
 #: Fewer estimates say nothing about how many are far too large (another worker has the others, or one test was chosen).
 ENOUGH = 100
 
@@ -18,7 +17,7 @@ def estimates():
     return []
 
 
-@pytest.mark.parametrize("case", bank(*BOUNDARY_VALUE_PROBLEMS, *ALGEBRAIC_PROBLEMS))
+@pytest.mark.parametrize("case", bank(*BANK, *OUTSIDE))
 def test_special_points_and_their_error_estimates(case, estimates):
     estimates += check(case)
 
