@@ -1,7 +1,7 @@
 """Values of radial problems by shooting: ``python -m bank.shooting`` (from tests/contin, half a minute) prints them.
 
-v'' + k v' / x = -f(v) with v(0) = top and v'(0) = 0 reaches its boundary value at x = X(top): after scaling to the unit interval
-lam = X^2. Folds are where dv/dtop vanishes as well. Integrated by scipy's DOP853 with tolerances of 1e-13 together with the
+v'' + k v' / x = -f(v) with v(0) = top and v'(0) = 0 reaches its boundary value at x = X(top), so lam = X^2 on the unit
+interval. Folds are where dv/dtop vanishes as well. Integrated by scipy's DOP853 with tolerances of 1e-13 together with the
 equation of dv/dtop; values are good to 1e-11.
 """
 

@@ -170,7 +170,7 @@ def resonance_folds():
     return sorted(found, key=lambda special: -special.values["w"])
 
 
-# --- Bratu's problem on a square grid of 3 x 3 points: one fold, and branch points of the coarse grid only ---------------
+# --- Bratu's problem on a square grid of 3 x 3 points: one fold, and no branch point up to 8 in the middle ----------------
 
 
 def grid_residual(u, p, out):
