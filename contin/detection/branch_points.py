@@ -26,6 +26,9 @@ from contin.stepping.trial import Trial, sign_changed
 _OUTSIDE = 1e-6
 #: A branch point further off the cubic than this part of the step is another one.
 _OFF = 0.1
+#: A branch point that the curve passes at a larger distance is none: the branches do not cross. A mesh that is not symmetric
+#: parts them by the root of its error; ten times smaller, such branch points of coarse meshes would be lost.
+_GAP = 1e-2
 #: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is "possible".
 _HALVINGS = 12
 #: Rounds of inverse iteration where the determinant's sign contradicts the count after two: singular values of similar size
@@ -87,7 +90,7 @@ class BranchPointSearch:
                 found = locate_branch_point(state.system, segment.guess(middle), segment.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
                 inside = segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
-                if inside and segment.distance(found.x, at) < _OFF * step:
+                if inside and found.gap < _GAP and segment.distance(found.x, at) < _OFF * step:
                     found = found.along(state.system, trial.x - state.x)
                     return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:

@@ -432,7 +432,7 @@ CASES = [
          equilibria(BYKOV, "q2", bykov, *(zeros(lambda x, q=q: bykov(x)[1] - q, *ends)[0]
                                           for q, ends in ((0.5, (0.2, 0.3)), (2, (0.001, 0.01)))))),
     Case("prey alone", prey, [Special("BP", {"K": 1.0, "x": 1.0, "y": 0.0}), Special("EP", {"K": 5.0, "x": 5.0, "y": 0.0})]),
-    Case("prey and predator", lambda: switch(prey, 0, "K", {"K": (0.2, 5), "y": (-0.5, 3)}, sign=1),
+    Case("prey and predator", lambda: switch(prey, 0, "K", {"K": (0.2, 5), "y": (-0.5, 3)}, state=1),
          [Special("HB", {"K": 3.0, "x": 1.0, "y": 4 / 3, "frequency": 3 ** -0.5}, ERROR),
           Special("EP", {"K": 5.0, "x": 1.0, "y": 1.6}, ERROR)]),
     Case("food chain: 1", first_of_chain, [Special("BP", {"p1": 0.75, "x": 1.0, "z": 0.0}), Special("EP", {"p1": 1.0})]),

@@ -53,7 +53,7 @@ def complaint(case) -> str:
     """Return one line that says how a run differs from its reference; empty if it does not."""
     try:
         branch = case.run()
-    except contin.ContinError as error:
+    except (contin.ContinError, LookupError) as error:  # a point to start from is missing, too
         return f"{type(error).__name__}: {error}"
     found, wanted = cases.labelled(branch), case.specials
     if branch.stop.reason == "max points":
