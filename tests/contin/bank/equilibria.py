@@ -130,18 +130,18 @@ def lorenz84(x, g=0.25):
     return (x, y, z), x + 4 * g**2 / size
 
 
-# --- Roessler (1976): x = a y', fold at c^2 = 4 a b ---------------------------------------------------------------------
+# --- Roessler (1976): x = a y', fold at c^2 = 4 a b; with a = b a Hopf point lies right there ----------
 
 ROESSLER = AlgebraicProblem(
     lambda u, p: (-u.y - u.z, u.x + p.a * u.y, p.b + u.z * (u.x - p.c)),
     ["x", "y", "z"],
-    {"a": 0.2, "b": 0.2, "c": 5.0},
+    {"a": 0.2, "b": 0.3, "c": 5.0},
     functionals={"x": lambda u, p: u.x},
 )
 
 
 def roessler(z):
-    return (0.2 * z, -z, z), 0.2 * z + 0.2 / z
+    return (0.2 * z, -z, z), 0.2 * z + 0.3 / z
 
 
 # --- glycolysis (Sel'kov 1968; Strogatz, section 7.3): Hopf points at b^2 = (1 - 2 a -+ sqrt(1 - 8 a)) / 2 ---------------
@@ -421,7 +421,7 @@ CASES = [
     Case("Lorenz 1984", lambda: follow(LORENZ84, [0.0, 0.25, 0.0], "F", {"F": (-1, 3), "x": (-1, 3)}),
          equilibria(LORENZ84, "F", lorenz84, zeros(lambda x: lorenz84(x)[1], -0.5, 0.1)[-1],
                     zeros(lambda x: lorenz84(x)[1] - 3, 0, 4)[0])),
-    Case("Roessler", lambda: follow(ROESSLER, [0.01, -0.04, 0.04], "c", {"c": (-1, 10)}, direction=-1),
+    Case("Roessler", lambda: follow(ROESSLER, [0.01, -0.06, 0.06], "c", {"c": (-1, 10)}, direction=-1),
          equilibria(ROESSLER, "c", roessler, *(zeros(lambda z, c=c: roessler(z)[1] - c, *ends)[0]
                                                for c, ends in ((5, (0.01, 0.9)), (10, (2, 60)))))),
     Case("Selkov", lambda: follow(SELKOV, [0.1, 1.0], "b", {"b": (0, 2)}), equilibria(SELKOV, "b", selkov, 0.1, 2.0)),
