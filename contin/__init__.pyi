@@ -31,7 +31,7 @@ from .stepping.trial import Monitor, TestFunction, Trial
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
-    "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "VariationalProblem", "basis", "cache_directory", "correct", "curve",
-    "diagram", "exact_text", "follow", "gradient", "interpolation", "load", "locate_branch_point", "point_of", "save",
-    "sensitivities", "solve", "temporary_name", "trace", "write_whole",
+    "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "VariationalProblem", "basis", "cache_directory",
+    "correct", "curve", "diagram", "exact_text", "follow", "gradient", "interpolation", "load", "locate_branch_point",
+    "point_of", "save",    "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

@@ -64,6 +64,12 @@ class BranchPoint:
     hessian: Array
     imperfection: float
 
+    @property
+    def gap(self) -> float:
+        """Distance at which the curve beta = 0, a hyperbola near by, passes the branch point: zero where it is perfect."""
+        largest = float(np.max(np.abs(np.linalg.eigvalsh(self.hessian))))
+        return float(np.sqrt(2 * self.imperfection / largest)) if largest > 0 else 0.0
+
     def along(self, system: Discretization, direction: Array) -> BranchPoint:
         """Return the same branch point with its tangents in order: first the one nearest to ``direction``, with its sense."""
         cosines = [inner(system, tangent, direction) for tangent in self.tangents]

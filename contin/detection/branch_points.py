@@ -1,7 +1,7 @@
 """Branch points inside a step: how many there are, and where.
 
 A branch point changes the sign of the determinant of [F_x; row]; more of them are seen in how the smallest singular values
-change (`contin.detection.crossings`).
+change (`contin.detection.crossings`). Both must agree: where the sign stays and one value passes, another did unseen.
 """
 
 from __future__ import annotations
@@ -26,16 +26,17 @@ from contin.stepping.trial import Trial, sign_changed
 _OUTSIDE = 1e-6
 #: A branch point further off the cubic than this part of the step is another one.
 _OFF = 0.1
+#: A branch point that the curve passes at a larger distance is none: the branches do not cross. A mesh that is not symmetric
+#: parts them by the root of its error; ten times smaller, such branch points of coarse meshes would be lost.
+_GAP = 1e-2
 #: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is "possible".
 _HALVINGS = 12
-
-
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
 _TOGETHER = 0.1
 
 
 #: Rounds of the power method where it gives more than the one singular value that the determinant's sign tells of, or another.
-_MORE_ROUNDS = 5
+_MORE_ROUNDS = 8
 
 
 class BranchPointSearch:
@@ -65,7 +66,12 @@ class BranchPointSearch:
         shares = _shares(values)
         if len(shares):
             self._share, self._spread = float(np.mean(shares)), float(np.ptp(shares))
-        return crossings(values)
+        count, clear = crossings(values)
+        return count, clear and self._agrees(values)
+
+    def _agrees(self, values: ComplexArray) -> bool:
+        """Return whether the number of singular values that pass zero is odd where the determinant's sign changes."""
+        return (crossings(values)[0] % 2 == 1) == self.sign_changes
 
     @property
     def sign_changes(self) -> bool:
@@ -84,7 +90,7 @@ class BranchPointSearch:
                 found = locate_branch_point(state.system, segment.guess(middle), segment.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
                 inside = segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
-                if inside and segment.distance(found.x, at) < _OFF * step:
+                if inside and found.gap < _GAP and segment.distance(found.x, at) < _OFF * step:
                     found = found.along(state.system, trial.x - state.x)
                     return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:

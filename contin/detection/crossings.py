@@ -22,7 +22,10 @@ _KEPT = 0.9
 #: A singular value that changes by less than this factor stays about as it is. Where one of those watched does, all that change
 #: more are watched, too.
 _STEADY = 3.0
-#: A singular value that ends this many times smaller vanishes at the very end of the step, on neither side for certain.
+#: Factor by which a watched singular value may shrink in one step without passing zero: one that ends close to zero may pass
+#: it in the next step twice, and come back. Without this, two branch points of the test bank are lost.
+_SHRINKS = 20.0
+#: One that passes zero and ends this many times smaller vanishes at the very end of the step, on neither side for certain.
 _VANISHES = 1e4
 #: Up to this change no singular value comes near zero, and factors of an iterate close by do as well. A fifth of it costs 10 %
 #: more factorizations on the test bank, twice as much saves 0.5 %.
@@ -85,7 +88,8 @@ def calm(values: ComplexArray) -> bool:
 def crossings(values: ComplexArray) -> tuple[int, bool]:
     """Return how many singular values pass zero, from `quotients`, and whether that is clear.
 
-    It is not where one of them is almost zero at the end.
+    It is not where one of them is close to zero at the end.
     """
     passed = (values.real < 0) & (np.abs(values.imag) < np.abs(values.real))
-    return int(np.count_nonzero(passed)), bool(np.all(np.abs(values) < _VANISHES))
+    clear = np.abs(values) < np.where(passed, _VANISHES, _SHRINKS)
+    return int(np.count_nonzero(passed)), bool(np.all(clear))

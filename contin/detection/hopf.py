@@ -64,6 +64,11 @@ def _is_complex(values: ComplexArray) -> Any:
     return values.imag > _REAL * (1 + np.abs(values))
 
 
+def _half_plane(values: ComplexArray) -> Any:
+    """Return 1 for an eigenvalue above the real axis, -1 below it, 0 on it."""
+    return np.where(np.abs(values.imag) > _REAL * (1 + np.abs(values)), np.sign(values.imag), 0.0)
+
+
 def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the Hopf points between places of a step, in order."""
     inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
@@ -94,11 +99,11 @@ def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
 def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
     """Return the Hopf points between two places."""
     first, last = _changes(left[1], right[1])
-    one, other = _is_complex(first), _is_complex(last)
-    if not np.any(one | other):
+    one, other = _half_plane(first), _half_plane(last)
+    if not (np.any(one) or np.any(other)):
         return []
     if np.all(one == other):
-        found = [_located(segment, left, right, pair) for pair in zip(first[one], last[one])]
+        found = [_located(segment, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
         if all(_pairs_at(point) >= _count_at(point, found, segment) for point in found):
             return found
     if depth == _CUTS:

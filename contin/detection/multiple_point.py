@@ -33,6 +33,9 @@ _SINGULAR = 1e-7
 _MOST_STEPS = 12
 #: Residual of the equations, beta and G together, above which they contradict each other: two branch points, not one.
 _CONSISTENT = 1e-6
+#: Null vectors of an exactly singular matrix are taken this far along the branch, where it can be factored; they only border
+#: the equations, so a distance ten times larger does as well.
+_ASIDE = 1e-6
 #: An update below this is round-off of the differences.
 _ROUND_OFF = 1e-8
 #: Directions from which zeros on a sphere are sought: each of the at most 3^d lines is found many times.
@@ -147,9 +150,11 @@ def locate_multiple_point(
 
 
 def _bordered(system: Discretization, x: Array, row: Array, dimension: int, newton: Newton) -> _Manifold:
-    """Return the manifold with borders made of the null vectors at x."""
-    factors = system.linearize(x, (row,))[1]
-    right, left, response = smallest_directions(factors, system.size, dimension + 1, 3)
+    """Return the manifold with borders made of the null vectors at x; right beside x where the matrix is exactly singular."""
+    for at in (x, x + _ASIDE * row / system.weights):
+        right, left, response = smallest_directions(system.linearize(at, (row,))[1], system.size, dimension + 1, 3)
+        if np.all(np.isfinite(response)):
+            break
     if len(right) < dimension or not np.all(np.isfinite(response)):
         raise ConvergenceError("the matrix is singular")
     u, _, vh = np.linalg.svd(response)

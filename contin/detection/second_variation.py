@@ -7,12 +7,13 @@ From the Jacobian of the canonical equations at the Gauss points, f = (H_l, -H_x
 What is varied freely is v - K dx, with K = -C^+ H_lx: then dx does not grow by itself where the controls could hold it (with
 x' = w, dx' is what is varied).
 
-Gauss collocation commutes with variations: with dx collocated like the states, on their mesh, Q restricted to what the conditions
-allow is singular exactly where the collocated equations are. So index changes and the special points of a run agree to round-off.
+Gauss collocation commutes with variations: with dx collocated like the states, on their mesh, Q restricted to what the
+conditions allow is singular exactly where the collocated equations are. So changes of the index and the special points of a run
+agree to round-off.
 
-On an interval v has d k components at the Gauss points. Only n + n_int combinations of them, y, matter to what lies outside; the
-rest is eliminated, and its negative eigenvalues count (inertia is additive, Haynsworth 1968). Neighbouring intervals are joined in
-the same way while what is eliminated is well positive. What is left is a small dense matrix: O(N) work in all.
+On an interval v has d k components at the Gauss points. Only n + n_int combinations of them, y, matter to what lies outside;
+the rest is eliminated, and its negative eigenvalues count (inertia is additive, Haynsworth 1968). Neighbouring intervals are
+joined in the same way while what is eliminated is well positive. What is left is a small dense matrix: O(N) work in all.
 
                  x ──> [ Phi | B ] ──> x of the next interval
     (x, y) of an interval:  Q = [x y] [ Qxx Qxy ] [x]        constraint rows:  [Gx | Gy]
@@ -37,8 +38,8 @@ from contin.errors import ProblemError
 from contin.problems.variational import Symmetry, VariationalProblem
 from contin.stepping.trial import TestFunction, Trial
 
-#: What is eliminated when intervals are joined has no smaller eigenvalue than this, of 1 where dx does not count: far from zero,
-#: so that elimination loses no digits.
+#: What is eliminated when intervals are joined has no smaller eigenvalue than this, of 1 where dx does not count: far from
+#: zero, so that elimination loses no digits.
 _POSITIVE = 0.1
 #: An eigenvalue of H_ll below this part of the largest one is zero: there are fewer controls than states.
 _NO_CONTROL = 1e-10
@@ -90,7 +91,7 @@ class SecondVariation:
 
 @functools.singledispatch
 def index_of(system: Discretization) -> TestFunction | None:
-    """Return the test function whose value is the index of a point, None for a kind of problem without. Kinds register theirs."""
+    """Return the test function whose value is the index of a point; None for a kind of problem without one."""
     return None
 
 
@@ -100,7 +101,8 @@ def _of_boundary_value(system: Collocation) -> TestFunction | None:
 
 
 def _index(trial: Trial) -> float:
-    found = second_variation(trial.system, trial.x)
+    system: Any = trial.system
+    found = second_variation(system, trial.x)
     return np.nan if found is None else float(found.index())
 
 
@@ -234,7 +236,7 @@ def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
 
 
 def _intervals(system: Collocation, x: Array) -> tuple[_Pieces, Array] | None:
-    """Return the pieces that are single intervals, with all components of v, and dx at their Gauss points (N, d, n, n + d k)."""
+    """Return the single intervals, with all components of v, and dx at their Gauss points, shape (N, d, n, n + d k)."""
     n = system.problem.dimension  # type: ignore[attr-defined]
     h, d = np.diff(system.mesh), system.degree
     jacobian = _jacobian(system, x).reshape(len(h), d, -1, 2 * n)
@@ -300,7 +302,7 @@ def _antiderivatives(points: Array) -> Array:
 
 
 def _joined(pieces: _Pieces) -> tuple[_Pieces, int, tuple[_Recovery, ...]]:
-    """Return the pieces without what matters inside them only, joined in pairs as long as possible; and how much is negative."""
+    """Return the pieces joined in pairs as long as possible, how many negative directions went, and the way back."""
     recoveries = []
     pieces, negative, least, recovery = _condensed(pieces)
     if recovery is not None:
@@ -343,14 +345,14 @@ def _only_square(n: int, m: int) -> Array:
 
 
 def _condensed(pieces: _Pieces) -> tuple[_Pieces, int, float, _Recovery | None]:
-    """Return pieces whose y are those combinations that matter outside; how many others are negative, and their least eigenvalue."""
+    """Return pieces whose y matter outside; how many others are negative, and the least of their eigenvalues."""
     n, m, c = pieces.b.shape[1], pieces.b.shape[2], pieces.g.shape[1]
     kept = n + c
     if m <= kept:
         return pieces, 0, np.inf, None
     outward = np.concatenate([pieces.b, pieces.g[:, :, n:]], axis=1)
     sizes = np.linalg.norm(outward, axis=2, keepdims=True)
-    turn = np.linalg.qr((outward / np.where(sizes > 0, sizes, 1.0)).swapaxes(1, 2), mode="complete")[0]
+    turn: Any = np.linalg.qr((outward / np.where(sizes > 0, sizes, 1.0)).swapaxes(1, 2), mode="complete")[0]
     whole = np.zeros((len(pieces.phi), n + m, n + m))
     whole[:, range(n), range(n)] = 1.0
     whole[:, n:, n:] = turn
@@ -358,7 +360,7 @@ def _condensed(pieces: _Pieces) -> tuple[_Pieces, int, float, _Recovery | None]:
     inner = q[:, n + kept :, n + kept :]
     values = np.linalg.eigvalsh(inner)
     cross = q[:, n + kept :, : n + kept]
-    rest = np.linalg.solve(inner, cross)
+    rest: Any = np.linalg.solve(inner, cross)
     reduced = q[:, : n + kept, : n + kept] - cross.swapaxes(1, 2) @ rest
     turned = _Pieces(
         pieces.phi, pieces.b @ turn[:, :, :kept], (reduced + reduced.swapaxes(1, 2)) / 2,
@@ -401,7 +403,7 @@ def _reduced(system: Collocation, x: Array, pieces: _Pieces) -> tuple[Array, Arr
 
 
 def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:
-    """Return the derivatives of the end conditions by (x0, x1), (conditions, 2n), and the second ones of Phi + sigma.e, (2n, 2n)."""
+    """Return the derivatives of e by (x0, x1), shape (conditions, 2n), and the second ones of Phi + sigma.e, shape (2n, 2n)."""
     problem = system.problem
     assert isinstance(problem, VariationalProblem)
     n, batch, states = problem.dimension, problem.batch("boundary"), system.states(x)

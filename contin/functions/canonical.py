@@ -143,7 +143,8 @@ class _Derivation:
         except Exception as error:  # sympy and a user's function may raise anything
             reason = " ".join(str(error).split())
             raise ProblemError(
-                f"{what} cannot be differentiated: {type(error).__name__}: {reason} (write it with arithmetic and functions of math)"
+                f"{what} cannot be differentiated: {type(error).__name__}: {reason} "
+                "(write it with arithmetic and functions of math)"
             ) from error
 
     def _named(self, names: Sequence[str], values: Sequence[Any]) -> Any:
@@ -308,7 +309,8 @@ class _Derivation:
         ends = [] if v.ends is None else self._called("ends", v.ends, first, last, p)
         phi = 0 if v.end_energy is None else self._called("end_energy", v.end_energy, first, last, p)[0]
         fixed: tuple[list[int], list[int]] = ([], [])
-        sigmas, potential = [], sympy.sympify(phi)
+        sigmas: list[Any] = []
+        potential = sympy.sympify(phi)
         for number, value in enumerate(ends):
             place = self._fixes(value)
             if place is None:
@@ -352,7 +354,7 @@ def _elimination(k: int) -> list[str]:
     for i in range(k):
         for j in range(i + 1, k):
             lines.append(f"Q = B{j}_{i} / B{i}_{i}")
-            lines += [f"B{l}_{j} = B{l}_{j} - Q * B{l}_{i}" for l in range(j, k)]
+            lines += [f"B{m}_{j} = B{m}_{j} - Q * B{m}_{i}" for m in range(j, k)]
             lines.append(f"D{j} = D{j} - Q * D{i}")
     for i in reversed(range(k)):
         for j in range(i + 1, k):

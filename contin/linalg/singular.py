@@ -39,7 +39,7 @@ def orthonormalize(rows: Matrix) -> None:
 
 
 def smallest_directions(factors: Factors, size: int, count: int, rounds: int = 2) -> tuple[Array, Array, Array]:
-    """Return right and left singular vectors of the ``count`` smallest singular values, as rows, by inverse iteration on a block.
+    """Return right and left singular vectors of the ``count`` smallest singular values, as rows, by block inverse iteration.
 
     It starts from random vectors, not from those of the point before: a resumed run must decide as one that was never
     interrupted.

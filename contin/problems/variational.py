@@ -25,7 +25,8 @@ class VariationalProblem(BoundaryValueProblem):
 
     Held are end conditions e(x(t0), x(t1), p) = 0 and integral conditions, the integral of g(t, x, w, p) being zero. The
     equations of the states and their multipliers, and the conditions at free ends, are derived (`contin.functions.canonical`):
-    nothing need be counted. Functions are plain Python with arithmetic and functions of ``math``; x, w and p come as named tuples.
+    nothing need be counted. Functions are plain Python with arithmetic and functions of ``math``; x, w and p come as named
+    tuples.
 
     Parameters
     ----------
@@ -48,8 +49,8 @@ class VariationalProblem(BoundaryValueProblem):
     functionals : mapping of str to callable, optional
         ``f(t, x, w, p)``: integrals that are columns of every point. ``energy`` (the integral of L) is one without being named.
     hamiltonian : callable, optional
-        ``hamiltonian(t, x, lam, p)``, H = max over w of lam.f - L, where it is known in closed form; instead of ``energy`` (pass
-        None), ``kinematics`` and ``integrals``.
+        ``hamiltonian(t, x, lam, p)``, H = max over w of lam.f - L, where it is known in closed form; instead of ``energy``
+        (pass None), ``kinematics`` and ``integrals``.
     symmetries : mapping of str to callable, optional
         Maps of states that leave the energy unchanged, by name: ``map(t, x)`` with t (K,) and x (K, n) at symmetric places t
         returns the image of x, as for `contin.diagram`. Special points say which of them they break.

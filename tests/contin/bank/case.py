@@ -12,6 +12,12 @@ from contin import Branch, Continuation, Point, Settings, Stop
 
 #: Wanted agreement with the reference, relative to max(1, |value|).
 TOLERANCE = 1e-9
+#: An error may be so many times its estimate, ten: the estimate is the change from one mesh to the next, a size and no bound.
+UNDERRATED = 10.0
+#: An estimate is far too large if it is so many times what it could be at best; and so many of all estimates may be.
+OVERRATED, SELDOM = 1000.0, 0.05
+#: Units in the last place that neither an error nor an estimate is expected to resolve.
+ROUND_OFF = 4e-16
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +65,41 @@ def deviations(point: Point, special: Special) -> dict[str, float]:
     return {name: abs(value(point, name) - known) / max(1.0, abs(known)) for name, known in special.values.items()}
 
 
+@dataclass(frozen=True)
+class Estimate:
+    """An error estimate of a special point beside the true error.
+
+    Attributes
+    ----------
+    error, estimate : float
+    least : float
+        Uncertainty of the reference, or round-off if that is more: no error below it can be told from zero.
+    """
+
+    error: float
+    estimate: float
+    least: float
+
+    @property
+    def is_underrated(self) -> bool:
+        """Whether the error is more than ten times its estimate; also if there is no estimate."""
+        return not self.error <= UNDERRATED * (self.estimate + self.least)
+
+    @property
+    def is_overrated(self) -> bool:
+        """Whether the estimate is a thousand times larger than need be."""
+        return self.estimate > OVERRATED * max(self.error, self.least)
+
+
+def estimates(point: Point, special: Special) -> dict[str, Estimate]:
+    """The error estimates of a point's free parameters whose reference values are known."""
+    sizes = {name: max(1.0, abs(known)) for name, known in special.values.items() if name in point.errors}
+    return {
+        name: Estimate(abs(point[name] - special.values[name]), point.errors[name], max(special.error, ROUND_OFF) * size)
+        for name, size in sizes.items()
+    }
+
+
 def run_until(start: Point, free: Sequence[str], labels: int, **settings) -> Branch:
     """Follow a branch that has no end of its own until it has come past so many labelled points."""
     system, x = start.system.with_free(free, start.x)
@@ -78,8 +119,8 @@ def bank(*names: str) -> list:
     return [pytest.param(case, id=case.name) for case in cases]
 
 
-def check(case: Case):
-    """Run a case and assert that what came out is what is known."""
+def check(case: Case) -> list[Estimate]:
+    """Run a case, assert that what came out is what is known and no error estimate too small; return the estimates."""
     branch = case.run()
     found = labelled(branch)
     assert [point.label for point in found] == [special.label for special in case.specials], branch.stop
@@ -87,3 +128,7 @@ def check(case: Case):
     for point, special in zip(found, case.specials):
         for name, deviation in deviations(point, special).items():
             assert deviation <= max(TOLERANCE, special.error), (point.label, name, value(point, name), special.values[name])
+    seen = [(point, name, e) for point, special in zip(found, case.specials) for name, e in estimates(point, special).items()]
+    for point, name, estimate in seen:
+        assert not estimate.is_underrated, (point.label, point.name, name, estimate)
+    return [estimate for _, _, estimate in seen]

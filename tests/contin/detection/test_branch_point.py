@@ -89,3 +89,11 @@ def test_two_modes_at_once_are_reported():
     for point in points:
         assert isinstance(point.details, MultiplePoint) and point.details.dimension == 2
         assert point.name == "kernel of dimension 2"
+
+
+@pytest.mark.parametrize("step", [0.05, 1.0, 2.0, 3.0])
+def test_branches_that_pass_each_other_at_a_distance_do_not_cross(step):
+    """(1 - p) x - 3/2 x^2 = p / 100 (Koiter): a fold at 0.783, and another branch beyond; a step of 2 lands on that one."""
+    problem = AlgebraicProblem(lambda u, p: ((1 - p.load) * u.x - 1.5 * u.x**2 - 0.01 * p.load,), ["x"], {"load": 0.0})
+    branch = trace(solve(problem, [0.0]), free=["load"], limits={"load": (-1, 2)}, step=step)
+    assert [point.label for point in branch.points[1:] if point.label] == ["LP", "EP"]

@@ -57,6 +57,20 @@ def test_several_hopf_points_in_one_step(rates, places):
     assert [point["mu"] for point in branch.labelled("HB")] == pytest.approx(places, abs=1e-10)
 
 
+@pytest.mark.parametrize("nu", [0.1, 0.014, 0.0027, 0.0012, 0.00075, 0.00013])
+@pytest.mark.parametrize("start", [3.1, 5.5, 7.7])
+def test_a_hopf_point_in_the_same_step_as_a_fold(nu, start):
+    """On x^2 = mu eigenvalues have the product 2 x and the sum nu - x: Hopf at x = nu; real, one zero, at the fold x = 0."""
+    problem = AlgebraicProblem(
+        lambda u, p: (u.y, p.mu - u.x**2 + (p.nu - u.x) * u.y), ["x", "y"], {"mu": 4.0, "nu": 0.1},
+        functionals={"x": lambda u, p: u.x},
+    )  # fmt: skip
+    first = solve(problem, [start, 0.0], {"mu": start**2, "nu": nu})
+    branch = trace(first, free=["mu"], direction=-1, limits={"x": (-3, 20)}, errors=False)
+    assert [point.label for point in branch if point.label] == ["EP", "HB", "LP", "EP"]
+    assert branch.labelled("HB")[0]["x"] == pytest.approx(nu, abs=1e-9)
+
+
 def test_a_double_hopf_point():
     """Three Brusselators (A = 1) in a ring, coupled by .1, .2: b = 1 + A^2 for equal ones, 3 (.1 + .2) more for two modes."""
 
