@@ -11,9 +11,11 @@ from contin.discretization.collocation import Collocation
 from contin.errors import ProblemError
 from contin.problems.variational import VariationalProblem
 
-#: Gauss-Newton steps, halvings of one, and the step relative to 1 + the multipliers after which the next changes nothing:
-#: one step does where the energy is quadratic in the controls.
-_STEPS, _HALVINGS, _SETTLED = 30, 30, 1e-8
+#: Gauss-Newton steps, halvings of one, and the part of the residual that the last one gains: one step does where the energy is
+#: quadratic in the controls.
+_STEPS, _HALVINGS, _SETTLED = 30, 30, 1e-3
+#: Added to the normal equations, relative to their trace: multipliers that nothing determines stay small.
+_LITTLE = 1e-13
 #: The most intervals on which multipliers are looked for: the equations are solved densely. Newton's method does the rest.
 _MOST_INTERVALS = 20
 
@@ -55,7 +57,9 @@ def _fitted(system: Collocation, states: Array) -> Array:
     if not np.all(np.isfinite(residual)):
         raise ProblemError("guess: the equations have no finite value there (look for what divides by zero, or at `starts`)")
     for _ in range(_STEPS):
-        step = np.linalg.lstsq(jacobian, -residual, rcond=None)[0]
+        normal = jacobian.T @ jacobian
+        normal[np.diag_indices_from(normal)] += _LITTLE * np.trace(normal)
+        step = np.linalg.solve(normal, -(jacobian.T @ residual))
         part = 1.0
         for _ in range(_HALVINGS):
             new_lam = lam + part * step[: lam.size].reshape(lam.shape)
@@ -66,8 +70,9 @@ def _fitted(system: Collocation, states: Array) -> Array:
             part /= 2
         else:
             break
+        gained = np.linalg.norm(residual) - np.linalg.norm(new[0])
         lam, multipliers, (residual, jacobian) = new_lam, new_multipliers, new
-        if np.abs(step).max(initial=0.0) <= _SETTLED * (1 + np.abs(lam).max()):
+        if gained <= _SETTLED * np.linalg.norm(residual) or np.linalg.norm(residual) < _SETTLED:
             break
     return _packed(system, states, lam, multipliers)
 
