@@ -383,17 +383,19 @@ class Continuation:
         """Return the index before and after each special point of a step, and note what contradicts itself."""
         if self._index is None or not special:
             return [None] * len(special)
-        places = [segment.low, *(point.at for point in special), segment.step]
-        between = [segment.before, *(segment.near((a + b) / 2) for a, b in itertools.pairwise(places[1:-1])), segment.trial]
+        groups = [list(group) for _, group in itertools.groupby(special, lambda point: (point.same_as or point).at)]
+        middles = [(a[-1].at + b[0].at) / 2 for a, b in itertools.pairwise(groups)]
+        between = [segment.before, *(segment.near(s) for s in middles), segment.trial]
         values = [trial.value(self._index) for trial in between]
         whole = [None if np.isnan(value) else int(value) for value in values]
-        for point, (before, after) in zip(special, itertools.pairwise(values)):
-            if abs(after - before) > nullity_of(point) or (point.label == "LP" and after == before):
-                self.notes.append(
-                    f"the index goes from {before:g} to {after:g} at {point.label or 'a point'} {point.name} "
-                    f"({self.primary} = {point.trial[self.primary]:.10g})"
-                )
-        return [pair if nullity_of(point) else None for point, pair in zip(special, itertools.pairwise(whole))]
+        changes: list[IndexChange | None] = []
+        for group, (before, after), pair in zip(groups, itertools.pairwise(values), itertools.pairwise(whole)):
+            changes += [pair if nullity_of(point) else None for point in group]
+            if abs(after - before) > sum(map(nullity_of, group)) or (group[0].label == "LP" and after == before):
+                name = f"{group[0].label} {group[0].name}".strip()
+                place = f"{self.primary} = {group[0].trial[self.primary]:.10g}"
+                self.notes.append(f"the index goes from {before:g} to {after:g} at {name} ({place})")
+        return changes
 
     # --- the mesh ------------------------------------------------------------------------------------------------
 

@@ -40,6 +40,8 @@ _STATIONARY = 1e-5
 #: A test function vanishes at a special point where it is smaller there by this factor than at the larger end of the step: as
 #: exactly as branch points are located. Values that are typed as round numbers coincide exactly.
 _COINCIDENT = 1e-10
+#: The same on a mesh: where zero and special point coincide in the problem, they differ by the error of the discretization.
+_NEARLY = 1e-6
 #: Zeros of a test function that vanishes at a special point are looked for from this part of the step on beside it.
 _BESIDE = 1e-4
 #: The branch point where a branch ends on the trivial one has the trivial quantity at zero to this part of its values at the
@@ -178,6 +180,8 @@ class Inspection:
             if not test.passed(before, after):
                 continue
             point = self.segment.locate(test, left, right)
+            if point.name.startswith("possible") and (special := self._nearly(test, crossings)) is not None:
+                point = self._at_special(test, special)
             if test.confirm is None or test.confirm(point.trial):
                 found.append(point)
             if test.terminal:
@@ -190,6 +194,11 @@ class Inspection:
             return False
         largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
         return bool(abs(point.trial.value(test)) <= _COINCIDENT * largest)
+
+    def _nearly(self, test: TestFunction, crossings: list[SpecialPoint]) -> SpecialPoint | None:
+        """Return the branch point at which a test function vanishes up to the discretization: nothing is located beside it."""
+        largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
+        return next((point for point in crossings if abs(point.trial.value(test)) <= _NEARLY * largest), None)
 
     def _at_special(self, test: TestFunction, point: SpecialPoint) -> SpecialPoint:
         """Return the zero of a test function that lies at a special point."""

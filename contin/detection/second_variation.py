@@ -12,8 +12,8 @@ conditions allow is singular exactly where the collocated equations are. So chan
 agree to round-off.
 
 On an interval v has d k components at the Gauss points. Only n + n_int combinations of them, y, matter to what lies outside;
-the rest is eliminated, and its negative eigenvalues count (inertia is additive, Haynsworth 1968). Neighbouring intervals are
-joined in the same way while what is eliminated is well positive. What is left is a small dense matrix: O(N) work in all.
+the rest is eliminated where Q is well positive on it (then the index stays: inertia is additive, Haynsworth 1968). Neighbouring
+intervals are joined in the same way, as long as that holds. What is left is a small dense matrix: O(N) work in all.
 
                  x ──> [ Phi | B ] ──> x of the next interval
     (x, y) of an interval:  Q = [x y] [ Qxx Qxy ] [x]        constraint rows:  [Gx | Gy]
@@ -54,20 +54,17 @@ class SecondVariation:
     Attributes
     ----------
     eigenvalues : ndarray
-        Of the reduced matrix, ascending. Their signs matter, and where they vanish; not their sizes.
-    eliminated : int
-        Negative directions inside intervals, not among the eigenvalues.
+        Of the reduced matrix, ascending, without positive ones that were eliminated. Their signs matter, and where they vanish.
     """
 
     eigenvalues: Array
-    eliminated: int
     _vectors: Array
     _profile: _Profile
 
     def index(self, nullity: int = 0) -> int:
         """Return the number of negative eigenvalues, without the ``nullity`` ones that are nearest to zero."""
         values = self.eigenvalues[np.argsort(np.abs(self.eigenvalues))[nullity:]]
-        return self.eliminated + int(np.count_nonzero(values < 0))
+        return int(np.count_nonzero(values < 0))
 
     def modes(self, count: int, t: Array) -> Array:
         """Return dx at t (K,), shape (count, K, n), of the eigenvalues nearest to zero, the largest number 1."""
@@ -170,13 +167,14 @@ class _Pieces:
 class _Recovery:
     """How pieces came out of those before: y = turn [kept, rest], rest = -inside (x, kept); ``pairs``: these are two pieces.
 
-    ``phi`` and ``b`` lead from one of the two to the other.
+    ``phi`` and ``b`` lead from one of the two to the other, ``count`` is the number of pieces before.
     """
 
     turn: Array
     inside: Array
-    phi: Array | None
-    b: Array | None
+    count: int
+    phi: Array | None = None
+    b: Array | None = None
 
     def back(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return x at the beginning, and y, of the pieces before: (K, n) and (K, m) to (2 K, n), (2 K, m / 2) for pairs."""
@@ -186,7 +184,8 @@ class _Recovery:
             return x, whole
         first, second = np.split(whole, 2, axis=1)
         middle = np.einsum("kij,kj->ki", self.phi, x) + np.einsum("kij,kj->ki", self.b, first)
-        return np.stack([x, middle], 1).reshape(-1, x.shape[1]), np.stack([first, second], 1).reshape(-1, first.shape[1])
+        starts, ys = np.stack([x, middle], 1), np.stack([first, second], 1)
+        return starts.reshape(-1, x.shape[1])[: self.count], ys.reshape(-1, first.shape[1])[: self.count]
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +205,6 @@ class _Profile:
         for recovery in reversed(self.recoveries):
             x, y = recovery.back(x, y)
         count = len(self.inside)
-        x, y = x[:count], y[:count]  # an odd number of pieces was filled up
         at_points = np.einsum("eijk,ek->eij", self.inside, np.concatenate([x, y], axis=1))
         nodes = np.append(0.0, self.points)
         weights = 1 / np.prod(nodes[:, None] - nodes + np.eye(len(nodes)), axis=1)
@@ -230,9 +228,9 @@ def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
     if local is None:
         return None
     pieces, inside = local
-    pieces, eliminated, recoveries = _joined(pieces)
+    pieces, recoveries = _joined(pieces)
     values, vectors, starts = _reduced(system, x, pieces)
-    return SecondVariation(values, eliminated, vectors, _Profile(system.mesh, system.basis.points, inside, recoveries, starts))
+    return SecondVariation(values, vectors, _Profile(system.mesh, system.basis.points, inside, recoveries, starts))
 
 
 def _intervals(system: Collocation, x: Array) -> tuple[_Pieces, Array] | None:
@@ -301,21 +299,21 @@ def _antiderivatives(points: Array) -> Array:
     return result
 
 
-def _joined(pieces: _Pieces) -> tuple[_Pieces, int, tuple[_Recovery, ...]]:
-    """Return the pieces joined in pairs as long as possible, how many negative directions went, and the way back."""
+def _joined(pieces: _Pieces) -> tuple[_Pieces, tuple[_Recovery, ...]]:
+    """Return the pieces joined in pairs as long as possible, and the way back."""
     recoveries = []
-    pieces, negative, least, recovery = _condensed(pieces)
+    condensed, recovery = _condensed(pieces)
     if recovery is not None:
+        pieces = condensed
         recoveries.append(recovery)
     while len(pieces.phi) > 1:
-        pairs = _pairs(pieces)
-        joined, more, least, recovery = _condensed(pairs)
-        if least < _POSITIVE or recovery is None:
+        joined, recovery = _condensed(_pairs(pieces))
+        if recovery is None:
             break
         phi, b = pieces.phi[::2], pieces.b[::2]
-        recoveries.append(dataclasses.replace(recovery, phi=phi, b=b))
-        pieces, negative = joined, negative + more
-    return pieces, negative, tuple(recoveries)
+        recoveries.append(dataclasses.replace(recovery, phi=phi, b=b, count=len(pieces.phi)))
+        pieces = joined
+    return pieces, tuple(recoveries)
 
 
 def _pairs(pieces: _Pieces) -> _Pieces:
@@ -344,12 +342,12 @@ def _only_square(n: int, m: int) -> Array:
     return q
 
 
-def _condensed(pieces: _Pieces) -> tuple[_Pieces, int, float, _Recovery | None]:
-    """Return pieces whose y matter outside; how many others are negative, and the least of their eigenvalues."""
+def _condensed(pieces: _Pieces) -> tuple[_Pieces, _Recovery | None]:
+    """Return pieces with those y that matter outside; the same where the others are not well positive, or none."""
     n, m, c = pieces.b.shape[1], pieces.b.shape[2], pieces.g.shape[1]
     kept = n + c
     if m <= kept:
-        return pieces, 0, np.inf, None
+        return pieces, None
     outward = np.concatenate([pieces.b, pieces.g[:, :, n:]], axis=1)
     sizes = np.linalg.norm(outward, axis=2, keepdims=True)
     turn: Any = np.linalg.qr((outward / np.where(sizes > 0, sizes, 1.0)).swapaxes(1, 2), mode="complete")[0]
@@ -358,7 +356,9 @@ def _condensed(pieces: _Pieces) -> tuple[_Pieces, int, float, _Recovery | None]:
     whole[:, n:, n:] = turn
     q = whole.swapaxes(1, 2) @ pieces.q @ whole
     inner = q[:, n + kept :, n + kept :]
-    values = np.linalg.eigvalsh(inner)
+    least = float(np.linalg.eigvalsh(inner).min())
+    if least < _POSITIVE:
+        return pieces, None
     cross = q[:, n + kept :, : n + kept]
     rest: Any = np.linalg.solve(inner, cross)
     reduced = q[:, : n + kept, : n + kept] - cross.swapaxes(1, 2) @ rest
@@ -366,7 +366,7 @@ def _condensed(pieces: _Pieces) -> tuple[_Pieces, int, float, _Recovery | None]:
         pieces.phi, pieces.b @ turn[:, :, :kept], (reduced + reduced.swapaxes(1, 2)) / 2,
         np.concatenate([pieces.g[:, :, :n], pieces.g[:, :, n:] @ turn[:, :, :kept]], axis=2),
     )  # fmt: skip
-    return turned, int(np.count_nonzero(values < 0)), float(values.min()), _Recovery(turn, rest, None, None)
+    return turned, _Recovery(turn, rest, len(turn))
 
 
 def _reduced(system: Collocation, x: Array, pieces: _Pieces) -> tuple[Array, Array, Array]:
