@@ -29,6 +29,8 @@ from contin.functions.fingerprint import contents
 _NEWTON, _HALVINGS = 60, 40
 #: A step below this, relative to 1 + the control, is the last: the next would be its square.
 _SETTLED = 1e-9
+#: Where the energy is not convex, a pivot is at least this part of 1 + the diagonal: Newton's step is then long, and damped.
+_LEAST_PIVOT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -227,7 +229,7 @@ class _Derivation:
         self.helpers.append(self._function("pointwise", [*given, *self.w], [], values))
         real = ", ".join(f"{name}.real" for name in map(str, given))
         outputs = ", ".join(["E", *(f"G{i}" for i in range(k)), *(f"A{i}_{j}" for i, j in pairs)])
-        solve = _elimination(k)
+        solve, exact = _elimination(k, True), _elimination(k, False)
         trial = ", ".join(f"V{i}" for i in range(k))
         lines = [f"def controls({names}):"]
         lines += [f"    W{i} = {start!r}" for i, start in enumerate(self.variation.starts)]
@@ -245,7 +247,7 @@ class _Derivation:
         lines += [f"        W{i} = W{i} + part * D{i}" for i in range(k)]
         settled = " and ".join(f"D{i} * D{i} <= {_SETTLED**2!r} * (1.0 + W{i} * W{i})" for i in range(k))
         lines += [f"        {outputs} = {call}", f"        if {settled}:", "            break"]
-        lines += [f"    {outputs} = pointwise({names}, {', '.join(map(str, self.w))})", *("    " + line for line in solve)]
+        lines += [f"    {outputs} = pointwise({names}, {', '.join(map(str, self.w))})", *("    " + line for line in exact)]
         lines += [f"    return ({', '.join(f'W{i} + D{i}' for i in range(k))},)", ""]
         self.helpers.append("\n".join(lines))
         self.search = f"{', '.join(map(str, self.w))}, = controls({names})"
@@ -344,14 +346,19 @@ class _Derivation:
         return own[0] if slope.is_number and slope != 0 else None
 
 
-def _elimination(k: int) -> list[str]:
-    """Return the lines that solve A D = -G, for a symmetric positive definite A of size k, without pivoting."""
+def _elimination(k: int, guarded: bool) -> list[str]:
+    """Return the lines that solve A D = -G, for a symmetric positive definite A of size k, without pivoting.
+
+    ``guarded`` makes pivots positive that are not: then D still leads downhill.
+    """
     lines = []
     for i in range(k):
         for j in range(i + 1):
             lines.append(f"B{i}_{j} = A{i}_{j}")
         lines.append(f"D{i} = -G{i}")
     for i in range(k):
+        if guarded:
+            lines.append(f"B{i}_{i} = max(abs(B{i}_{i}), {_LEAST_PIVOT!r} * (1.0 + abs(A{i}_{i})))")
         for j in range(i + 1, k):
             lines.append(f"Q = B{j}_{i} / B{i}_{i}")
             lines += [f"B{m}_{j} = B{m}_{j} - Q * B{m}_{i}" for m in range(j, k)]
