@@ -154,17 +154,16 @@ class _Explorer:
     def _match(self, known: Point, point: Point) -> tuple[int, int] | None:
         """Return (tangent, way) of a known junction along which the branch of ``point`` goes, if they are images."""
         a, b = known.system, point.system
-        scale = 1 + np.abs(point.x[b.state_size :])
-        if np.any(np.abs(known.x[a.state_size :] - point.x[b.state_size :]) > self.tolerance * scale):
+        carry, there = b.carrier(a), _seen(a, known.x)
+        here, ahead = _seen(a, carry(point.x)), _seen(a, carry(point.details.tangents[0]))
+        parameters = slice(a.state_size, None)
+        if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
             return None
-        carry = b.carrier(a)
-        here, ahead = carry(point.x), carry(point.details.tangents[0])
         for symmetry in self.symmetries:
-            image = self._image(a, symmetry, here)
-            gap = image - known.x
-            if np.sqrt(inner(a, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(a, known.x, known.x))):
+            gap = _image(a, symmetry, here) - there
+            if np.sqrt(inner(a, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(a, there, there))):
                 continue
-            turned = self._image(a, symmetry, ahead)
+            turned = _image(a, symmetry, ahead)
             cosines = [inner(a, turned, tangent) for tangent in known.details.tangents]
             which = int(np.argmax(np.abs(cosines)))
             return which, int(np.sign(cosines[which]) or 1)
@@ -173,20 +172,36 @@ class _Explorer:
     def _images(self, point: Point, direction: Array) -> list[tuple[int, int]]:
         """Return (tangent, way) of the half-branches at ``point`` that are images of the one along ``direction``."""
         system, result = point.system, []
+        here, direction = _seen(system, point.x), _seen(system, direction)
         for symmetry in self.symmetries:
-            gap = self._image(system, symmetry, point.x) - point.x
-            if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, point.x, point.x))):
+            gap = _image(system, symmetry, here) - here
+            if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, here, here))):
                 continue
-            turned = self._image(system, symmetry, direction)
+            turned = _image(system, symmetry, direction)
             cosines = [inner(system, turned, tangent) for tangent in point.details.tangents]
             which = int(np.argmax(np.abs(cosines)))
             result.append((which, int(np.sign(cosines[which]) or 1)))
         return result
 
-    @staticmethod
-    def _image(system: Discretization, symmetry: Symmetry, x: Array) -> Array:
-        states = symmetry(system.nodes, system.states(x).copy())
-        return np.concatenate([np.asarray(states).ravel(), x[system.state_size :]])
+
+def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
+    """Return the image of unknowns; of a variational problem the states x have one, multipliers are zero (`_seen`)."""
+    states = system.states(x).copy()
+    visible = states[:, : getattr(system.problem, "dimension", states.shape[1])]
+    visible[:] = symmetry(system.nodes, visible.copy())
+    states = states if system.scales is None else states / system.scales.states
+    return np.concatenate([states.ravel(), x[system.state_size :]])
+
+
+def _seen(system: Any, x: Array) -> Array:
+    """Return unknowns without multipliers: these follow from the others, and change their sign under symmetries."""
+    problem = system.problem
+    if not problem.multipliers:
+        return x
+    x = x.copy()
+    x[: system.state_size].reshape(-1, len(problem.state_names))[:, problem.dimension :] = 0.0
+    x[[system.parameter_index(name) for name in problem.multipliers]] = 0.0
+    return x
 
 
 def diagram(
@@ -206,7 +221,8 @@ def diagram(
         Largest number of branch points between ``start``'s branch and the others: 0 follows that branch alone.
     symmetries : sequence of callable
         Maps ``s(t, states) -> states`` of solutions to solutions (nodes t, states (K, n), same parameters), for states whose
-        parameters they leave alone: images of a branch count as that branch.
+        parameters they leave alone: images of a branch count as that branch. Those of a `VariationalProblem` map the states x,
+        without multipliers; the ones that it declares count, too.
     tolerance : float
         Relative distance below which two branch points are one.
 
@@ -221,6 +237,7 @@ def diagram(
     for symmetry in checks.sequence("symmetries", symmetries, "functions"):
         checks.function("symmetries", symmetry)
     settings = settings_with(settings, options)
+    symmetries = [*symmetries, *getattr(system_of(start, "start").problem, "symmetries", {}).values()]
     system, x = (
         (start.system, start.x) if free is None else system_of(start, "start").with_free(checks.names("free", free), start.x)
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from contin.arrays import Array
+from contin.detection.second_variation import SecondVariation, index_of, second_variation
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
@@ -83,6 +84,21 @@ class Point:
     def __getitem__(self, name: str) -> float:
         """Return a parameter or functional by name."""
         return self.parameters[name] if name in self.parameters else self.functionals[name]
+
+    def second_variation(self) -> SecondVariation:
+        """Return the second variation of the energy there: its eigenvalues, and its modes as functions.
+
+        Raises
+        ------
+        ProblemError
+            The problem is no `VariationalProblem`, or Legendre's condition fails.
+        """
+        if index_of(self.system) is None:
+            raise ProblemError("second_variation: the problem has no energy; state it as a VariationalProblem")
+        found = second_variation(self.system, self.x)  # type: ignore[arg-type]
+        if found is None:
+            raise ProblemError("second_variation: the energy is not convex in the controls there (Legendre's condition)")
+        return found
 
 
 def point_of(system: Discretization, x: Array, iterations: int = 0, error: float = 0.0) -> Point:
