@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.diagram import run_diagram
 from branches.display import Display
@@ -26,6 +26,8 @@ FIG12 = (
     "limits: {kappa_n: [-100, 100]}, stride: 20}"
 )
 WINDOW = (-8.0, 14.0)
+#: Section 6.3: how many folds the branch (1, 2) has; none for rods. Where the ribbon's is.
+FOLDS_PUBLISHED, FOLD_PUBLISHED = {"ribbon": "1"}, {("ribbon", 1, 2): "4.08"}
 
 
 def fig11(folder: Path) -> Section:
@@ -65,7 +67,7 @@ def fig12(folder: Path) -> Section:
         remark = f"m/ν, (27) for n → ∞; n = 7 is at {_threshold(graph, m, 7):.3f}"
         rows.append(Row(f"ribbon: bifurcations of m = {m} accumulate at κₙL/2π =", printed, m / NU, remark))
     for law in LAWS:
-        rows.append(Row(f"{law}: folds on (1, 2)", "1" if law == "ribbon" else "0", _folds_of(graph, law, 1, 2), "section 6.3"))
+        rows.append(Row(f"{law}: folds on (1, 2)", FOLDS_PUBLISHED.get(law, "0"), _folds_of(graph, law, 1, 2), "section 6.3"))
         near = diagram.course(graph, 1, 2, law, NU)[0]["nodes"]
         rows.append(Row(f"{law}: (1, 2) ends on covering", "3", near[-1]["covering"], f"at κₙL/2π = {near[-1]['kappa_n']:.6f}"))
     worst, table = _fold_rows(graph)
@@ -123,7 +125,7 @@ def _fold_rows(graph) -> tuple[float, list[Row]]:
             raise ArithmeticError(f"{law} ({m}, {n}): {len(found)} folds by collocation, {len(known)} by quadrature")
         for node, point in zip(found, known):
             worst = max(worst, abs(node["kappa_n"] - point.kappa_n))
-            published = "4.08" if (law, m, n) == ("ribbon", 1, 2) else ""
+            published = FOLD_PUBLISHED.get((law, m, n), "")
             remark = f"κ̄* = {node['kappa_star']:.6f}; quadrature {node['kappa_n'] - point.kappa_n:+.0e}"
             rows.append(Row(f"{law}: fold of ({m}, {n}) at κₙL/2π =", published, f"{node['kappa_n']:.10f}", remark))
     return worst, rows

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.diagram import run_diagram
 from branches.display import Display
