@@ -14,14 +14,13 @@ from __future__ import annotations
 
 import functools
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from contin import BoundaryValueProblem, Collocation
-from ribbon_model.equilibrium import CENTRELINE, FRAME, LENGTH, directors, with_force, without_force
+from ribbon_model.equilibrium import LENGTH, directors, with_force, without_force
 from ribbon_model.laws import Law
 from ribbon_model.shape import Shape
 
@@ -37,7 +36,8 @@ class StripProblem(BoundaryValueProblem):
     on: Domain | None = None
 
 
-class Domain(ABC):
+@dataclass(frozen=True, eq=False, repr=False)
+class Domain:
     """A part of the closed strip with conditions at its ends.
 
     Attributes
@@ -46,43 +46,52 @@ class Domain(ABC):
         As in scenes and files.
     free : tuple of str
         The parameters that are free on a branch, kappa_n first.
+    boundary : callable
+        ``boundary(u0, u1, p)``: the conditions at the ends.
+    parameters : mapping of str to float
+        Those of the domain, ``length`` first, with their values.
+    unfold : callable
+        ``unfold(part)`` is the closed strip from the part of it that was computed, a `Shape`.
     reversal : str
         The symmetry at both ends of a half loop, 'mirror' or 'axis'; '' on other domains.
+    quarters : int
+        Where it begins on the closed strip of a cell, in quarter waves.
+    equations : callable
+        ``equations(law)``, see `ribbon_model.equilibrium`.
     """
 
     name: str
     free: tuple[str, ...]
+    boundary: Callable
+    parameters: Mapping[str, float]
+    unfold: Callable[[Shape], Shape] = lambda part: part
     reversal: str = ""
+    quarters: int = 0
+    equations: Callable = with_force
 
     @functools.cache  # noqa: B019 - the domains are constants of this module; what is compiled for a problem is found again
     def problem(self, law: Law) -> StripProblem:
         """The problem of a law: one object for each law."""
-        return self._stated(law)
+        rhs, states, loads, functionals = self.equations(law)
+        values = {"kappa_n": 0.0, **law.defaults, **loads, **self.parameters}
+        return StripProblem(rhs, self.boundary, states, values, functionals=functionals, law=law, on=self)
 
-    @abstractmethod
-    def _stated(self, law: Law) -> StripProblem: ...
-
-    @abstractmethod
     def parts(self, n: int) -> int:
         """How many such parts the loop of a wave of wavenumber n consists of."""
+        return round(LENGTH / self.parameters["length"])
 
     def wavenumber(self, parameters: Mapping[str, float]) -> int:
         """n of the primary branch that a solution is on; 0 where the domain does not tell."""
         return 0
 
-    @abstractmethod
     def whole(self, part: Shape, parameters: Mapping[str, float]) -> Shape:
-        """The closed strip from the part of it that was computed."""
+        """The closed strip from the part of it that was computed, and the parameters of the solution."""
+        return self.unfold(part)
 
     def stretch(self, period: int, quarter: int) -> tuple[int, int]:
-        """Nodes (first, last) of this domain on the closed strip, nodes 0 ... ``period``, of a cell, nodes 0 ... ``quarter``.
-
-        Raises
-        ------
-        ValueError
-            A domain that a cell is not carried to.
-        """
-        raise ValueError(f"no solution on the cell is carried to the {self.name}")
+        """First and last node of this domain on the closed strip, 0 to ``period``, of a cell with nodes 0 to ``quarter``."""
+        first = self.quarters * quarter
+        return first, first + period // self.parts(1)
 
     def discretize(self, law: Law, intervals: int, degree: int, parameters: Mapping[str, float]) -> Collocation:
         """The collocation system on a uniform mesh."""
@@ -101,35 +110,12 @@ class Domain(ABC):
     def __repr__(self) -> str:
         return f"<{self.name}>"
 
-    def _with_force(self, law: Law, boundary: Callable, length: float, **marks: float) -> StripProblem:
-        """Frame and centreline as states, moment and force at S = 0 as parameters; ``marks`` are parameters besides."""
-        rhs, functionals = with_force(law)
-        values = dict.fromkeys(("M1", "M2", "M3", "R1", "R2", "R3", "unfold"), 0.0)
-        values = {"kappa_n": 0.0, **law.defaults, **values, "length": length, **marks}
-        return StripProblem(rhs, boundary, (*FRAME, *CENTRELINE), values, functionals=functionals, law=law, on=self)
 
-
-class _Cell(Domain):
+class Cell(Domain):
     """Quarter wave with R = 0; parameters ``turn`` (2 pi m / 4n) and ``sense`` (the sign of the moment on the circle).
 
     Where the plane of the mirror and the two-fold axis meet, the waves turn about one line, so the centreline closes.
     """
-
-    name, free = "cell", ("kappa_n", "M1", "M2")
-
-    def _stated(self, law: Law) -> StripProblem:
-        def boundary(u0, u1, p):
-            d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
-            moment = p.sense * math.sqrt(p.M1 * p.M1 + p.M2 * p.M2)
-            return (
-                u0.q0 - 1, u0.q1, u0.q2, u0.q3,
-                d21 * p.M1 + d22 * p.M2,
-                math.cos(p.turn) * d23 * moment - math.sin(p.turn) * (d22 * p.M1 - d21 * p.M2),
-            )  # fmt: skip
-
-        rhs, functionals = without_force(law)
-        values = {"kappa_n": 0.0, **law.defaults, "M1": 0.0, "M2": 0.0, "length": 1.0, "turn": 1.0, "sense": 1.0}
-        return StripProblem(rhs, boundary, FRAME, values, functionals=functionals, law=law, on=self)
 
     def parts(self, n: int) -> int:
         return 4 * n
@@ -150,86 +136,54 @@ class _Cell(Domain):
         if abs(math.sin(angle / 2)) > _NO_TURN:  # where the two-fold axis (through x along d2) meets the plane of the mirror
             d2, x, normal = part.directors[-1, 1], part.centreline[-1], part.directors[0, 2]
             centre = x - d2 * (x @ normal) / (d2 @ normal)
-        return part.turned().mirrored().repeated(self.wavenumber(p), axis, centre, angle)
+        return self.unfold(part).repeated(self.wavenumber(p), axis, centre, angle)
 
 
-class _HalfLoop(Domain):
-    """[0, L/2] between mirrors normal to d3: M3 = R1 = R2 = 0 at both ends follows from d3 being parallel there."""
-
-    name, free, reversal = "half loop", ("kappa_n", "M1", "M2", "R3"), "mirror"
-
-    def _stated(self, law: Law) -> StripProblem:
-        def boundary(u0, u1, p):
-            d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
-            return u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, d31, d32, u1.x3
-
-        return self._with_force(law, boundary, LENGTH / 2)
-
-    def parts(self, n: int) -> int:
-        return 2
-
-    def whole(self, part: Shape, parameters: Mapping[str, float]) -> Shape:
-        return part.mirrored()
-
-    def stretch(self, period: int, quarter: int) -> tuple[int, int]:
-        start = 2 * quarter  # the closed strip starts at a mirror, two quarter waves before S = 0
-        return start, start + period // 2
+def _ends_of_cell(u0, u1, p):
+    """A mirror at S = 0, a two-fold axis along d2 at the other end."""
+    d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
+    moment = p.sense * math.sqrt(p.M1 * p.M1 + p.M2 * p.M2)
+    return (
+        u0.q0 - 1, u0.q1, u0.q2, u0.q3,
+        d21 * p.M1 + d22 * p.M2,
+        math.cos(p.turn) * d23 * moment - math.sin(p.turn) * (d22 * p.M1 - d21 * p.M2),
+    )  # fmt: skip
 
 
-class _HalfLoopBetweenAxes(Domain):
-    """[0, L/2] between two-fold axes along d2: M2 = R2 = 0 at both ends follows from both axes being one line.
-
-    ``axes`` = 1, which the equations do not use, marks the columns of such a solution in files.
-    """
-
-    name, free, reversal = "half loop between axes", ("kappa_n", "M1", "M3", "R1", "R3"), "axis"
-
-    def _stated(self, law: Law) -> StripProblem:
-        def boundary(u0, u1, p):
-            d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
-            return u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, d21, d23, u1.x1, u1.x3
-
-        return self._with_force(law, boundary, LENGTH / 2, axes=1.0)
-
-    def parts(self, n: int) -> int:
-        return 2
-
-    def whole(self, part: Shape, parameters: Mapping[str, float]) -> Shape:
-        return part.turned()
-
-    def stretch(self, period: int, quarter: int) -> tuple[int, int]:
-        start = 3 * quarter  # at the end of the cell
-        return start, start + period // 2
+def _mirrors(u0, u1, p):
+    """Mirrors normal to d3: M3 = R1 = R2 = 0 at both ends follows from d3 being parallel there."""
+    d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
+    return u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, d31, d32, u1.x3
 
 
-class _Loop(Domain):
-    """[0, L] closed. M3 at S = 0, a parameter, fixes the phase; ``unfold`` is zero on every closed solution.
+def _axes(u0, u1, p):
+    """Two-fold axes along d2: M2 = R2 = 0 at both ends follows from both axes being one line."""
+    d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
+    return u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, d21, d23, u1.x1, u1.x3
+
+
+def _closed(u0, u1, p):
+    """The frame and the centreline come back.
 
     H(M) + R3 is constant along the strip, so one of the six conditions of closure follows from the others; a dissipative term
     ``unfold`` (M × omega + R × e3), which would change that constant, makes the count regular.
     """
-
-    name, free = "loop", ("kappa_n", "M1", "M2", "R1", "R2", "R3", "unfold")
-
-    def _stated(self, law: Law) -> StripProblem:
-        def boundary(u0, u1, p):
-            return (
-                u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, u1.q1, u1.q2, u1.q3, u1.x1, u1.x2, u1.x3,
-            )  # fmt: skip
-
-        return self._with_force(law, boundary, LENGTH)
-
-    def parts(self, n: int) -> int:
-        return 1
-
-    def whole(self, part: Shape, parameters: Mapping[str, float]) -> Shape:
-        return part
-
-    def stretch(self, period: int, quarter: int) -> tuple[int, int]:
-        return 0, period
+    return u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, u1.q1, u1.q2, u1.q3, u1.x1, u1.x2, u1.x3
 
 
-CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP = _Cell(), _HalfLoop(), _HalfLoopBetweenAxes(), _Loop()
+CELL = Cell(
+    "cell", ("kappa_n", "M1", "M2"), _ends_of_cell, {"length": 1.0, "turn": 1.0, "sense": 1.0},
+    unfold=lambda part: part.turned().mirrored(), equations=without_force,
+)  # fmt: skip
+HALF_LOOP = Domain(
+    "half loop", ("kappa_n", "M1", "M2", "R3"), _mirrors, {"length": LENGTH / 2}, Shape.mirrored, "mirror", quarters=2
+)  # the closed strip of a cell starts at a mirror, two quarter waves before S = 0
+HALF_LOOP_BETWEEN_AXES = Domain(  # the equations do not use ``axes``: it marks the columns of such a solution in files
+    "half loop between axes", ("kappa_n", "M1", "M3", "R1", "R3"), _axes, {"length": LENGTH / 2, "axes": 1.0},
+    Shape.turned, "axis", quarters=3,
+)  # fmt: skip
+#: M3 at S = 0, a parameter, fixes the phase; ``unfold`` is zero on every closed solution.
+LOOP = Domain("loop", ("kappa_n", "M1", "M2", "R1", "R2", "R3", "unfold"), _closed, {"length": LENGTH})
 #: All domains by name.
 DOMAINS: dict[str, Domain] = {domain.name: domain for domain in (CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP)}
 #: The half loops by the reversal of S that they keep.

@@ -16,6 +16,7 @@ from ribbon_model.laws import Law
 LENGTH = 2 * math.pi
 FRAME = ("q0", "q1", "q2", "q3")
 CENTRELINE = ("x1", "x2", "x3")
+LOADS = ("M1", "M2", "M3", "R1", "R2", "R3", "unfold")
 
 
 def directors(q0, q1, q2, q3):
@@ -44,25 +45,26 @@ def on_directors(q0, q1, q2, q3, a1, a2, a3):
     )  # fmt: skip
 
 
-def without_force(law: Law) -> tuple[Callable, dict[str, Callable]]:
-    """Right-hand side and functionals where R = 0: states `FRAME`, parameters M1, M2 (M3 = 0) and ``length``."""
+def without_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float], dict[str, Callable]]:
+    """Right-hand side, states, loads (parameters, zero) and functionals where R = 0, and M3 = 0 at S = 0.
+
+    Of parameters the equations also take ``length``, and those of the law.
+    """
     response = law.response_at
 
-    def local(u, p):
-        q0, q1, q2, q3 = u
-        M1, M2, M3 = on_directors(q0, q1, q2, q3, p.M1, p.M2, 0.0)
-        return response(M1, M2, M3, p)
+    def moment(u, p):
+        return on_directors(u.q0, u.q1, u.q2, u.q3, p.M1, p.M2, 0.0)
 
     def rhs(t, u, p):
-        q0, q1, q2, q3 = u
-        H, w1, w2, w3, conjugate = local(u, p)
-        return spin(q0, q1, q2, q3, w1, w2, w3, p.length)
+        M1, M2, M3 = moment(u, p)
+        H, w1, w2, w3, conjugate = response(M1, M2, M3, p)
+        return spin(u.q0, u.q1, u.q2, u.q3, w1, w2, w3, p.length)
 
-    return rhs, _functionals(response, lambda u, p: on_directors(u.q0, u.q1, u.q2, u.q3, p.M1, p.M2, 0.0))
+    return rhs, FRAME, {"M1": 0.0, "M2": 0.0}, _functionals(response, moment)
 
 
-def with_force(law: Law) -> tuple[Callable, dict[str, Callable]]:
-    """Right-hand side and functionals: states `FRAME` and `CENTRELINE`, moment and force at S = 0 as parameters.
+def with_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float], dict[str, Callable]]:
+    """The same with a force: the centreline is a state, moment and force at S = 0 are loads.
 
     ``unfold`` multiplies the dissipative term M × omega + R × e3, which is zero on a closed solution (see `domains.LOOP`).
     """
@@ -85,7 +87,7 @@ def with_force(law: Law) -> tuple[Callable, dict[str, Callable]]:
         d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u.q0, u.q1, u.q2, u.q3)
         return (*rates, p.length * d31, p.length * d32, p.length * d33)
 
-    return rhs, _functionals(response, moment)
+    return rhs, (*FRAME, *CENTRELINE), dict.fromkeys(LOADS, 0.0), _functionals(response, moment)
 
 
 def _functionals(response, moment):

@@ -19,8 +19,12 @@ import math
 import types
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ribbon_model import finite_width
+
+_DEFAULTS = {"nu": 0.3, "Gamma": 1.0}
+_WHOSE = "it is a parameter of the law 'finite width', and of no other"
 
 
 class NoThreshold(ValueError):
@@ -50,17 +54,20 @@ class Law:
     parameters: tuple[str, ...] = ("nu",)
     gradient: Callable[..., tuple] | None = None
 
+    #: Whether Gamma is a parameter.
+    has_width: ClassVar[bool] = False
+    #: Whether the surface is ruled along d1 + eta d3, eta = omega_3/omega_1 (6a).
+    has_rulings: ClassVar[bool] = False
+    #: ``curvatures_at(omega_1, omega_3, p)`` = (U_11, U_13, U_33) for a law that ends where U is convex no further; None for
+    #: one whose H is a closed expression: its domain is known without.
+    curvatures_at: ClassVar[Callable[..., tuple] | None] = None
+
     # --- parameters -------------------------------------------------------------------------------------------------------
 
     @property
     def defaults(self) -> dict[str, float]:
         """The parameters and their default values."""
-        return {"nu": 0.3}
-
-    @property
-    def has_width(self) -> bool:
-        """Whether Gamma is a parameter."""
-        return False
+        return {name: _DEFAULTS[name] for name in self.parameters}
 
     def values(self, nu: float, Gamma: float | None = None) -> dict[str, float]:
         """The law's parameters by name.
@@ -107,14 +114,6 @@ class Law:
             strain = np.array([np.broadcast_to(w, shape) for w in response(*arguments, kappa_n, *parameters)[1:4]])
         return strain[:, 0].real.T, strain.imag.transpose(2, 0, 1) / step
 
-    @functools.cached_property
-    def curvatures_at(self) -> Callable[..., tuple] | None:
-        """``curvatures_at(omega_1, omega_3, p)`` = (U_11, U_13, U_33) for a law that ends where U is convex no further.
-
-        None for a law whose H is a closed expression: its domain is known without.
-        """
-        return None
-
     def strain_energy(self, strain, kappa_n: float, nu: float) -> tuple:
         """U, the moment dU/d(omega) and the stiffness D2U at strains (..., 3), for the descents of `ribbon_model.descent`.
 
@@ -131,11 +130,6 @@ class Law:
         """
         *others, last = map(repr, PAPER_LAWS)
         raise ValueError(f"law {self.name!r}: descents are for {', '.join(others)} and {last}")
-
-    @property
-    def has_rulings(self) -> bool:
-        """Whether the surface is ruled along d1 + eta d3, eta = omega_3/omega_1 (6a)."""
-        return False
 
     # --- circles ----------------------------------------------------------------------------------------------------------
 
@@ -191,9 +185,6 @@ class Law:
         return True
 
 
-_WHOSE = "it is a parameter of the law 'finite width', and of no other"
-
-
 # --- the laws of the paper --------------------------------------------------------------------------------------------------
 
 
@@ -222,9 +213,7 @@ def isotropic_rod_hamiltonian(M1, M2, M3, kappa_n, nu):
 class Ribbon(Law):
     """The inextensible ribbon: developable, omega_2 = 0."""
 
-    @property
-    def has_rulings(self) -> bool:
-        return True
+    has_rulings = True
 
     def strain_energy(self, strain, kappa_n: float, nu: float) -> tuple:
         """With c = (omega_1**2 + omega_3**2)/omega_1 and a = c - nu kappa_n where that is positive, else 0,
@@ -326,13 +315,7 @@ class IsotropicRod(Rod):
 class FiniteWidth(Law):
     """The strip of finite width: `ribbon_model.finite_width`."""
 
-    @property
-    def defaults(self) -> dict[str, float]:
-        return {"nu": 0.3, "Gamma": 1.0}
-
-    @property
-    def has_width(self) -> bool:
-        return True
+    has_width = True
 
     def values(self, nu: float, Gamma: float | None = None) -> dict[str, float]:
         if Gamma is None:
@@ -346,13 +329,10 @@ class FiniteWidth(Law):
         response = self.response
         return lambda M1, M2, M3, p: response(M1, M2, M3, p.kappa_n, p.nu, p.Gamma)
 
-    @functools.cached_property
-    def curvatures_at(self) -> Callable[..., tuple] | None:
-        def curvatures(w1, w3, p):
-            U, U1, U3, U11, U13, U33, Uk, U1k, U3k = finite_width.strain_energy(w1, w3, p.kappa_n, p.nu, p.Gamma)
-            return U11, U13, U33
-
-        return curvatures
+    @staticmethod
+    def curvatures_at(w1, w3, p) -> tuple:
+        U, U1, U3, U11, U13, U33, Uk, U1k, U3k = finite_width.strain_energy(w1, w3, p.kappa_n, p.nu, p.Gamma)
+        return U11, U13, U33
 
     def circle(self, m: int, kappa_n: float, nu: float, Gamma: float | None = None) -> dict[str, float]:
         U, U1, _, _, _, _, Uk, _, _ = finite_width.strain_energy(m, 0.0, kappa_n, nu, Gamma)

@@ -55,7 +55,7 @@ class Solution:
 
     @classmethod
     def of(cls, point: Point) -> Solution:
-        """The solution at a point of a branch."""
+        """The solution at a point of a branch (or alike: anything with ``system`` and ``x``)."""
         return cls.at(point.system, point.x)
 
     @classmethod

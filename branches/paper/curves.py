@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from branches.files import write_picture
-from branches.paper.draw import STABLE, UNSTABLE
+from branches.paper.draw import STABLE, UNSTABLE, keep
 from branches.paper.page import Row, Section
 from branches.stability import LABEL, Watch
 from contin import Settings, curve, follow, locate_branch_point
@@ -129,6 +128,4 @@ def _draw(lines, secondary, last, folder: Path) -> str:
     panels[0].legend(frameon=False)
     for axes in panels:
         axes.grid(alpha=0.2)
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"curves{suffix}")
-    return "curves"
+    return keep(figure, folder, "curves")

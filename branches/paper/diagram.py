@@ -11,8 +11,8 @@ from branches.diagram import run_diagram
 from branches.display import Display
 from branches.draw_branch import figure as draw_branch
 from branches.draw_diagram import figure as draw_diagram
-from branches.files import write_picture
 from branches.job import run_branch
+from branches.paper.draw import keep
 from branches.paper.page import Row, Section
 from branches.preview import preview
 from branches.read import read_branch
@@ -49,7 +49,7 @@ def fig11(folder: Path) -> Section:
         "κₙ first increases from 2.5: the pitchfork of the ribbon is supercritical, as section 6.3 says first; its last "
         "sentence on this bifurcation says the opposite (see Fig. 12).",
     ]
-    return Section("Fig. 11: from the single to the triple loop", rows, [_save(draw_branch(branch), folder, "fig11")], notes)
+    return Section("Fig. 11: from the single to the triple loop", rows, [keep(draw_branch(branch), folder, "fig11")], notes)
 
 
 def fig12(folder: Path) -> Section:
@@ -57,9 +57,9 @@ def fig12(folder: Path) -> Section:
     scene = parse(FIG12, "fig12")
     run_diagram(scene, folder / "fig12", Display(quiet=True))
     graph = diagram.read(folder / "fig12")
-    pictures = [_save(draw_diagram(graph, law, NU, WINDOW), folder, f"fig12_{law.replace(' ', '_')}") for law in LAWS]
+    pictures = [keep(draw_diagram(graph, law, NU, WINDOW), folder, f"fig12_{law.replace(' ', '_')}") for law in LAWS]
     ahead = preview(parse(FIG12, "fig12", ["law=ribbon"]))
-    pictures.insert(1, _save(draw_diagram(ahead, "ribbon", NU, WINDOW), folder, "fig12_preview"))
+    pictures.insert(1, keep(draw_diagram(ahead, "ribbon", NU, WINDOW), folder, "fig12_preview"))
     rows = [
         Row(f"{law}: different branches", "", _families(graph, law), "m = 1, 3, 5, 7, n ≤ 7, |κₙL/2π| ≤ 100") for law in LAWS
     ]
@@ -79,12 +79,6 @@ def fig12(folder: Path) -> Section:
         "branch arrives at them.",
     ]
     return Section("Fig. 12: the bifurcation diagram, ν = .3", rows + table, pictures, notes)
-
-
-def _save(figure, folder: Path, name: str) -> str:
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"{name}{suffix}")
-    return name
 
 
 def _families(graph, law) -> int:

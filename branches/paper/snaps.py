@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from branches.paper.draw import keep
 from branches.paper.page import Row, Section
 from ribbon_model.descent import METRICS, Descent, Rest, descend, identify, perturbed
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
@@ -165,7 +166,6 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
     from matplotlib.figure import Figure
 
     from branches.draw_branch import draw_strip
-    from branches.files import write_picture
 
     films = sorted(films, key=lambda film: film[0].m)
     figure = Figure(figsize=(2 * frames, 2.3 * len(films)), layout="constrained")
@@ -178,9 +178,7 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
             draw_strip(axes, shape, 0.25 * reach)
             axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
             axes.set_title(f"energy {strip.energy:.3f}", fontsize=9, y=0.95)
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"snaps{suffix}")
-    return "snaps"
+    return keep(figure, folder, "snaps")
 
 
 def _frames(descent: Descent, count: int) -> list[Strip]:

@@ -12,10 +12,9 @@ from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.diagram import run_diagram
 from branches.display import Display
-from branches.files import write_picture
 from branches.job import run_branch
 from branches.paper.diagram import FIG12, LAWS, NU, WINDOW
-from branches.paper.draw import STABLE, UNSTABLE
+from branches.paper.draw import STABLE, UNSTABLE, keep
 from branches.paper.page import Row, Section
 from branches.read import read_branch
 from ribbon_model.laws import LAWS as LAW_OBJECTS
@@ -152,6 +151,4 @@ def _draw(found, folder: Path) -> str:
     handles = [Patch(facecolor=STABLE, label="stable circle"), Patch(facecolor=UNSTABLE, hatch="////", edgecolor="white",
                label="stable buckled state of the branch (m, n)")]  # fmt: skip
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"fig12b{suffix}")
-    return "fig12b"
+    return keep(figure, folder, "fig12b")
