@@ -12,7 +12,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from branches.labels import LABELS
+from branches.labels import label_of
 
 if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this module before it knows what to do
     from contin import Point
@@ -174,4 +174,4 @@ def _describe(config, event) -> str:
         inside_out = ", curled against its natural curvature" if index < 0 else ""
         return f"ends on the {abs(index)}-covered circle{inside_out} at {place}{certain}"
     what = f" ({name})" if name and label != b"LP" else ""
-    return f"{LABELS[label.decode()].word}{what} at {place}{certain}, kappa* = {event['kappa_star']:.10f}"
+    return f"{label_of(label.decode()).word}{what} at {place}{certain}, kappa* = {event['kappa_star']:.10f}"

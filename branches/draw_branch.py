@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from branches.draw_diagram import smooth
-from branches.labels import LABELS
+from branches.labels import label_of
 from contin import exact_text
 from ribbon_model.laws import label as name_law
 
@@ -60,7 +60,7 @@ def curve(axes, branch, chosen) -> None:
     axes.plot(*smooth(points["arclength"], points["kappa_n"], points["kappa_star"]), color=CURVE, lw=1.6, zorder=1)
     seen = set()
     for event in branch.events:
-        mark = LABELS[event["label"].decode()]
+        mark = label_of(event["label"].decode())
         label = None if mark.kind in seen or mark.kind == "branch point" else mark.kind
         seen.add(mark.kind)
         place = event["kappa_n"], event["kappa_star"]

@@ -48,6 +48,11 @@ ON_PAGE = {
 }  # fmt: skip
 
 
+def label_of(text: str) -> Label:
+    """The label of these letters; that of an end for letters of another version."""
+    return LABELS.get(text, LABELS["EP"])
+
+
 def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
     """What a labelled point is in a diagram.
 
@@ -66,5 +71,5 @@ def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
         return "circle"
     if name == "primary branch":
         return name
-    kind = LABELS[label].kind
+    kind = label_of(label).kind
     return "leaves" if kind == "end" and reason == "limit" else kind

@@ -111,6 +111,11 @@ class Solution:
         """Number of negative directions of the energy; see `ribbon_model.stability.index`."""
         return stability.index(self.equilibrium(), accuracy)
 
+    def functionals(self) -> dict[str, float]:
+        """kappa_star (28) and energy (mean of U, without kappa_n**2/2), by the Gauss points of the collocation."""
+        system, x = self.discretized()
+        return dict(zip(system.problem.functionals, map(float, system.functionals(x))))
+
     def on(self, domain: Domain) -> Solution:
         """The same strip on another domain: a solution on the cell on a half loop, or any on the whole loop.
 
