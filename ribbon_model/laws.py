@@ -23,7 +23,9 @@ from typing import ClassVar
 
 from ribbon_model import finite_width
 
+#: Of parameters in a problem's statement; a run states them, so that nothing depends on these.
 _DEFAULTS = {"nu": 0.3, "Gamma": 1.0}
+#: What a message says of Gamma.
 _WHOSE = "it is a parameter of the law 'finite width', and of no other"
 
 

@@ -17,9 +17,10 @@ from branches.paper.page import Row, Section
 from branches.preview import preview
 from branches.read import read_branch
 from ribbon_model import exact
+from ribbon_model.laws import PAPER_LAWS
 
 NU = 0.3
-LAWS = ("ribbon", "flat rod", "isotropic rod")
+LAWS = tuple(PAPER_LAWS)
 FIG11 = f"{{title: Fig. 11, law: ribbon, nu: {NU}, m: 1, n: 2}}"
 FIG12 = (
     f"{{title: Fig. 12a, law: [{', '.join(LAWS)}], nu: {NU}, m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], "
