@@ -13,6 +13,7 @@ import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from contin import exact_text
+from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, label
 
 
 class ConfigError(Exception):
@@ -74,10 +75,6 @@ Interval = Annotated[tuple[float, float], BeforeValidator(_two_ordered_numbers)]
 Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]
 
 
-#: The domain on which a secondary branch is followed, by the reversal of S that it keeps.
-DOMAINS = {"mirror": "half loop", "axis": "half loop between axes"}
-
-
 class OriginConfig(_Strict):
     """Where a secondary branch leaves the primary branch (m, n)."""
 
@@ -90,7 +87,7 @@ class Config(_Strict):
     """One branch, followed to its end: that of the mode of wavenumber n on the m-covered circle, or one that leaves it."""
 
     title: str = ""
-    law: Literal["ribbon", "flat rod", "isotropic rod", "finite width"] = "ribbon"
+    law: Literal[*LAWS] = RIBBON.name
     nu: float = Field(0.3, gt=-1, le=0.5, description="Poisson's ratio")
     Gamma: float | None = Field(None, ge=0, le=1e12, description="w^2 / (h L/2pi), width and thickness; law finite width only")
     m: int = Field(ge=1, le=1000, description="covering index of the circle that the branch leaves")
@@ -126,9 +123,10 @@ class Config(_Strict):
             if self.domain == "half loop between axes":
                 raise ValueError("domain: the half loop between axes is for secondary branches, which have an origin")
             return
-        from ribbon_model.secondary import breaking  # brings the engine along: not for every scene
+        from ribbon_model.domains import HALF_LOOPS  # brings the engine along (.3 s): not for every scene
+        from ribbon_model.modes import Mode
 
-        allowed = [DOMAINS[reversal] for reversal in breaking(self.n, self.origin.mode).keeps]
+        allowed = [HALF_LOOPS[reversal].name for reversal in Mode.parse(self.n, self.origin.mode).keeps]
         if not allowed:
             raise ValueError(f"origin: {self.origin.mode!r} keeps no mirror and no axis, and is not followed")
         if self.domain not in allowed:
@@ -142,7 +140,6 @@ class Config(_Strict):
         ValueError
             The mode has no bifurcation; see `ribbon_model.linear.thresholds`.
         """
-        from ribbon_model.laws import LAWS
         from ribbon_model.linear import circle, thresholds
 
         law, material = LAWS[self.law], (self.nu, self.Gamma)
@@ -152,8 +149,6 @@ class Config(_Strict):
     @property
     def material(self) -> str:
         """The law with its Gamma, if it has one, as one name."""
-        from ribbon_model.laws import label
-
         return label(self.law, self.Gamma)
 
 
@@ -221,8 +216,6 @@ def _diagram(values: dict, name: str, settings: list[str]) -> DiagramConfig:
 
 def _branch_name(law: str, Gamma: float | None, nu: float, m: int, n: int) -> str:
     """A branch of a diagram in words."""
-    from ribbon_model.laws import label
-
     return f"{label(law, Gamma)}, nu = {exact_text(nu)}, ({m}, {n})"
 
 
@@ -242,9 +235,10 @@ def _check_different(branches: list[Config], name: str) -> None:
 
 def _families(lists: dict) -> list[tuple]:
     """All (law, nu, Gamma) of a diagram; beside the law that has a Gamma, the others stand without."""
-    laws, Gammas = lists.get("law", ["ribbon"]), lists.get("Gamma", [None])
-    without = [None] if "finite width" in laws else Gammas
-    kinds = [(law, Gamma) for law in laws for Gamma in (Gammas if law == "finite width" else without)]
+    laws, Gammas = lists.get("law", [RIBBON.name]), lists.get("Gamma", [None])
+    wide = [name for name, law in LAWS.items() if law.has_width and name in laws]
+    without = [None] if wide else Gammas
+    kinds = [(law, Gamma) for law in laws for Gamma in (Gammas if law in wide else without)]
     return [(law, nu, Gamma) for law, Gamma in kinds for nu in lists.get("nu", [0.3])]
 
 
@@ -331,7 +325,7 @@ def _of_strip(values: dict, name: str) -> dict:
     except ValueError as error:
         raise ConfigError(f"{name}: strip: {error}") from error
     rest = {key: value for key, value in values.items() if key != "strip"}
-    rest |= {"law": "finite width", "nu": found.poisson_ratio, "Gamma": found.Gamma}
+    rest |= {"law": FINITE_WIDTH.name, "nu": found.poisson_ratio, "Gamma": found.Gamma}
     zeros = rest.get("zeros", {})
     if isinstance(zeros, dict) and isinstance(zeros.get("kappa_n", []), list):  # else its own check complains
         rest["zeros"] = {**zeros, "kappa_n": [*zeros.get("kappa_n", []), found.kappa_n]}

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import time
 from pathlib import Path
 
-from branches import graph as diagram_graph
+from branches import diagram_graph
 from branches.config import Config, DiagramConfig, dump
 from branches.executor import WAIT, executor, run_jobs, trouble
-from branches.files import StoreError, only_run, prepare, write_bytes
-from contin import exact_text
+from branches.files import only_run, prepare, write_bytes
+from branches.names import DIAGRAM, primary_file
+from branches.read import complete_run, read_branch
 
 
 def compute(text: str) -> tuple[bytes, str]:
@@ -21,14 +21,6 @@ def compute(text: str) -> tuple[bytes, str]:
     from branches.job import compute_branch
 
     return compute_branch(parse(text, "scene"), Display(silent=True))
-
-
-def file_name(config: Config) -> str:
-    """The file of a primary branch inside the folder of its diagram; different branches of a scene have different ones."""
-    law = config.law.replace(" ", "_")
-    if config.Gamma is not None:
-        law += f"_Gamma{config.Gamma:.12g}"
-    return f"{law}_nu{exact_text(config.nu)}_m{config.m}_n{config.n}.h5"
 
 
 class _Plan:
@@ -92,8 +84,8 @@ def run_diagram(
         The scheduler cannot be used.
     """
     began, folder, graph = time.perf_counter(), Path(folder), diagram_graph.new_graph(config.title)
-    prepare(folder / "diagram.json")
-    with only_run(folder / "diagram.json"):
+    prepare(folder / DIAGRAM)
+    with only_run(folder / DIAGRAM):
         run = executor(scheduler, workers, time_limit)
         failed, left_out = _compute_missing(config, folder, graph, display, run, overwrite)
         graph.graph.update({"config": dump(config), "failed": json.dumps(failed), "absent": json.dumps(config.absent)})
@@ -105,7 +97,13 @@ def run_diagram(
 def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[dict[str, str], list[Config]]:
     """Compute what the folder does not hold; what failed, by file name with the reason, and what was there already."""
     configs = config.branches
-    fresh = [one for one in configs if overwrite or not _stored(folder, one, graph)]
+    fresh = []
+    for one in configs:
+        stored = None if overwrite else complete_run(folder / primary_file(one), one)
+        if stored is None:
+            fresh.append(one)
+        else:
+            diagram_graph.add_branch(graph, stored, primary_file(one))
     plan, failed = _Plan(configs, fresh, graph), {}
     display.begin_diagram(config, len(configs), len(configs) - len(fresh))
     if fresh:
@@ -114,7 +112,7 @@ def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[di
             for one, result in run_jobs(plan.next, _compute_one, submit, limit, wait):
                 problem = _take(folder, one, result, graph)
                 if problem:
-                    failed[file_name(one)] = problem
+                    failed[primary_file(one)] = problem
                 place = "" if problem else diagram_graph.describe(graph, one.m, one.n, one.material, one.nu)
                 display.branch_done(one, problem, place)
     return failed, plan.left_out
@@ -148,28 +146,12 @@ def _load_kernels(configs):
         system.functionals(x)
 
 
-def _stored(folder: Path, config: Config, graph) -> bool:
-    """Whether the folder holds this very branch, complete; it is then put into the graph."""
-    from branches.config import parse
-    from branches.read import read_branch
-
-    path = folder / file_name(config)
-    with contextlib.suppress(StoreError):
-        branch = read_branch(path)
-        if branch.status == "complete" and parse(dump(config), "scene").model_dump() == branch.config:
-            diagram_graph.add_branch(graph, branch, path.name)
-            return True
-    return False
-
-
 def _take(folder: Path, config: Config, result, graph) -> str:
     """Keep a finished branch; what went wrong with it, if anything."""
-    from branches.read import read_branch
-
     if isinstance(result, BaseException):
         return trouble(result)
     image, outcome = result
-    path = folder / file_name(config)
+    path = folder / primary_file(config)
     write_bytes(path, image)
     branch = read_branch(path)
     diagram_graph.add_branch(graph, branch, path.name)

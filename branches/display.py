@@ -12,13 +12,14 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
+from branches.labels import label_of
+
 if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this module before it knows what to do
     from contin import Point
 
 _HEADER = "   PT  TY  LAB         kappa_n      kappa_star          energy      step   N  it"
 #: Every that many regular points one is printed between the labelled ones.
 _EVERY = 5
-_KINDS = {b"LP": "fold", b"BP": "branch point", b"SB": "secondary bifurcation", b"UZ": "user value"}
 
 
 def survive_any_encoding() -> None:
@@ -173,4 +174,4 @@ def _describe(config, event) -> str:
         inside_out = ", curled against its natural curvature" if index < 0 else ""
         return f"ends on the {abs(index)}-covered circle{inside_out} at {place}{certain}"
     what = f" ({name})" if name and label != b"LP" else ""
-    return f"{_KINDS.get(label, 'end')}{what} at {place}{certain}, kappa* = {event['kappa_star']:.10f}"
+    return f"{label_of(label.decode()).word}{what} at {place}{certain}, kappa* = {event['kappa_star']:.10f}"

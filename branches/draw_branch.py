@@ -5,15 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from branches.draw_diagram import smooth
+from branches.labels import label_of
 from contin import exact_text
 from ribbon_model.laws import label as name_law
 
-# Okabe-Ito colours: told apart by the colour-blind, and in print
-CURVE, FOLD, END, SHAPE, BACK = "#0072B2", "#D55E00", "#000000", "#E8A33D", "#7A5195"
-MARKS = {
-    "LP": ("*", FOLD, 170, "fold"), "EP": ("o", END, 45, "end"), "BP": ("o", END, 45, "branch point"),
-    "UZ": ("D", "#009E73", 40, "user value"),
-}  # fmt: skip
+CURVE, SHAPE, BACK = "#0072B2", "#E8A33D", "#7A5195"
 
 
 def figure(branch, shapes: int = 6, width: float = 0.3):
@@ -64,12 +60,12 @@ def curve(axes, branch, chosen) -> None:
     axes.plot(*smooth(points["arclength"], points["kappa_n"], points["kappa_star"]), color=CURVE, lw=1.6, zorder=1)
     seen = set()
     for event in branch.events:
-        marker, colour, size, name = MARKS.get(event["label"].decode(), ("x", END, 40, "lost"))
-        label = None if name in seen or name == "branch point" else name
-        seen.add(name)
-        axes.scatter(event["kappa_n"], event["kappa_star"], marker=marker, color=colour, s=size, zorder=3, label=label)
+        mark = label_of(event["label"].decode())
+        label = None if mark.kind in seen or mark.kind == "branch point" else mark.kind
+        seen.add(mark.kind)
+        place = event["kappa_n"], event["kappa_star"]
+        axes.scatter(*place, marker=mark.marker, color=mark.colour, s=mark.size, zorder=3, label=label)
         if event["label"] == b"LP":
-            place = (event["kappa_n"], event["kappa_star"])
             axes.annotate(f"{event['kappa_n']:.4f}", place, (9, -3), textcoords="offset points", fontsize=9)
     axes.set_xlabel(r"natural curvature $\kappa_n L/2\pi$")
     axes.set_ylabel(r"conjugate curvature $\bar\kappa^*$")

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from branches.graph import families, pieces, secondaries
+from branches.diagram_graph import families, pieces, secondaries
+from branches.labels import END, FOLD, MARKS, SECONDARY
 from contin import exact_text
 
-STABLE, UNSTABLE, FOLD, DOT, SECONDARY = "#000000", "#9a9a9a", "#D55E00", "#000000", "#CC79A7"
+STABLE, UNSTABLE = "#000000", "#9a9a9a"
 #: Okabe-Ito colours and a line style for each wavenumber: told apart without colour too.
 STYLES = {
     1: ("#CC79A7", (0, (1, 1))), 2: ("#0072B2", "-"), 3: ("#009E73", "-"), 4: ("#D55E00", (0, (6, 1.5))),
@@ -17,7 +18,6 @@ STYLES = {
 }  # fmt: skip
 _OTHER = ("#444444", ":")
 _SECONDARY_STYLE = (SECONDARY, (0, (3, 1)))
-_MARKS = {"fold": ("*", FOLD, 90), "circle": ("o", DOT, 16), "secondary bifurcation": ("D", SECONDARY, 26)}
 #: Shapes of the way of a branch from one circle to the other in the disentangled picture, sigma -> sigma ** power.
 _POWERS = (1.0, 1.7, 0.6, 3.0, 0.35)
 
@@ -54,7 +54,7 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = 
     Parameters
     ----------
     graph : networkx.MultiGraph
-        As of `branches.graph`.
+        As of `branches.diagram_graph`.
     window : (float, float)
         Of kappa_n.
     disentangle : bool
@@ -114,8 +114,8 @@ def _draw(axes, line, height, at):
     if line.stable.any():
         axes.plot(line.kappa_n, np.where(line.stable, height, np.nan), color=colour, lw=4, zorder=2, solid_capstyle="butt")
     for (x, _, kind), y in zip(line.marks, at):
-        if kind in _MARKS:
-            marker, colour, size = _MARKS[kind]
+        if kind in MARKS:
+            marker, colour, size = MARKS[kind]
             axes.scatter(x, y, marker=marker, color=colour, s=size, zorder=3, linewidths=0)
 
 
@@ -160,7 +160,7 @@ def legend(graph, law: str, nu: float) -> list:
     handles += [
         Line2D([], [], color=STABLE, lw=2.5, label="circle, stable"),
         Line2D([], [], color=UNSTABLE, lw=1, label="circle, unstable"),
-        Line2D([], [], marker="o", color=DOT, ls="", ms=5, label="bifurcation of a circle"),
+        Line2D([], [], marker="o", color=END, ls="", ms=5, label="bifurcation of a circle"),
     ]
     if secondaries(graph, law, nu):
         colour, dashes = _SECONDARY_STYLE

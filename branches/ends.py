@@ -12,6 +12,7 @@ from contin import Continuation, Point, Stop
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import covering, thresholds
+from ribbon_model.solution import Solution
 
 #: An end on a circle misses its value in the linear theory by no more than ten times its error estimate, or by this, relative
 #: to 1 + its size: branches that end are known to 1e-11 and better, and other bifurcations of the circle are not as near.
@@ -65,7 +66,7 @@ def _explained(run: Continuation, config: Config) -> Stop | None:
     left = margin(state.system, state.x)
     if left > _NEARLY_CONVEX:
         return stop
-    value = state.system.all_parameters(state.x)[list(state.system.problem.parameters).index("kappa_n")]
+    value = Solution.at(state.system, state.x).parameters["kappa_n"]
     return Stop(
         "no convergence",
         f"the law has no response beyond kappa_n = {value:.6g}: its strain energy loses its convexity close by "

@@ -10,56 +10,14 @@ from pathlib import Path
 from branches.config import Config, ConfigError, dump, parse
 from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
+from branches.start import UntilPrimary, seed, settings_of
 from branches.store import BranchWriter, open_branch, read_state
-from contin import Continuation, ConvergenceError, MeshControl, Newton, Settings, exact_text
+from contin import Continuation, exact_text
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
-from ribbon_model.seeds import half_loop_branch, primary_branch
 
 #: Fields that a resumed run may change: where to stop and what to label, nothing that alters the points.
 _CHANGEABLE = ("title", "limits", "zeros", "stride")
-
-
-def settings_of(config: Config, monitors=()) -> Settings:
-    """The engine's settings for a scene, with further events."""
-    mesh, steps = config.mesh, config.steps
-    # beside a bifurcation that the branch leaves slowly, round-off moves solutions by as much along its kernel
-    newton = Newton(1e-8) if config.origin else Newton()
-    return Settings(
-        primary="kappa_n", step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
-        max_points=steps.max_points, angle=steps.angle, limits=config.limits, zeros=config.zeros, errors=True,
-        trivial=None if config.origin else "M2", monitors=monitors, newton=newton,
-        mesh=MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every),
-    )  # fmt: skip
-
-
-def seed(config: Config):
-    """System, first point and tangent of a scene's branch.
-
-    Raises
-    ------
-    ConfigError
-        The first mesh is too coarse to see the mode, or sees another one in its place; an origin that is none.
-    """
-    if config.origin:
-        from branches.secondary import leave
-
-        return leave(config)
-    start = primary_branch if config.domain == "cell" else half_loop_branch
-    coarse = ConfigError(
-        f"mesh: {config.mesh.intervals} intervals of degree {config.mesh.degree} do not resolve the mode "
-        f"(m, n) = ({config.m}, {config.n}) on the {config.domain}; take more intervals"
-    )
-    try:
-        system, x, tangent = start(
-            LAWS[config.law], config.m, config.n, config.nu, config.mesh.intervals, config.mesh.degree, Gamma=config.Gamma
-        )
-    except (ConvergenceError, ValueError) as error:
-        raise coarse from error
-    expected = config.at_bifurcation()["kappa_n"]
-    if abs(x[system.parameter_index("kappa_n")] - expected) > 1e-4 * (1 + abs(expected)):
-        raise coarse
-    return system, x, tangent
 
 
 def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=False) -> str:
@@ -124,11 +82,7 @@ def _watch(config: Config, system, x):
 
 def _kind(config: Config) -> type[Continuation]:
     """What follows the branch."""
-    if config.origin is None:
-        return Continuation
-    from branches.secondary import UntilPrimary
-
-    return UntilPrimary
+    return Continuation if config.origin is None else UntilPrimary
 
 
 def _monitors(config: Config, watch) -> list:

@@ -1,7 +1,7 @@
 """The instant preview: a diagram from the exact quadrature (`ribbon_model.exact`), nothing followed by continuation.
 
-It has the form of a computed diagram (`branches.graph`), says in ``graph.graph["source"]`` what it is, and is never mixed with
-computed branches.
+It has the form of a computed diagram (`branches.diagram_graph`), says in ``graph.graph["source"]`` what it is, and is never
+mixed with computed branches.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import Config, DiagramConfig
+from branches.labels import kind_of
 from contin import exact_text
 from ribbon_model import exact
 
 SOURCE = "preview: exact quadrature"
-_KINDS = {"LP": "fold", "BP": "circle", "EP": "leaves", "MX": "lost"}
 
 
 def preview(config: Config | DiagramConfig, step: float = 0.2):
@@ -54,7 +54,7 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
 
 
 def _add(graph, family, points):
-    place = np.array([exact.coordinates(point) for point in points])
+    place = np.array([point.coordinates for point in points])
     columns = {"arclength": np.append(0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))}
     columns |= {name: np.array([getattr(point, name) for point in points]) for name in ("kappa_n", "kappa_star", "energy")}
     special = [i for i, point in enumerate(points) if point.label]
@@ -64,6 +64,6 @@ def _add(graph, family, points):
 
 
 def _node(family, point, number):
-    kind = _KINDS[point.label]
+    kind = kind_of(point.label, "start" if point.label == "BP" else "", "limit", False)  # ends are circles or limits
     values = {"kappa_n": point.kappa_n, "kappa_star": point.kappa_star, "energy": point.energy}
     return diagram.node(family, kind, values, number)

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.config import ConfigError, parse
+from branches.config import Config, ConfigError, dump, parse
 from branches.files import StoreError
 from branches.store import open_branch
+from ribbon_model.domains import DOMAINS
 from ribbon_model.laws import LAWS
-from ribbon_model.shape import Shape, closed_strip
+from ribbon_model.shape import Shape
+from ribbon_model.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,8 @@ class StoredBranch:
         """Numbers of the points whose full solution is kept."""
         return self.index["point"]
 
-    def solution(self, point: int) -> tuple[np.ndarray, np.ndarray, int, dict[str, float]]:
-        """Nodes t (K,), states (K, n), degree and parameters of a kept point.
+    def solution(self, point: int) -> Solution:
+        """The solution of a kept point.
 
         Raises
         ------
@@ -48,13 +50,14 @@ class StoredBranch:
             raise StoreError(f"the solution of point {point} is not kept; a smaller stride keeps more")
         row = self.index[found[0]]
         here = slice(row["start"], row["start"] + row["count"])
-        names = [name for name in self.points.dtype.names if self.points.dtype[name].kind == "f"]
-        return self.t[here], self.states[here], int(row["degree"]), {name: float(self.points[point][name]) for name in names}
+        law, domain = LAWS[self.config["law"]], DOMAINS[self.config["domain"]]
+        names = [name for name in domain.problem(law).parameters if name in self.points.dtype.names]
+        parameters = {name: float(self.points[point][name]) for name in names}
+        return Solution(law, domain, self.t[here], self.states[here], int(row["degree"]), parameters)
 
     def shape(self, point: int) -> Shape:
         """The closed strip at a kept point; see `solution`."""
-        t, states, degree, parameters = self.solution(point)
-        return closed_strip(LAWS[self.config["law"]], t, states, degree, parameters)
+        return self.solution(point).shape()
 
     def to_pandas(self):
         """The table of points as a ``pandas.DataFrame`` (ImportError where pandas is not installed)."""
@@ -92,3 +95,13 @@ def read_branch(path: str | Path) -> StoredBranch:
             config, attributes["status"], attributes["stop"], attributes["stop_reason"], file["points"][:],
             file["events"][:], solutions["index"][:], solutions["t"][:], solutions["states"][:],
         )  # fmt: skip
+
+
+def complete_run(path: Path, config: Config) -> StoredBranch | None:
+    """The branch of a scene in a file, if it is there and complete."""
+    try:
+        branch = read_branch(path)
+    except StoreError:
+        return None
+    same = parse(dump(config), "scene").model_dump() == branch.config
+    return branch if branch.status == "complete" and same else None

@@ -7,87 +7,22 @@ those scenes from the labelled points SB of a result, runs them, and puts the br
 from __future__ import annotations
 
 import argparse
-import contextlib
-import dataclasses
 import json
 import sys
 from pathlib import Path
 
 import numpy as np
 
-from branches import graph as diagram
-from branches.config import DOMAINS, Config, ConfigError, dump, parse
+from branches import diagram_graph as diagram
+from branches.config import Config, ConfigError, dump, parse
 from branches.display import Display, complain, write_output
 from branches.files import StoreError, prepare, write_bytes
-from branches.read import StoredBranch, read_branch
-from contin import BranchPoint, ContinError, Continuation, Stop, exact_text
-from ribbon_model.laws import LAWS
-from ribbon_model.secondary import breaking, force, secondary_branch
-
-#: A force below this is none: what branches from a primary one has |R| of order one.
-_NO_FORCE = 1e-7
-#: Closer than this to a primary branch, kappa_n turns because the bifurcation is a pitchfork.
-_BESIDE = 1e-2
-#: Two values of kappa* closer than this, relative to 1 + their size, are the same place at the same kappa_n.
-_SAME_PLACE = 1e-6
-
-
-# --- one branch -----------------------------------------------------------------------------------------------------
-
-
-class UntilPrimary(Continuation):
-    """A run along a secondary branch that ends where it comes to a primary one: at a branch point with R = 0.
-
-    Beyond it the branch would be its own image.
-    """
-
-    def __iter__(self):
-        for point in super().__iter__():
-            if point.label == "LP" and force(point) < _BESIDE:
-                continue
-            if point.name != "start" and isinstance(point.details, BranchPoint) and force(point) < _NO_FORCE:
-                self.stop = Stop("primary branch", "came to a primary branch, where R = 0")
-                point = dataclasses.replace(point, label="EP", name="primary branch")
-            yield point
-            if self.stop is not None:
-                return
-
-
-def leave(config: Config):
-    """System, first point and tangent of the scene of a secondary branch; the primary one is followed to its origin.
-
-    Raises
-    ------
-    ConfigError
-        The primary branch does not pass there, or nothing leaves it there.
-    """
-    reversal = next(name for name, domain in DOMAINS.items() if domain == config.domain)
-    point = _at_origin(config)
-    solution = point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
-    try:
-        return secondary_branch(LAWS[config.law], *solution, reversal)
-    except (ContinError, ValueError) as error:
-        raise ConfigError(f"origin: {error}") from error
-
-
-def _at_origin(config: Config):
-    """The point of the primary branch."""
-    from branches.job import seed, settings_of
-
-    origin = config.origin
-    primary = Config(law=config.law, nu=config.nu, Gamma=config.Gamma, m=config.m, n=config.n, mesh=config.mesh)
-    reach = 10 * (1 + max(abs(origin.kappa_n), abs(primary.at_bifurcation()["kappa_n"])))
-    primary = primary.model_copy(update={"limits": {"kappa_n": (-reach, reach)}, "zeros": {"kappa_n": [origin.kappa_n]}})
-    system, x, tangent = seed(primary)
-    for point in Continuation(system, x, settings_of(primary), tangent):
-        same = abs(point["kappa_star"] - origin.kappa_star) < _SAME_PLACE * (1 + abs(origin.kappa_star))
-        if point.label == "UZ" and same:
-            return point
-    raise ConfigError(
-        f"origin: kappa_n = {origin.kappa_n:.10g}, kappa_star = {origin.kappa_star:.10g} is no point of the branch "
-        f"(m, n) = ({config.m}, {config.n})"
-    )
-
+from branches.job import compute_branch
+from branches.names import DIAGRAM, secondary_file
+from branches.read import StoredBranch, complete_run, read_branch
+from contin import ContinError
+from ribbon_model.domains import CELL, HALF_LOOPS
+from ribbon_model.modes import Mode
 
 # --- all that leave the branches of a result ------------------------------------------------------------------------
 
@@ -117,7 +52,7 @@ def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[di
         A result that cannot be used; a setting that cannot be.
     """
     primaries = _primaries(result)
-    prepare(folder / "diagram.json")
+    prepare(folder / DIAGRAM)
     graph = _diagram_in(folder)
     old = _remove_secondaries(graph, primaries)
     there = {data["file"] for _, _, data in graph.edges(data=True)}
@@ -150,7 +85,7 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
         found = {name: read_branch(result / name) for name in names}
     else:
         found = {result.name: read_branch(result)}
-    found = {name: one for name, one in found.items() if one.config["stability"] and one.config["domain"] == "cell"}
+    found = {name: one for name, one in found.items() if one.config["stability"] and one.config["domain"] == CELL.name}
     if not found:
         raise StoreError(f"{str(result)!r} holds no branch with its index on the cell; run its scene with stability: true")
     return found
@@ -158,7 +93,7 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
 
 def _diagram_in(folder: Path):
     """The diagram of a folder, or a new one."""
-    return diagram.read(folder) if (folder / "diagram.json").exists() else diagram.new_graph()
+    return diagram.read(folder) if (folder / DIAGRAM).exists() else diagram.new_graph()
 
 
 def _remove_secondaries(graph, primaries) -> list[dict]:
@@ -178,7 +113,7 @@ def _attempts(graph, branch: StoredBranch, name: str, event, folder: Path, setti
     about = {key: config[key] for key in ("law", "Gamma", "nu", "m", "n")} | where | {"mode": event["name"].decode()}
     record = {"primary": name, **about}
     try:
-        how = breaking(config["n"], about["mode"])
+        how = Mode.parse(config["n"], about["mode"])
     except ValueError as error:
         yield record | {"outcome": "failed", "reason": str(error)}
         return
@@ -186,14 +121,14 @@ def _attempts(graph, branch: StoredBranch, name: str, event, folder: Path, setti
     if not how.keeps:
         yield record | {"outcome": "failed", "reason": "its modes keep no mirror and no axis: they need the whole loop"}
     for reversal in how.keeps:
-        this = record | {"keeps": how.kept(reversal), "breaks": how.broken(reversal), "domain": DOMAINS[reversal]}
+        this = record | {"keeps": how.kept(reversal), "breaks": how.broken(reversal), "domain": HALF_LOOPS[reversal].name}
         yield this | _attempt(graph, branch, event, reversal, folder, settings)
 
 
 def _attempt(graph, branch: StoredBranch, event, reversal: str, folder: Path, settings) -> dict:
     """Follow one branch, put it into the diagram: how it ended."""
     config = _scene(branch.config, event, reversal, settings)
-    file = _file_name(config, {data["file"] for _, _, data in graph.edges(data=True)})
+    file = secondary_file(config, {data["file"] for _, _, data in graph.edges(data=True)})
     known = _arrived_before(graph, config)
     if known:
         return {"outcome": "known", "reason": f"the other end of {known}", "file": known}
@@ -217,22 +152,8 @@ def _scene(primary: dict, event, reversal: str, settings: list[str]) -> Config:
     kept["mesh"] = primary["mesh"]
     kept["limits"] = {name: list(ends) for name, ends in primary["limits"].items() if name not in ("M1", "M2")}
     origin = {name: float(event[name]) for name in ("kappa_n", "kappa_star")} | {"mode": event["name"].decode()}
-    text = dump(Config.model_validate(kept | {"domain": DOMAINS[reversal], "origin": origin}))
+    text = dump(Config.model_validate(kept | {"domain": HALF_LOOPS[reversal].name, "origin": origin}))
     return parse(text, "scene", settings)
-
-
-def _file_name(config: Config, taken: set[str]) -> str:
-    """The file of a secondary branch: that of its primary one, with the place and the domain.
-
-    The place has six digits: it was computed, and the others may differ on another machine. It is told more exactly only where
-    another branch of the diagram has the name already.
-    """
-    from branches.diagram import file_name
-
-    kappa_n, kappa_star = exact_text(config.origin.kappa_n), exact_text(config.origin.kappa_star)
-    places = (f"{config.origin.kappa_n:.6g}", kappa_n, f"{kappa_n}_{kappa_star}")
-    names = [f"{file_name(config)[:-3]}_from{place}_{config.domain.replace(' ', '_')}.h5" for place in places]
-    return next((name for name in names if name not in taken), names[-1])
 
 
 def _arrived_before(graph, config: Config) -> str:
@@ -247,15 +168,12 @@ def _arrived_before(graph, config: Config) -> str:
 
 def _computed(path: Path, config: Config) -> StoredBranch:
     """The branch of a scene: the one in the file if it is complete, or computed."""
-    from branches.job import compute_branch
-
-    with contextlib.suppress(StoreError):
+    stored = complete_run(path, config)
+    if stored is None:
+        image, _ = compute_branch(config, Display(silent=True))
+        write_bytes(path, image)
         stored = read_branch(path)
-        if stored.status == "complete" and stored.config == config.model_dump():
-            return stored
-    image, _ = compute_branch(config, Display(silent=True))
-    write_bytes(path, image)
-    return read_branch(path)
+    return stored
 
 
 def _goes(graph, file: str) -> str:

@@ -9,10 +9,11 @@ from threadpoolctl import ThreadpoolController
 
 from contin import ConvergenceError, TestFunction, correct
 from ribbon_model.convexity import margin
-from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
+from ribbon_model.modes import REVERSALS, Mode
 from ribbon_model.second_variation import from_solution
-from ribbon_model.secondary import breaking, force
+from ribbon_model.secondary import force
+from ribbon_model.solution import Solution
 from ribbon_model.stability import Stability, index
 
 #: Label of a secondary bifurcation: one that breaks a symmetry of the domain, which its own equations cannot see.
@@ -72,6 +73,7 @@ class Watch:
     def __init__(self, law: Law, system, x, from_circle: bool = True):
         self._law, self._known, self._blas, self._from_circle = law, [], ThreadpoolController(), from_circle
         self._margin = margin(law)
+        self._n = system.problem.on.wavenumber(Solution.at(system, x).parameters)
         names = [entry.name for entry in self.at(system, x).classes]
         self.monitors = [self._monitor(name) for name in names if name != _FULL]
 
@@ -142,16 +144,16 @@ class Watch:
                 values = values[np.abs(values) > _ON_CIRCLE]
             return float(np.prod(values))
 
-        wavenumber, parity = name
-        return TestFunction(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant, estimated=False)
+        mode = Mode(self._n, *name)
+        return TestFunction(LABEL, str(mode), determinant, estimated=False, describe=lambda trial: mode)
 
 
 def _broken(point) -> tuple[int, str]:
     """Dimension of the kernel of a secondary bifurcation, and the symmetries that it breaks."""
-    if "turn" not in point.parameters:  # a half loop: its one reversal is all that there is
-        return 1, "two-fold axis" if "axes" in point.parameters else "mirror"
-    n = round(LENGTH / (4 * point["length"]))
-    how = breaking(n, point.name.removeprefix("possible "))
+    reversal, how = point.system.problem.on.reversal, point.details
+    if reversal:  # a half loop: its one reversal is all that there is
+        return 1, REVERSALS[reversal]
+    n = how.n
     if not how.keeps:
         return how.dimension, f"{n} mirrors, {n} two-fold axes"
     return how.dimension, " or ".join(how.broken(reversal) for reversal in how.keeps)

@@ -100,8 +100,8 @@ def _at_natural_curvature(strip: Strip, m: int, n: int, folds: list) -> Iterator
     from ribbon_model import convexity
     from ribbon_model.laws import FINITE_WIDTH
     from ribbon_model.linear import thresholds
-    from ribbon_model.second_variation import from_solution
     from ribbon_model.seeds import primary_branch
+    from ribbon_model.solution import Solution
 
     kappa_n, nu, Gamma = strip.kappa_n, strip.poisson_ratio, strip.Gamma
     try:
@@ -116,8 +116,7 @@ def _at_natural_curvature(strip: Strip, m: int, n: int, folds: list) -> Iterator
         if point.label == "LP":
             folds.append((f"fold of ({m}, {n})", point["kappa_n"]))
         if point.label == "UZ":
-            solution = point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
-            yield point, from_solution(FINITE_WIDTH, *solution)
+            yield point, Solution.of(point).equilibrium()
 
 
 def _state(strip: Strip, name: str, point, equilibrium) -> State:

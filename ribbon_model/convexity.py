@@ -11,9 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 from contin import Batch, Monitor
-from ribbon_model.finite_width import strain_energy
-from ribbon_model.laws import FINITE_WIDTH, Law
+from ribbon_model.laws import Law
 from ribbon_model.shape import frames
+from ribbon_model.solution import Solution
 
 NAME = "the end of the convex strain energy"
 
@@ -24,28 +24,27 @@ def margin(law: Law) -> Callable | None:
     It is looked at for the strains at the nodes and halfway between those of neighbours, which finds jumps. None for a law
     whose H is a closed expression: its domain is known without.
     """
-    if law is not FINITE_WIDTH:
+    response, curvatures = law.response_at, law.curvatures_at
+    if curvatures is None:
         return None
-    response = law.response
 
     def strains(u, p):
-        H, w1, w2, w3, conjugate = response(u.M1, u.M2, u.M3, p.kappa_n, p.nu, p.Gamma)
+        H, w1, w2, w3, conjugate = response(u.M1, u.M2, u.M3, p)
         return w1, w3
 
-    def curvatures(u, p):
-        U, U1, U3, U11, U13, U33, Uk, U1k, U3k = strain_energy(u.w1, u.w3, p.kappa_n, p.nu, p.Gamma)
-        return U11, U13, U33
+    def second_derivatives(u, p):
+        return curvatures(u.w1, u.w3, p)
 
     names = ("kappa_n", *law.parameters)
     at, second = (
         Batch([function], [count], states, names, times=False)
-        for function, count, states in ((strains, 2, ("M1", "M2", "M3")), (curvatures, 3, ("w1", "w3")))
+        for function, count, states in ((strains, 2, ("M1", "M2", "M3")), (second_derivatives, 3, ("w1", "w3")))
     )
 
     def least(system, x):
-        values = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
-        p = np.array([values[name] for name in names])
-        w = _values(at, _moments(system.states(x), values), p)
+        solution = Solution.at(system, x)
+        p = np.array([solution.parameters[name] for name in names])
+        w = _values(at, _moments(solution), p)
         U11, U13, U33 = _values(second, np.concatenate([w, (w[1:] + w[:-1]) / 2]), p).T
         ratio = np.where((U11 > 0) & (U33 > 0), (U11 * U33 - U13**2) / (U11 * U33), -1.0)
         return float(np.nan_to_num(ratio, nan=-1.0).min())
@@ -57,11 +56,11 @@ def _values(batch, u, p):
     return batch.values(np.zeros(len(u)), np.ascontiguousarray(u), np.empty((0, u.shape[1])), p)
 
 
-def _moments(states, values):
+def _moments(solution: Solution):
     """Components of M on the directors at the nodes, shape (K, 3)."""
-    moment, force = (np.array([values.get(f"{letter}{i}", 0.0) for i in (1, 2, 3)]) for letter in "MR")
+    states, moment = solution.states, solution.moment
     if states.shape[1] > 4:
-        moment = moment - np.cross(states[:, 4:7], force)
+        moment = moment - np.cross(states[:, 4:7], solution.force)
     return np.einsum("kij,kj->ki", frames(states), np.broadcast_to(moment, (len(states), 3)))
 
 

@@ -25,11 +25,13 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
 from contin import correct
 from ribbon_model import exact, second_variation
-from ribbon_model.equilibrium import LENGTH, loop
+from ribbon_model.domains import LOOP
+from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
 from ribbon_model.linear import thresholds
 from ribbon_model.segments import Strip
 from ribbon_model.shape import quaternions
+from ribbon_model.solution import Solution
 from ribbon_model.stability import Stability, index
 
 #: Radius of gyration of a section in the metric 'velocity', in units of L / 2 pi.
@@ -285,8 +287,7 @@ def identify(strip: Strip) -> Rest:
     values = np.array([system.functionals(x) for system, x in solutions])[:, ::-1]  # energy, kappa*
     error = float(np.abs(values[1] - values[0]).max())
     system, x = solutions[1]
-    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
-    stability = index(second_variation.from_solution(law, system.nodes, system.states(x), system.degree, parameters))
+    stability = Solution.at(system, x).index()
     n = int(np.argmax(np.abs(np.fft.rfft(strains[:, 2]))))
     for m, point in _on_primary_branches(law, nu, kappa_n, n):
         difference = float(np.abs(values[1] - [point.energy, point.kappa_star]).max())
@@ -296,7 +297,7 @@ def identify(strip: Strip) -> Rest:
 
 
 def polished(strip: Strip, intervals: int = 24, degree: int = 7):
-    """The equilibrium next to a strip at rest, by collocation on the whole loop (`equilibrium.loop`) at the same kappa_n.
+    """The equilibrium next to a strip at rest, by collocation on the whole loop (`domains.LOOP`) at the same kappa_n.
 
     Returns
     -------
@@ -312,9 +313,8 @@ def polished(strip: Strip, intervals: int = 24, degree: int = 7):
     start = int(np.argmax(np.abs(twist - np.roll(twist, 1))))  # M3 at S = 0 fixes the phase
     strip = replace(strip, strains=np.roll(strip.strains, -start, axis=0))
     loads = -strip.segment * strip.linearized()[3]
-    domain = loop(strip.law)
     values = dict(zip(("M1", "M2", "M3", "R1", "R2", "R3"), loads)) | {"nu": strip.nu, "kappa_n": strip.kappa_n, "unfold": 0.0}
-    system = domain.discretize(intervals, degree, values)
+    system = LOOP.discretize(strip.law, intervals, degree, values)
     axes, x = strip.along(LENGTH * system.nodes)
     guess = system.pack(np.hstack([quaternions(axes.transpose(0, 2, 1)), x]), values)
     row = np.zeros(system.size)

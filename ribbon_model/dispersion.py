@@ -1,4 +1,4 @@
-"""Vibrations of a circular strip: tangent moduli, matrix and dispersion relation (Table 2, (23)-(26) of Audoly & Seffen 2015).
+"""Vibrations of a circular strip: matrix and dispersion relation ((23)-(26) of Audoly & Seffen 2015).
 
 Lengths are in units of the radius r0 of the circle and moments in units of B / r0, so that the prestress is
 moment = 1 - kappa_n r0 (17a). A mode of wavenumber n on the m-covered circle has k = n / m (22). Everything but the matrix is
@@ -13,38 +13,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
-from ribbon_model import finite_width
-from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
-
-
-def tangent_moduli(law: Law, ratio, nu, width=None) -> tuple:
-    """Contrast g of the bending moduli and twisting modulus t of (15), over B, where kappa_n r0 = ``ratio``: Table 2.
-
-    ``ratio`` and ``nu`` may be arrays; g is a number, infinite where the law has omega_2 = 0. ``width`` = w**2 / (h r0)
-    = Gamma omega_1 is of the law 'finite width' only.
-
-    Raises
-    ------
-    ValueError
-        A law that is not in Table 2 and not that one.
-    """
-    if law is RIBBON:
-        return math.inf, 2 * (1 - nu * ratio)
-    if law is FLAT_ROD:
-        return math.inf, 2 / (1 + nu)
-    if law is ISOTROPIC_ROD:
-        return 1.0, 1 / (1 + nu)
-    if law is FINITE_WIDTH:
-        return math.inf, finite_width.on_circle(ratio, nu, width)[1]
-    raise ValueError(f"the law {law.name!r} is not in Table 2: no closed formula for its tangent moduli")
-
-
-def prestress(law: Law, ratio, nu, width=None):
-    """Moment of the circle in units of B / r0: 1 - kappa_n r0 (17a), but for the law 'finite width'; see `tangent_moduli`."""
-    if law is FINITE_WIDTH:
-        return finite_width.on_circle(ratio, nu, width)[0]
-    return 1 - ratio
 
 
 def mode_matrix(moment: float, g: float, t: float, k: float, omega_squared: float) -> np.ndarray:

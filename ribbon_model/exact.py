@@ -24,11 +24,12 @@ The rods' quadratures are in `ribbon_model.exact_rods`; the follower and the fun
 Units: bending modulus B = 1, length L = 2 pi. Source of every number: quadrature of the R = 0 equilibrium.
 """
 
-import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
+from ribbon_model import exact_finite_width
 from ribbon_model.exact_rods import FLOAT, RODS, Numerics, RodPoint
 
 _HOMOCLINIC = -300.0  # log(q)/2 at which the follower stops, before q underflows
@@ -56,6 +57,18 @@ class ExactPoint:
     mu: float
     energy: float
     label: str = ""
+    law: ClassVar[str] = "ribbon"
+    root: ClassVar[int] = 0
+
+    @property
+    def amplitude(self) -> float:
+        """max(eta**2)."""
+        return self.eta_max_squared
+
+    @property
+    def coordinates(self) -> np.ndarray:
+        """Where the point lies in the plane of the unknowns, shape (2,), in which the branch is a smooth curve."""
+        return np.array([np.log1p(self.eta_max_squared), np.log(self.q) / 2])
 
 
 def bifurcation(m, n, nu):
@@ -79,14 +92,14 @@ def residuals(c, A, kappa_n, m, n, nu):
     return np.pi * np.array([(mean + mean_squared) / c - 1 / (2 * n), _defect(azimuth, m, n)])
 
 
-def solve(m, n, nu, guess, *, kappa_n=None, eta_max_squared=None, amplitude=None, law="ribbon", root=0):
+def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0):
     """The point of the branch with given kappa_n, or given amplitude, nearest a guess in the sense of Newton's method.
 
     Parameters
     ----------
     guess : ExactPoint, RodPoint, or for the ribbon (c, A, kappa_n)
-    kappa_n, eta_max_squared, amplitude : float
-        Exactly one of them: what the point must have. The two amplitudes are the A of the ribbon and of the rods.
+    kappa_n, amplitude : float
+        Exactly one of them: what the point must have. The amplitude is A: max(eta**2) for the ribbon.
     law, root :
         As for `curve`.
 
@@ -98,9 +111,8 @@ def solve(m, n, nu, guess, *, kappa_n=None, eta_max_squared=None, amplitude=None
         If Newton does not converge. Near a fold of kappa_n prescribe the amplitude, and conversely.
     """
     family = _family(law, m, n, nu, root)
-    A = eta_max_squared if law == "ribbon" else amplitude
-    if (kappa_n is None) == (A is None) or (eta_max_squared is not None and amplitude is not None):
-        raise ValueError(f"give exactly one of kappa_n and {'eta_max_squared' if law == 'ribbon' else 'amplitude'}")
+    if (kappa_n is None) == (amplitude is None):
+        raise ValueError("give exactly one of kappa_n and amplitude")
     if isinstance(guess, ExactPoint | RodPoint):
         z = family.coordinates(guess)
     else:
@@ -108,7 +120,7 @@ def solve(m, n, nu, guess, *, kappa_n=None, eta_max_squared=None, amplitude=None
     for _ in range(30):
         defect, numerator, denominator = FLOAT.gradients(family.parts, z)
         if kappa_n is None:
-            target = np.expm1(z[0]) - A, np.array([np.exp(z[0]), 0.0])
+            target = np.expm1(z[0]) - amplitude, np.array([np.exp(z[0]), 0.0])
         else:
             target = tuple(numerator[i] - kappa_n * denominator[i] for i in (0, 1))
         update = np.linalg.solve([defect[1], target[1]], [-defect[0], -target[0]])
@@ -147,10 +159,8 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
     RuntimeError
         If the follower cannot proceed.
     """
-    if law == "finite width":
-        from ribbon_model import exact_finite_width  # the engine compiles its energy
-
-        return exact_finite_width.curve(m, n, nu, Gamma, kappa_limits, step)
+    if law in _FOLLOWERS:
+        return _FOLLOWERS[law](m, n, nu, Gamma, kappa_limits, step)
     family, (lowest, highest) = _family(law, m, n, nu, root), kappa_limits
     start, begin = family.threshold(m), family.circle(m)
     if not lowest <= start <= highest:
@@ -191,14 +201,6 @@ def initial_slope(m, n, nu, law="ribbon", root=0):
     defect, numerator, denominator = FLOAT.gradients(family.parts, family.circle(m))
     gradient = (numerator[1] * denominator[0] - numerator[0] * denominator[1]) / denominator[0] ** 2
     return float(gradient[0] - gradient[1] * defect[1][0] / defect[1][1])  # along the branch, log(1 + A) being A to first order
-
-
-def coordinates(point):
-    """Where a point of `curve` lies in the plane of the unknowns, shape (2,) or (3,), on which the branch is a smooth curve."""
-    if hasattr(point, "Gamma"):
-        return np.array([point.kappa_n / 5, point.omega, math.sqrt(point.amplitude)])
-    law, root = (point.law, point.root) if isinstance(point, RodPoint) else ("ribbon", 0)
-    return _family(law, point.m, point.n, point.nu, root).coordinates(point)
 
 
 def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0, Gamma=None):
@@ -246,8 +248,7 @@ def refine(point, digits):
     """
     import mpmath  # of no use to anything else
 
-    law, root = (point.law, point.root) if isinstance(point, RodPoint) else ("ribbon", 0)
-    coarse = _family(law, point.m, point.n, point.nu, root)
+    coarse = _family(point.law, point.m, point.n, point.nu, point.root)
 
     def conditions(family, z, kappa_n, numerics):
         defect, turning = _turning(family, z, numerics)
@@ -257,7 +258,7 @@ def refine(point, digits):
             return np.array([defect, z[0]])
         return np.array([defect, family.values(z, numerics)[0] - kappa_n])
 
-    z = coarse.coordinates(point)
+    z = point.coordinates
     steps = 1e-5 * np.eye(2)
     slopes = [
         (conditions(coarse, z + e, point.kappa_n, FLOAT) - conditions(coarse, z - e, point.kappa_n, FLOAT)) for e in steps
@@ -265,7 +266,7 @@ def refine(point, digits):
     inverse = np.linalg.inv(np.array(slopes).T / 2e-5)
     with mpmath.workdps(digits + 10):
         numerics = Numerics(digits + 4)
-        fine = type(coarse)(point.m, point.n, mpmath.mpf(repr(point.nu)), root)
+        fine = type(coarse)(point.m, point.n, mpmath.mpf(repr(point.nu)), point.root)
         z, kappa_n = numerics.array(z), mpmath.mpf(repr(point.kappa_n))
         for _ in range(digits):  # a chord: some six digits each time
             update = numerics.array(inverse @ conditions(fine, z, kappa_n, numerics).astype(float))
@@ -276,12 +277,12 @@ def refine(point, digits):
 
 
 def _family(law, m, n, nu, root):
-    if law != "ribbon" and law not in RODS:
-        raise ValueError(f"law = {law!r} is none of 'ribbon', {', '.join(map(repr, RODS))}")
-    if root not in ((0, 1) if law == "isotropic rod" else (0,)):
+    if law not in _FAMILIES:
+        raise ValueError(f"law = {law!r} is none of {', '.join(map(repr, _FAMILIES))}")
+    if root not in range(_FAMILIES[law].roots):
         raise ValueError(f"root = {root}: the {law} has no such threshold")
     _check(m, n, nu, root)
-    return _Ribbon(m, n, nu) if law == "ribbon" else RODS[law](m, n, nu, root)
+    return _FAMILIES[law](m, n, nu, root)
 
 
 def _check(m, n, nu, root=0):
@@ -330,6 +331,8 @@ def _defect(azimuth, m, n, numerics=FLOAT):
 class _Ribbon:
     """The ribbon's branch in z = (log(1 + A), log(q)/2); the same interface as `ribbon_model.exact_rods.Rod`."""
 
+    roots = 1
+
     def __init__(self, m, n, nu, root=0):
         self.m, self.n, self.nu = m, n, nu
         self.finish = 2 * n - m if 2 * n > m else None
@@ -363,7 +366,12 @@ class _Ribbon:
         return ExactPoint(self.m, self.n, float(self.nu), *map(float, values), label)
 
     def coordinates(self, point):
-        return np.array([np.log1p(point.eta_max_squared), np.log(point.q) / 2])
+        return point.coordinates
+
+
+#: The branches of a law, by its name: those that the follower below walks, and those that are followed by another.
+_FAMILIES = {ExactPoint.law: _Ribbon, **RODS}
+_FOLLOWERS = {exact_finite_width.LAW: exact_finite_width.curve}
 
 
 def _homoclinic(z):

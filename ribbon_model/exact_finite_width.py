@@ -28,6 +28,8 @@ from ribbon_model import linear
 from ribbon_model.finite_width import strain_energy
 from ribbon_model.laws import FINITE_WIDTH
 
+#: The law's name.
+LAW = FINITE_WIDTH.name
 _FEWEST, _MOST = 32, 512  # nodes of a quarter wave
 _DIFFERENCE = 1e-5
 _FIRST, _SHORTEST = 0.02, 1e-3  # steps; the first is sqrt(A) of the first point, and off the circle
@@ -52,6 +54,11 @@ class FiniteWidthPoint:
     kappa_star: float
     energy: float
     label: str = ""
+
+    @property
+    def coordinates(self) -> np.ndarray:
+        """Where the point lies in the space of the unknowns, shape (3,), kappa_n counting a fifth."""
+        return np.array([self.kappa_n / 5, self.omega, math.sqrt(self.amplitude)])
 
 
 @functools.cache

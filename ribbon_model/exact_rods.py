@@ -104,6 +104,11 @@ class RodPoint:
     energy: float
     label: str = ""
 
+    @property
+    def coordinates(self) -> np.ndarray:
+        """Where the point lies in the plane of the unknowns, shape (2,), in which the branch is a smooth curve."""
+        return RODS[self.law](self.m, self.n, self.nu, self.root).coordinates(self)
+
 
 class Rod:
     """One branch: unknowns z = (log(1 + A), a function of the other constant), one equation.
@@ -112,7 +117,11 @@ class Rod:
     ----------
     finish : int or None
         The covering index of the circle where the branch may end, negative if omega_1 < 0 there.
+    roots : int
+        How many thresholds there are on a circle.
     """
+
+    roots = 1
 
     name: str
     alpha: int
@@ -206,7 +215,7 @@ class FlatRod(Rod):
 class IsotropicRod(Rod):
     """z = (log(1 + A), -log(p)/nu), whose limit at nu = 0 is U."""
 
-    name, alpha = "isotropic rod", 1
+    name, alpha, roots = "isotropic rod", 1, 2
     beta = property(lambda self: 1 + self.nu)
 
     def covering(self):

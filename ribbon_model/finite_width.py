@@ -146,6 +146,19 @@ def strain_energy(w1, w3, kappa_n, nu, Gamma):
     )
 
 
+def first_zero_of_t(nu: float, width: float) -> float | None:
+    """The smallest xi in (0, 1) where the torsional modulus t of the unfolding arc vanishes, or None; width is w**2/(R h)."""
+    import numpy as np
+    from scipy.optimize import brentq
+
+    def t(xi):
+        return strain_energy(1 - xi, 0.0, 1.0, nu, width)[5]
+
+    grid = 1 - np.geomspace(1.0, 1e-3 / (1 + width), 2000)
+    below = np.flatnonzero([t(xi) < 0 for xi in grid])
+    return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
+
+
 def _region(nu, Gamma):
     """The |omega_1| up to which the strip is like a flat rod, x < 1."""
     return 1 / (math.sqrt(3 * (1 - nu * nu)) * Gamma + 1e-100)

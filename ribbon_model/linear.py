@@ -13,11 +13,11 @@ the functions here, is for the law 'finite width' only.
 
 from __future__ import annotations
 
+import contextlib
 import math
 
-from ribbon_model import finite_width
-from ribbon_model.dispersion import coefficients, prestress, tangent_moduli
-from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
+from ribbon_model.dispersion import coefficients
+from ribbon_model.laws import Law, NoThreshold
 
 
 def thresholds(law: Law, m: int, n: int, nu: float, Gamma: float | None = None) -> tuple[float, ...]:
@@ -37,50 +37,12 @@ def thresholds(law: Law, m: int, n: int, nu: float, Gamma: float | None = None) 
     law.values(nu, Gamma)
     if n == m:
         raise ValueError(f"n = m = {m} is a rigid rotation, not a bifurcation")
-    s = (n / m) ** 2 - 1
-    if law is RIBBON:  # 1 - K = -2 (1 - nu K) s
-        if 1 + 2 * nu * s <= 0:  # 1 - nu K = (1 - nu) / (1 + 2 nu s) is the tangent twisting modulus over 2
-            raise ValueError(f"m = {m}, n = {n}, nu = {nu:g}: no threshold where the ribbon's twisting modulus is positive")
-        return (m * (1 + 2 * s) / (1 + 2 * nu * s),)
-    if law is FLAT_ROD:
-        return (m * (1 + 2 * s / (1 + nu)),)
-    if law is ISOTROPIC_ROD:  # M^2 - (1 + t) M - t s = 0
-        t = 1 / (1 + nu)
-        root = math.sqrt((1 + t) ** 2 + 4 * t * s)
-        values = (m * (1 - (1 + t - root) / 2), m * (1 - (1 + t + root) / 2))
-        return tuple(sorted(values, key=lambda value: abs(value - m)))
-    if law is FINITE_WIDTH:
-        return (_finite_width_threshold(m, n, nu, Gamma),)
-    raise ValueError(f"the law {law.name!r} has no closed formula here")
-
-
-def _finite_width_threshold(m, n, nu, Gamma):
-    """kappa_n = m (1 - y): with M and t of `finite_width.on_circle`, M = t (1 - k**2) is quadratic in y.
-
-    A y**2 + B y + C = 0 with A = -nu**2 G'/4 >= 0, which vanishes in both limits: the threshold is the root that stays.
-    """
-    s = (n / m) ** 2 - 1
-    straight, bent = (finite_width.on_circle(ratio, nu, m * Gamma) for ratio in (1.0, 0.0))  # y = 0 and y = 1
-    opposite = finite_width.on_circle(2.0, nu, m * Gamma)[0]  # y = -1
-    A = (bent[0] + opposite) / 2
-    B, C = (bent[0] - opposite) / 2 + s * (bent[1] - straight[1]), s * straight[1]
-    radicand = B * B - 4 * A * C
-    if radicand >= 0 and B > 0:
-        y = -2 * C / (B + math.sqrt(radicand))
-        _, t, bending = finite_width.on_circle(1 - y, nu, m * Gamma)
-        if t > 0 and bending > 0:
-            return float(m * (1 - y))
-    raise ValueError(
-        f"m = {m}, n = {n}, nu = {nu:g}, Gamma = {Gamma:g}: no threshold where the strain energy of a circle is convex"
-    )
+    return law.thresholds(m, n, nu, Gamma)
 
 
 def circle(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = None) -> dict[str, float]:
     """M1, kappa_star (28) and energy (over 2 pi B / L, without the constant kappa_n**2/2) of the planar m-covered circle."""
-    if law is not FINITE_WIDTH:
-        return {"M1": m - kappa_n, "kappa_star": m, "energy": m * m / 2 - m * kappa_n}
-    U, U1, _, _, _, _, Uk, _, _ = finite_width.strain_energy(m, 0.0, kappa_n, nu, Gamma)
-    return {"M1": U1, "kappa_star": kappa_n - Uk, "energy": U - kappa_n * kappa_n / 2}
+    return law.circle(m, kappa_n, nu, Gamma)
 
 
 def covering(kappa_n: float, kappa_star: float, energy: float) -> int:
@@ -115,16 +77,9 @@ def stability_interval(law: Law, m: int, nu: float, Gamma: float | None = None) 
     for n in (m - 1, m + 1):
         if n == 0:
             continue
-        try:
+        with contextlib.suppress(NoThreshold):  # nu away from 0, beyond the modes that have one: a limit of the law comes first
             ends += [value / m for value in thresholds(law, m, n, nu, Gamma)]
-        except ValueError:
-            if law not in (RIBBON, FINITE_WIDTH):
-                raise
-            # nu away from 0, beyond the modes that have a threshold where t > 0: the limit below comes first
-    if law is RIBBON and nu != 0:
-        ends.append(1 / nu)
-    if law is FINITE_WIDTH:
-        ends += finite_width.convex_limits(nu, m * Gamma)
+    ends += law.convex_limits(m, nu, Gamma)
     return max([-math.inf, *(end for end in ends if end < 1)]), min([math.inf, *(end for end in ends if end > 1)])
 
 
@@ -136,9 +91,7 @@ def energy_interval(law: Law, m: int, nu: float, Gamma: float | None = None) -> 
     isotropic rod, g = 1, at m = 1: a ring cannot be stable inside out.
     """
     low, high = stability_interval(law, m, nu, Gamma)
-    if law is FINITE_WIDTH:  # g is infinite
-        return low, high
-    g, _ = tangent_moduli(law, 1.0, nu)
+    g, _ = law.tangent_moduli(1.0, nu, _width(law, m, nu, Gamma))
     return max(low, 1 - g), high
 
 
@@ -167,12 +120,12 @@ def index(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = Non
         As `stability_interval`. On a bifurcation itself the zero directions are not counted.
     """
     _check(m, nu)
-    width = m * law.values(nu, Gamma).get("Gamma", 0.0)
-    moment = prestress(law, kappa_n / m, nu, width)
-    g, t = tangent_moduli(law, kappa_n / m, nu, width)
+    ratio, width = kappa_n / m, _width(law, m, nu, Gamma)
+    moment = law.prestress(ratio, nu, width)
+    g, t = law.tangent_moduli(ratio, nu, width)
     if t < 0 or (t == 0 and moment < 0):
         return math.inf
-    if law is FINITE_WIDTH and finite_width.on_circle(kappa_n / m, nu, width)[2] < 0:
+    if law.tangent_bending(ratio, nu, width) < 0:
         return math.inf
     count = 0 if moment <= g else 1
     n = 0
@@ -190,6 +143,11 @@ def index(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = Non
             count += 4
         elif n > m:
             return count
+
+
+def _width(law: Law, m: int, nu: float, Gamma: float | None) -> float:
+    """w**2/(h r0) of the m-covered circle; 0 for a law without a width."""
+    return m * law.values(nu, Gamma).get("Gamma", 0.0)
 
 
 def _check(m, nu):

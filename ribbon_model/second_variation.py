@@ -125,7 +125,7 @@ def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = No
 
 
 def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
-    """The equilibrium from the solution on the cell, the half loop or the loop; arguments as `shape.closed_strip`.
+    """The equilibrium from the solution on the cell, the half loop or the loop; arguments as `solution.Solution`.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from ribbon_model.equilibrium import LENGTH
-from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
+from ribbon_model.laws import Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
 from ribbon_model.shape import Shape
 
@@ -31,57 +31,7 @@ _SERIES = np.array(
 _GENERATORS = np.array([cross_matrix(axis) for axis in np.eye(3)])
 
 
-# --- the energy ---------------------------------------------------------------------------------------------------------
-
-
-def strain_energy(law: Law, strain, kappa_n: float, nu: float):
-    """U = max over M of M . omega - H(M), the moment dU/d(omega) and the stiffness D2U, at strains (..., 3).
-
-    For the ribbon, with c = (omega_1**2 + omega_3**2)/omega_1 and a = c - nu kappa_n where that is positive, else 0,
-
-        U = a**2/2 - (1 - nu) kappa_n omega_1 - (nu kappa_n)**2/2,
-
-    which is (7) of Audoly & Seffen (2015) where a > 0, and its convex envelope elsewhere; U = inf for omega_1 <= 0. Where
-    a = 0 the stiffness is singular. A component omega_2 that a law has not is passed over; its moment here is 0.
-
-    Returns
-    -------
-    U, moment, stiffness : ndarray, shapes (...), (..., 3), (..., 3, 3)
-
-    Raises
-    ------
-    ValueError
-        A law that is not one of the paper's.
-    """
-    strain = np.asarray(strain)
-    if law is RIBBON:
-        return _ribbon_energy(strain, kappa_n, nu)
-    if law not in (FLAT_ROD, ISOTROPIC_ROD):
-        raise ValueError(f"law {law.name!r}: descents are for {RIBBON.name!r}, {FLAT_ROD.name!r} and {ISOTROPIC_ROD.name!r}")
-    compliance = np.diag(law.linearized(np.zeros((1, 3)), 0.0, nu)[1][0])
-    moduli = np.array([0.0 if value == 0 else 1 / value for value in compliance])
-    moment = moduli * strain - kappa_n * np.array([1.0, 0.0, 0.0])
-    U = np.sum(moduli * strain * strain, axis=-1) / 2 - kappa_n * strain[..., 0]
-    return U, moment, np.broadcast_to(np.diag(moduli), (*strain.shape, 3))
-
-
-def _ribbon_energy(strain, kappa_n, nu):
-    w1, w3 = strain[..., 0], strain[..., 2]
-    kind = np.result_type(strain, kappa_n)
-    moment, stiffness = np.zeros(strain.shape, kind), np.zeros((*strain.shape, 3), kind)
-    safe = np.where(w1.real > 0, w1, 1.0)
-    eta = w3 / safe
-    a = safe * (1 + eta * eta) - nu * kappa_n
-    convex = a.real > 0
-    a = np.where(convex, a, 0.0)
-    slope = np.stack([1 - eta * eta, 2 * eta], axis=-1)  # of c, by omega_1 and omega_3
-    ratio = np.stack([-eta, np.ones_like(eta)], axis=-1)
-    bend = (2 / safe)[..., None, None] * ratio[..., None] * ratio[..., None, :]
-    moment[..., ::2] = a[..., None] * slope
-    moment[..., 0] -= (1 - nu) * kappa_n
-    stiffness[..., ::2, ::2] = convex[..., None, None] * slope[..., None] * slope[..., None, :] + a[..., None, None] * bend
-    U = a * a / 2 - (1 - nu) * kappa_n * w1 - (nu * kappa_n) ** 2 / 2
-    return np.where(w1.real > 0, U, np.inf), moment, stiffness
+# --- rotations ---------------------------------------------------------------------------------------------------------
 
 
 def _turn(a):
@@ -125,8 +75,8 @@ class Strip:
 
     @cached_property
     def density(self):
-        """U, moment and stiffness on the segments: `strain_energy`."""
-        return strain_energy(self.law, self.strains, self.kappa_n, self.nu)
+        """U, moment and stiffness on the segments: `Law.strain_energy`."""
+        return self.law.strain_energy(self.strains, self.kappa_n, self.nu)
 
     @cached_property
     def energy(self) -> float:
@@ -135,9 +85,9 @@ class Strip:
 
     @cached_property
     def kappa_star(self) -> float:
-        """-dE/dkappa_n, the conjugate curvature (28), with U as in `strain_energy`."""
+        """-dE/dkappa_n, the conjugate curvature (28), with U as in `Law.strain_energy`."""
         step = 1e-30
-        varied = strain_energy(self.law, self.strains, self.kappa_n + 1j * step, self.nu)[0]
+        varied = self.law.strain_energy(self.strains, self.kappa_n + 1j * step, self.nu)[0]
         return float(-np.mean(varied.imag) / step)
 
     @property
@@ -280,7 +230,7 @@ class Strip:
         stations = np.linspace(0, LENGTH, places)
         axes, x = self.along(stations)
         eta = np.zeros(places)
-        if self.law is RIBBON:
+        if self.law.has_rulings:
             middle = (np.arange(len(self.strains)) + 0.5) * self.segment
             eta = np.interp(stations, middle, self.strains[:, 2] / self.strains[:, 0], period=LENGTH)
         return Shape(stations, x, axes.transpose(0, 2, 1), eta)

@@ -1,26 +1,29 @@
-"""The closed strip in space: centreline, directors and surface, from the solution on a domain.
-
-The cell carries a mirror at S = 0 (plane through x(0), normal to d3) and a two-fold axis along d2 at its other end; the half
-loop carries mirrors at both ends, or two-fold axes along d2. These symmetries unfold a solution to the whole loop; where
-the plane and the axis (or the planes) meet, the copies turn about one line, so the centreline closes.
-"""
+"""The strip in space: centreline, directors and surface; images of a part of it under mirrors, axes and rotations."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from contin import basis, interpolation
-from ribbon_model.equilibrium import LENGTH, directors, on_directors
-from ribbon_model.laws import Law
+from ribbon_model.equilibrium import directors
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A closed strip: arc length (K,), centreline (K, 3), directors (K, 3, 3) with rows d1, d2, d3, ratio eta (K,)."""
+    """A strip in space, or a part of it.
+
+    Attributes
+    ----------
+    arclength : ndarray, shape (K,)
+    centreline : ndarray, shape (K, 3)
+    directors : ndarray, shape (K, 3, 3)
+        Rows d1, d2, d3.
+    eta : ndarray, shape (K,)
+        omega_3 / omega_1.
+    """
 
     arclength: np.ndarray
     centreline: np.ndarray
@@ -36,6 +39,40 @@ class Shape:
         """Points of the strip, shape (K, across, 3), ruled along d1 + eta d3 (equation (6a)) up to half the width."""
         ruling = self.directors[:, 0] + self.eta[:, None] * self.directors[:, 2]
         return self.centreline[:, None] + np.linspace(-0.5, 0.5, across)[:, None] * width * ruling[:, None]
+
+    def turned(self) -> Shape:
+        """The part and its image under the two-fold axis along d2 at its end."""
+        axis, centre = self.directors[-1, 1], self.centreline[-1]
+        turn = 2 * np.outer(axis, axis) - np.eye(3)
+        x = (self.centreline[-2::-1] - centre) @ turn + centre
+        d = self.directors[-2::-1] @ turn * np.array([-1.0, 1.0, -1.0])[:, None]
+        s = 2 * self.arclength[-1] - self.arclength[-2::-1]
+        return self._joined(Shape(s, x, d, self.eta[-2::-1]))
+
+    def mirrored(self) -> Shape:
+        """Both sides of the mirror normal to d3 at S = 0, starting at the far end."""
+        normal = self.directors[0, 2]
+        mirror = np.eye(3) - 2 * np.outer(normal, normal)
+        x = self.centreline[:0:-1] @ mirror
+        d = self.directors[:0:-1] @ mirror * np.array([1.0, 1.0, -1.0])[:, None]
+        whole = Shape(-self.arclength[:0:-1], x, d, -self.eta[:0:-1])._joined(self)
+        return Shape(whole.arclength - whole.arclength[0], whole.centreline, whole.directors, whole.eta)
+
+    def repeated(self, copies: int, axis, centre, angle: float) -> Shape:
+        """Copies one after the other, each turned by ``angle`` about the unit vector ``axis`` (3,) through ``centre`` (3,)."""
+        cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+        result = self
+        for copy in range(1, copies):
+            a = copy * angle
+            rotation = math.cos(a) * np.eye(3) + math.sin(a) * cross + (1 - math.cos(a)) * np.outer(axis, axis)
+            x = (self.centreline - centre) @ rotation.T + centre
+            s = self.arclength + copy * self.arclength[-1]
+            result = result._joined(Shape(s[1:], x[1:], (self.directors @ rotation.T)[1:], self.eta[1:]))
+        return result
+
+    def _joined(self, other: Shape) -> Shape:
+        pairs = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(Shape))
+        return Shape(*map(np.concatenate, pairs))
 
 
 def frames(states) -> np.ndarray:
@@ -77,104 +114,3 @@ def quadrature_centreline(t, states, degree: int, length: float) -> np.ndarray:
     inside = length * h[:, None, None] * np.einsum("ij,ejk->eik", partial, d3)
     inside[1:] += np.cumsum(inside[:, -1], axis=0)[:-1, None]
     return np.concatenate([np.zeros((1, 3)), inside.reshape(-1, 3)])
-
-
-def invariants(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> dict[str, np.ndarray]:
-    """What equilibrium keeps constant, at the nodes: ``norm`` |q|^2 and ``hamiltonian`` H(M) + R3, shape (K,) each."""
-    moment, force = _loads(states, parameters)
-    material = parameters["kappa_n"], *(parameters[name] for name in law.parameters)
-    values = [law.response(*m, *material)[0] for m in moment]
-    return {"norm": np.sum(states[:, :4] ** 2, axis=1), "hamiltonian": np.array(values) + force[:, 2]}
-
-
-def _loads(states, p):
-    """Body components of M and R at the nodes, shapes (K, 3)."""
-    force = np.array([p.get(name, 0.0) for name in ("R1", "R2", "R3")])
-    moment = np.array([p["M1"], p["M2"], p.get("M3", 0.0)])
-    if states.shape[1] > 4:
-        moment = moment - np.cross(states[:, 4:7], force)
-    q = states[:, :4].T
-    moment = np.broadcast_to(moment, (len(states), 3)).T
-    return np.array(on_directors(*q, *moment)).T, np.array(on_directors(*q, *force)).T
-
-
-def closed_strip(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> Shape:
-    """The whole loop from the solution on the domain that it was computed on.
-
-    Parameters
-    ----------
-    t : ndarray, shape (K,)
-        Nodes on the unit interval.
-    states : ndarray, shape (K, 4) or (K, 7)
-        Quaternion, and centreline where it is a state.
-    degree : int
-        Degree of the collocation.
-    parameters : mapping
-        All parameters of the problem.
-    """
-    p = parameters
-    length = p["length"]
-    d = frames(states)
-    x = states[:, 4:7] if states.shape[1] > 4 else quadrature_centreline(t, states, degree, length)
-    moment, _ = _loads(states, p)
-    material = p["kappa_n"], *(p[name] for name in law.parameters)
-    omega = np.array([law.response(*m, *material)[1:4] for m in moment])
-    eta = omega[:, 2] / omega[:, 0]
-    s = length * np.asarray(t)
-    part = Shape(s, x, d, eta)
-    if math.isclose(length, LENGTH):
-        return part
-    if "axes" in p:  # half loop between two-fold axes, which are one line
-        return _turned(part)
-    if "turn" not in p:  # half loop: one mirror does it
-        return _mirrored(part)
-    periods = round(LENGTH / (4 * length))
-    wave = _mirrored(_turned(part))
-    axis = p["sense"] * np.array([p["M1"], p["M2"], 0.0])
-    axis /= np.linalg.norm(axis)
-    angle = 4 * p["turn"]
-    centre = _centre(d[-1, 1], x[-1], axis, d[0, 2]) if abs(math.sin(angle / 2)) > 1e-9 else np.zeros(3)
-    return _repeated(wave, periods, axis, centre, angle)
-
-
-def _turned(part: Shape) -> Shape:
-    """A part (a quarter wave, a half loop) and its image under the two-fold axis along d2 at its end."""
-    axis, centre = part.directors[-1, 1], part.centreline[-1]
-    turn = 2 * np.outer(axis, axis) - np.eye(3)
-    x = (part.centreline[-2::-1] - centre) @ turn + centre
-    d = part.directors[-2::-1] @ turn * np.array([-1.0, 1.0, -1.0])[:, None]
-    s = 2 * part.arclength[-1] - part.arclength[-2::-1]
-    return _joined(part, Shape(s, x, d, part.eta[-2::-1]))
-
-
-def _mirrored(half: Shape) -> Shape:
-    """Both sides of the mirror at S = 0, starting at the far end."""
-    normal = half.directors[0, 2]
-    mirror = np.eye(3) - 2 * np.outer(normal, normal)
-    x = half.centreline[:0:-1] @ mirror
-    d = half.directors[:0:-1] @ mirror * np.array([1.0, 1.0, -1.0])[:, None]
-    whole = _joined(Shape(-half.arclength[:0:-1], x, d, -half.eta[:0:-1]), half)
-    return Shape(whole.arclength - whole.arclength[0], whole.centreline, whole.directors, whole.eta)
-
-
-def _joined(a: Shape, b: Shape) -> Shape:
-    return Shape(*(np.concatenate([getattr(a, f), getattr(b, f)]) for f in ("arclength", "centreline", "directors", "eta")))
-
-
-def _centre(d2, x, axis, d3_start):
-    """Where the two-fold axis (through x along d2) meets the mirror plane (through the origin, normal to d3_start)."""
-    return x - d2 * (x @ d3_start) / (d2 @ d3_start)
-
-
-def _repeated(wave: Shape, periods: int, axis, centre, angle) -> Shape:
-    """``periods`` copies of a wave, each turned by ``angle`` about the axis through ``centre``."""
-    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    result = wave
-    for copy in range(1, periods):
-        a = copy * angle
-        rotation = math.cos(a) * np.eye(3) + math.sin(a) * cross + (1 - math.cos(a)) * np.outer(axis, axis)
-        x = (wave.centreline - centre) @ rotation.T + centre
-        s = wave.arclength + copy * wave.arclength[-1]
-        turned = Shape(s, x, wave.directors @ rotation.T, wave.eta)
-        result = _joined(result, Shape(*(getattr(turned, f)[1:] for f in ("arclength", "centreline", "directors", "eta"))))
-    return result

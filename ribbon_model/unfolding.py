@@ -23,9 +23,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ribbon_model import finite_width
-from ribbon_model.dispersion import prestress, tangent_moduli
-from ribbon_model.laws import FINITE_WIDTH, RIBBON, Law
+from ribbon_model.laws import Law
 
 #: Half width in xi of what is left out around the flat state, which is not a root.
 FLAT = 0.01
@@ -49,10 +47,10 @@ def system_matrix(law: Law, nu, xi, width: float | None = None) -> np.ndarray:
         raise ValueError("xi = 1 is the flat strip: it has no radius to scale lengths with")
     ratio = 1 / (1 - xi)  # kappa_n r0
     local = None if width is None else width * (1 - xi)
-    g, t = tangent_moduli(law, ratio, nu, local)
+    g, t = law.tangent_moduli(ratio, nu, local)
     if np.any(t == 0):
         raise ValueError("the tangent twisting modulus vanishes: (20c) cannot be solved for psi_3'")
-    moment = prestress(law, ratio, nu, local)  # (17a)
+    moment = law.prestress(ratio, nu, local)  # (17a)
     matrix = np.zeros((*xi.shape, 6, 6))
     matrix[..., 0, 1] = 1  # (20a)
     matrix[..., 1, 2], matrix[..., 1, 3] = 1 - moment / g, 1 / g  # (20b)
@@ -105,19 +103,11 @@ def factors(law: Law, nu, xi, theta_n: float = math.pi, width: float | None = No
     nu, xi = np.broadcast_arrays(np.asarray(nu, float), np.asarray(xi, float))
     if np.any(xi == 0):
         raise ValueError("xi = 0 is the natural state: nothing to divide by")
-    kappa, moment, half = 1 - xi, -xi, theta_n / 2
-    if law is RIBBON:  # t kappa without the division
-        g, torsion = math.inf, 2 * (kappa - nu)
-    elif law is FINITE_WIDTH:  # a circle of curvature kappa that is naturally of curvature 1
-        energy = np.vectorize(finite_width.strain_energy, otypes=[float] * 9)(kappa, 0.0, 1.0, nu, width)
-        g, moment, t = math.inf, energy[1], energy[5]
-        torsion = t * kappa
-    else:
-        g, t = tangent_moduli(law, 1.0, nu)
-        torsion = t * kappa
+    kappa, half = 1 - xi, theta_n / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        g, moment, torsion, compliance = law.arc(xi, nu, width)
     bending = kappa - moment / g
     with np.errstate(divide="ignore", invalid="ignore"):
-        compliance = kappa / torsion if law is RIBBON else 1 / t + 0 * kappa  # 1/t
         w_squared = bending * (torsion - moment) * compliance
         cosine, sine, difference = _trigonometric(w_squared, half)
     s, c = half * np.sinc(kappa * half / np.pi), np.cos(kappa * half)
@@ -180,7 +170,7 @@ def first_root(
     if not (-1 < nu < 1 and theta_n > 0 and largest > 0):
         raise ValueError(f"nu = {nu:g}, theta_n = {theta_n:g}, largest = {largest:g}: outside what the search covers")
     law.values(nu, width)
-    found, end = [], _singular(law, nu, width)
+    found, end = [], law.arc_end(nu, width)
     for low, high in _pieces(law, nu, largest, end):
         for function in _functions(law, nu, theta_n, ends, method, width):
             grid = _grid(low, high, end)
@@ -207,31 +197,12 @@ def _functions(law, nu, theta_n, ends, method, width) -> list[Callable]:
     return [lambda xi, i=i: factors(law, nu, xi, theta_n, width)[i] for i in (0, 1)]
 
 
-def _singular(law, nu, width) -> float | None:
-    """The smallest xi in (0, 1) where t vanishes: 1 - nu for the ribbon."""
-    if law is RIBBON and nu > 0:
-        return 1 - nu
-    return first_zero_of_t(nu, width) if law is FINITE_WIDTH else None
-
-
-def first_zero_of_t(nu: float, width: float) -> float | None:
-    """The smallest xi in (0, 1) where the torsional modulus t of the law 'finite width' vanishes, or None."""
-    from scipy.optimize import brentq
-
-    def t(xi):
-        return finite_width.strain_energy(1 - xi, 0.0, 1.0, nu, width)[5]
-
-    grid = 1 - np.geomspace(1.0, 1e-3 / (1 + width), 2000)
-    below = np.flatnonzero([t(xi) < 0 for xi in grid])
-    return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
-
-
 def _pieces(law, nu, largest, singular):
     """Intervals of xi without a singular point inside."""
     if singular is not None:
         return [(0.0, min(largest, singular))]
     pieces = [(0.0, min(largest, 1 - FLAT))]
-    if largest > 1 + FLAT and not (law is RIBBON and nu < 0):
+    if largest > 1 + FLAT and law.passes_flat(nu):
         pieces.append((1 + FLAT, largest))
     return pieces
 

@@ -53,8 +53,8 @@ def picture_path(options) -> Path:
 
 def choose(graph, law, nu):
     """The law and nu to draw: those asked for, or the first that the diagram has."""
+    from branches.diagram_graph import families
     from branches.files import StoreError
-    from branches.graph import families
     from contin import exact_text
 
     have = sorted({family[:2] for family in families(graph)}, key=lambda pair: (pair[0] != "ribbon", pair))

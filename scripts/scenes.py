@@ -38,8 +38,9 @@ from branches.ends import checked, is_threshold  # noqa: E402
 from branches.job import begun  # noqa: E402
 from contin import ConvergenceError, Point, Stop  # noqa: E402
 from ribbon_model import exact  # noqa: E402
+from ribbon_model.laws import PAPER_LAWS  # noqa: E402
 
-NAMES = ("ribbon", "flat rod", "isotropic rod")
+NAMES = tuple(PAPER_LAWS)
 #: A value further off than ten times its error estimate is wrong, if the difference is above round-off of the quadrature: this,
 #: relative to 1 + its size (the quadrature's fold is stationary, its relative error some 1e-13).
 ESTIMATES, ROUND_OFF = 10, 1e-11

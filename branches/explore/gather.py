@@ -13,17 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import Config, dump
 from branches.files import StoreError
+from branches.labels import ON_PAGE, kind_of
 from branches.read import StoredBranch, read_branch
-from ribbon_model import equilibrium
+from ribbon_model.domains import DOMAINS
+from ribbon_model.equilibrium import directors
 from ribbon_model.laws import LAWS, from_label, label
 from ribbon_model.linear import circle, covering, energy_interval, index
 
-DOMAINS = {
-    "cell": equilibrium.cell, "half loop": equilibrium.half_loop, "half loop between axes": equilibrium.half_loop_between_axes
-}  # fmt: skip
 #: What is kept of a shape at each node, in this order.
 CHANNELS = ("q0", "q1", "q2", "q3", "eta", "x1", "x2", "x3")
 #: Columns of a circle: those of every law that the page reads.
@@ -36,7 +35,6 @@ _LOOP_NODES, _FEWEST = 384, 16
 _CIRCLE_STEPS = 50
 #: An integration takes a few hundred evaluations; the end conditions, which hold moments, are met to about 1e-6 of those.
 _MOST_EVALUATIONS, _OPEN = 50_000, 1e-3
-_KINDS = {"LP": "fold", "SB": "secondary", "UZ": "user", "MX": "lost"}
 
 
 def gather(results: list[str]) -> dict:
@@ -121,14 +119,10 @@ def _mark(event, reason: str, secondary: bool) -> dict:
     values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
     if not all(map(math.isfinite, values.values())):
         raise StoreError(f"the labelled point {event['point']} has columns that are no numbers")
-    kind = _KINDS.get(event["label"].decode(), "end")
-    if name == "trivial branch" or (name == "start" and not secondary):
-        return place | {"kind": "circle", "covering": covering(**values)} | values
-    if name in ("start", "primary branch"):
-        kind = "secondary"
-    elif kind == "end" and reason == "limit":
-        kind = "limit"
-    return place | {"kind": kind, "name": name} | values
+    kind = kind_of(event["label"].decode(), name, reason, secondary)
+    if kind == "circle":
+        return place | {"kind": kind, "covering": covering(**values)} | values
+    return place | {"kind": ON_PAGE.get(kind, "end"), "name": name} | values
 
 
 def shapes(branch: StoredBranch) -> np.ndarray:
@@ -143,9 +137,9 @@ def shapes(branch: StoredBranch) -> np.ndarray:
         The columns of a point are not those of a closed strip.
     """
     config = branch.config
-    problem = DOMAINS[config["domain"]](LAWS[config["law"]]).problem
-    parts = 4 * config["n"] if config["domain"] == "cell" else 2
-    t = np.linspace(0, 1, max(_FEWEST, math.ceil(_LOOP_NODES / parts)) + 1)
+    domain = DOMAINS[config["domain"]]
+    problem = domain.problem(LAWS[config["law"]])
+    t = np.linspace(0, 1, max(_FEWEST, math.ceil(_LOOP_NODES / domain.parts(config["n"]))) + 1)
     name = f"branch ({config['m']}, {config['n']})"
     return np.array([_integrated(problem, row, t, f"{name}, point {row['point']}") for row in branch.points])
 
@@ -163,7 +157,7 @@ def _integrated(problem, row, t, name: str) -> np.ndarray:
         frame = field.values(np.array([s]), u[None, :size], none, parameters)[0]
         if next(evaluations) > _MOST_EVALUATIONS or not np.isfinite(frame).all():
             raise wrong
-        return frame if size > 4 else np.append(frame, row["length"] * np.array(equilibrium.directors(*u[:4])[6:]))
+        return frame if size > 4 else np.append(frame, row["length"] * np.array(directors(*u[:4])[6:]))
 
     start = np.array([1.0, 0, 0, 0, 0, 0, 0])
     states = solve_ivp(rates, (0, 1), start, method="DOP853", t_eval=t, rtol=1e-9, atol=1e-10).y.T

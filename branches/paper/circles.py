@@ -9,7 +9,7 @@ import numpy as np
 
 from branches.paper.draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, pyplot, save
 from branches.paper.page import Row, Section
-from ribbon_model.dispersion import coefficients, squared_frequencies, tangent_moduli
+from ribbon_model.dispersion import coefficients, squared_frequencies
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.linear import energy_interval, stability_interval
 
@@ -94,7 +94,7 @@ def _draw_fig9(folder: Path) -> str:
 def _frequencies(axes, ratio):
     """The second root (26b) as a function of k, blue and solid where positive, orange and dashed where negative."""
     k = np.linspace(0, 2.06, 2000)
-    g, t = tangent_moduli(RIBBON, ratio, NU)
+    g, t = RIBBON.tangent_moduli(ratio, NU)
     root = squared_frequencies(1 - ratio, g, t, k)[1]
     _quantized(axes, 3, 2.06)
     axes.axvline(0, color="0.4", lw=0.8)
@@ -138,17 +138,17 @@ def _region(axes, law, window, top):
     from matplotlib.colors import ListedColormap
 
     ratio, k = np.meshgrid(np.linspace(*window, 900), np.linspace(-0.06, top, 700))
-    g, t = tangent_moduli(law, ratio, NU)
+    g, t = law.tangent_moduli(ratio, NU)
     b, c = coefficients(1 - ratio, g, t, k)
     unstable = b * (1 - k**2) / c < 0  # the factor k**2 of (26b) left out: it changes no sign
     axes.pcolormesh(ratio, k, np.where(unstable & (k > 0), 1.0, np.nan), cmap=ListedColormap([UNSTABLE_FILL]), rasterized=True)
     axes.contour(ratio, k, np.where(k > 0, b, np.nan), [0], colors="k", linewidths=1.3)
-    if law is ISOTROPIC_ROD:
+    if not law.constrained:
         axes.contour(ratio, k, np.where(k > 0, c, np.nan), [0], colors="k", linewidths=1.6, linestyles=":")
         hidden = np.where((c < 0) & ~unstable & (k > 0), 1.0, np.nan)
         axes.contourf(ratio, k, np.nan_to_num(hidden), [0.5, 1.5], colors="none", hatches=["xxxx"])
-    if law is RIBBON:
-        axes.axvline(1 / NU, color="k", lw=1.6, ls="--")
+    for limit in law.convex_limits(1, NU):
+        axes.axvline(limit, color="k", lw=1.6, ls="--")
     axes.set(xlim=window)
 
 
@@ -158,7 +158,7 @@ def _modes(axes, law, m, window, top):
     ratio = np.linspace(*window, 4000)
     for n in range(1, int(top * m) + 1):
         if n != m:
-            g, t = tangent_moduli(law, ratio, NU)
+            g, t = law.tangent_moduli(ratio, NU)
             unstable = squared_frequencies(1 - ratio, g, t, n / m)[1] < 0
             axes.plot(ratio, np.where(unstable, n / m, np.nan), color=UNSTABLE, lw=3.5, solid_capstyle="butt", zorder=2)
 
@@ -194,7 +194,7 @@ def _draw_fig10(folder: Path) -> str:
             region.axhline(k, color=RIGID, lw=1.8)
         region.axvline(1, color="0.2", lw=0.9, ls=":")
         region.set(title=f"({letter}) {law.name}", ylim=(-0.06, top), ylabel=WAVE)
-        _bars(bars, [(law, m) for m in COVERINGS], window, energy=law is ISOTROPIC_ROD)
+        _bars(bars, [(law, m) for m in COVERINGS], window, energy=not law.constrained)
         bars.set(yticks=range(len(COVERINGS)), yticklabels=COVERINGS, ylabel="covering index $m$", title=f"({letter}')")
         bars.set_xlabel(f"natural over actual curvature {LOAD}")
         for row, m in enumerate(COVERINGS):

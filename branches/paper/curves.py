@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from branches.files import write_picture
-from branches.paper.draw import STABLE, UNSTABLE
+from branches.paper.draw import STABLE, UNSTABLE, keep
 from branches.paper.page import Row, Section
 from branches.stability import LABEL, Watch
 from contin import Settings, curve, follow, locate_branch_point
 from ribbon_model import exact
+from ribbon_model.domains import HALF_LOOP
 from ribbon_model.laws import RIBBON
-from ribbon_model.secondary import unfolded
 from ribbon_model.seeds import primary_branch
+from ribbon_model.solution import Solution
 
 NU, LOWEST, HIGHEST = 0.3, -0.9, 0.5
 FOLDS = ((1, 2), (3, 4))
@@ -87,8 +87,7 @@ def secondary_curve(m: int, n: int) -> tuple[np.ndarray, list[tuple[str, float, 
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 8, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (LEFT, 100)}, monitors=Watch(RIBBON, system, x).monitors)
     first = next(point for point in follow(system, x, settings, tangent) if point.label == LABEL)
-    states = first.system.states(first.x)
-    system, x = unfolded(RIBBON, first.system.nodes, states, first.system.degree, first.parameters, "mirror")
+    system, x = Solution.of(first).on(HALF_LOOP).discretized()
     found = locate_branch_point(system, x)
     start = dataclasses.replace(first, label="BP", system=system, x=found.x, details=found)
     options = {"limits": {"nu": (LOWEST, HIGHEST), "kappa_n": (LEFT, 100)}, "zeros": {"nu": NUS_SECONDARY}, "max_step": 10.0}
@@ -129,6 +128,4 @@ def _draw(lines, secondary, last, folder: Path) -> str:
     panels[0].legend(frameon=False)
     for axes in panels:
         axes.grid(alpha=0.2)
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"curves{suffix}")
-    return "curves"
+    return keep(figure, folder, "curves")

@@ -5,27 +5,30 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.diagram import run_diagram
 from branches.display import Display
 from branches.draw_branch import figure as draw_branch
 from branches.draw_diagram import figure as draw_diagram
-from branches.files import write_picture
 from branches.job import run_branch
+from branches.paper.draw import keep
 from branches.paper.page import Row, Section
 from branches.preview import preview
 from branches.read import read_branch
 from ribbon_model import exact
+from ribbon_model.laws import PAPER_LAWS
 
 NU = 0.3
-LAWS = ("ribbon", "flat rod", "isotropic rod")
+LAWS = tuple(PAPER_LAWS)
 FIG11 = f"{{title: Fig. 11, law: ribbon, nu: {NU}, m: 1, n: 2}}"
 FIG12 = (
     f"{{title: Fig. 12a, law: [{', '.join(LAWS)}], nu: {NU}, m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], "
     "limits: {kappa_n: [-100, 100]}, stride: 20}"
 )
 WINDOW = (-8.0, 14.0)
+#: Section 6.3: how many folds the branch (1, 2) has; none for rods. Where the ribbon's is.
+FOLDS_PUBLISHED, FOLD_PUBLISHED = {"ribbon": "1"}, {("ribbon", 1, 2): "4.08"}
 
 
 def fig11(folder: Path) -> Section:
@@ -47,7 +50,7 @@ def fig11(folder: Path) -> Section:
         "κₙ first increases from 2.5: the pitchfork of the ribbon is supercritical, as section 6.3 says first; its last "
         "sentence on this bifurcation says the opposite (see Fig. 12).",
     ]
-    return Section("Fig. 11: from the single to the triple loop", rows, [_save(draw_branch(branch), folder, "fig11")], notes)
+    return Section("Fig. 11: from the single to the triple loop", rows, [keep(draw_branch(branch), folder, "fig11")], notes)
 
 
 def fig12(folder: Path) -> Section:
@@ -55,9 +58,9 @@ def fig12(folder: Path) -> Section:
     scene = parse(FIG12, "fig12")
     run_diagram(scene, folder / "fig12", Display(quiet=True))
     graph = diagram.read(folder / "fig12")
-    pictures = [_save(draw_diagram(graph, law, NU, WINDOW), folder, f"fig12_{law.replace(' ', '_')}") for law in LAWS]
+    pictures = [keep(draw_diagram(graph, law, NU, WINDOW), folder, f"fig12_{law.replace(' ', '_')}") for law in LAWS]
     ahead = preview(parse(FIG12, "fig12", ["law=ribbon"]))
-    pictures.insert(1, _save(draw_diagram(ahead, "ribbon", NU, WINDOW), folder, "fig12_preview"))
+    pictures.insert(1, keep(draw_diagram(ahead, "ribbon", NU, WINDOW), folder, "fig12_preview"))
     rows = [
         Row(f"{law}: different branches", "", _families(graph, law), "m = 1, 3, 5, 7, n ≤ 7, |κₙL/2π| ≤ 100") for law in LAWS
     ]
@@ -65,7 +68,7 @@ def fig12(folder: Path) -> Section:
         remark = f"m/ν, (27) for n → ∞; n = 7 is at {_threshold(graph, m, 7):.3f}"
         rows.append(Row(f"ribbon: bifurcations of m = {m} accumulate at κₙL/2π =", printed, m / NU, remark))
     for law in LAWS:
-        rows.append(Row(f"{law}: folds on (1, 2)", "1" if law == "ribbon" else "0", _folds_of(graph, law, 1, 2), "section 6.3"))
+        rows.append(Row(f"{law}: folds on (1, 2)", FOLDS_PUBLISHED.get(law, "0"), _folds_of(graph, law, 1, 2), "section 6.3"))
         near = diagram.course(graph, 1, 2, law, NU)[0]["nodes"]
         rows.append(Row(f"{law}: (1, 2) ends on covering", "3", near[-1]["covering"], f"at κₙL/2π = {near[-1]['kappa_n']:.6f}"))
     worst, table = _fold_rows(graph)
@@ -77,12 +80,6 @@ def fig12(folder: Path) -> Section:
         "branch arrives at them.",
     ]
     return Section("Fig. 12: the bifurcation diagram, ν = .3", rows + table, pictures, notes)
-
-
-def _save(figure, folder: Path, name: str) -> str:
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"{name}{suffix}")
-    return name
 
 
 def _families(graph, law) -> int:
@@ -123,7 +120,7 @@ def _fold_rows(graph) -> tuple[float, list[Row]]:
             raise ArithmeticError(f"{law} ({m}, {n}): {len(found)} folds by collocation, {len(known)} by quadrature")
         for node, point in zip(found, known):
             worst = max(worst, abs(node["kappa_n"] - point.kappa_n))
-            published = "4.08" if (law, m, n) == ("ribbon", 1, 2) else ""
+            published = FOLD_PUBLISHED.get((law, m, n), "")
             remark = f"κ̄* = {node['kappa_star']:.6f}; quadrature {node['kappa_n'] - point.kappa_n:+.0e}"
             rows.append(Row(f"{law}: fold of ({m}, {n}) at κₙL/2π =", published, f"{node['kappa_n']:.10f}", remark))
     return worst, rows

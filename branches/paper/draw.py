@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from branches.files import write_picture
+
 STABLE, UNSTABLE, MODES, RIGID = "#0072B2", "#D55E00", "#8a6d3b", "#000000"
 UNSTABLE_FILL = "#F3B48B"
 
@@ -17,6 +19,13 @@ def pyplot():
     import matplotlib.pyplot as plt
 
     return plt
+
+
+def keep(figure, folder: Path, name: str) -> str:
+    """Write a figure of no display as name.png and name.svg; the name. Raises `branches.files.StoreError`."""
+    for suffix in (".png", ".svg"):
+        write_picture(figure, folder / f"{name}{suffix}")
+    return name
 
 
 def save(figure, folder: Path, name: str) -> str:

@@ -9,12 +9,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.diagram import run_diagram
 from branches.display import Display
 from branches.draw_diagram import STYLES, conjugate, legend
-from branches.files import write_picture
+from branches.paper.draw import keep
 from branches.paper.page import Row, Section
 from contin import Settings, curve, follow
 from ribbon_model import exact
@@ -125,7 +125,7 @@ def _draw_curves(fold, birth, folder: Path) -> str:
     axes.set(xscale="log", xlim=(0.05, 1000), ylim=(-1, _TOP), xlabel=r"$\Gamma = w^2/(h L/2\pi)$", ylabel=r"$\kappa_n L/2\pi$")
     axes.legend(frameon=False, ncols=2, fontsize=9)
     axes.grid(alpha=0.2)
-    return _save(figure, folder, "finite_width_curves")
+    return keep(figure, folder, "finite_width_curves")
 
 
 def _fine(points: np.ndarray) -> np.ndarray:
@@ -148,10 +148,4 @@ def _draw_diagrams(graph, folder: Path) -> str:
         axes.label_outer()
     panels[0].set_ylabel(r"conjugate curvature $\bar\kappa^*$")
     figure.legend(handles=legend(graph, "ribbon", NU), loc="outside lower center", ncols=8, frameon=False)
-    return _save(figure, folder, "finite_width_fig12a")
-
-
-def _save(figure, folder: Path, name: str) -> str:
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"{name}{suffix}")
-    return name
+    return keep(figure, folder, "finite_width_fig12a")

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from branches.display import write_output
-from branches.files import write_picture
-from branches.paper.draw import STABLE, UNSTABLE
+from branches.paper.draw import STABLE, UNSTABLE, keep
 from branches.paper.page import Row, Section
 from branches.shell import DEFAULT, Outcome, ShellError, compute, describe, read
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
@@ -144,9 +143,7 @@ def _draw(outcomes: list[Outcome], folder: Path) -> str:
     _draw_laws(left)
     _draw_roots(left, outcomes)
     _draw_paper(right, [o for o in outcomes if o.case.way == "direct"])
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"fig7{suffix}")
-    return "fig7"
+    return keep(figure, folder, "fig7")
 
 
 def _draw_laws(axes):

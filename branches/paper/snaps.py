@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from branches.paper.draw import keep
 from branches.paper.page import Row, Section
 from ribbon_model.descent import METRICS, Descent, Rest, descend, identify, perturbed
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON, Law
 from ribbon_model.linear import energy_interval
-from ribbon_model.second_variation import circle, from_solution
+from ribbon_model.second_variation import circle
 from ribbon_model.segments import Strip, discretized
+from ribbon_model.solution import Solution
 
 NU, SEGMENTS = 0.3, 96
 #: How far past its limit a state is let go, relative to 1 + |limit|; root mean square of the kick in the strains.
@@ -27,7 +29,11 @@ SEEN = {
     ("ribbon", 7, -1): "five loops (not measured)",
     ("ribbon", 3, 1): "not reached; 'into five loops' surmised",
 }
-SEEN_FOLD = "three loops (above κₙr₀ = 3.50)"
+#: Ends of stable pieces of branches: (m, n), label, which of the points with that label, side, what the experiments saw.
+BUCKLED = {
+    RIBBON: ((1, 2, "LP", 0, 1, "three loops (above κₙr₀ = 3.50)"), (3, 4, "LP", 0, 1)),
+    ISOTROPIC_ROD: ((3, 1, "SB", -2, 1), (3, 1, "SB", -1, -1)),  # the last two: a stable piece lies between them
+}
 
 
 @dataclass(frozen=True)
@@ -85,10 +91,7 @@ def _starts() -> Iterator[Start]:
                     strip = discretized(circle(law, NU, m, at), SEGMENTS)
                     seen = SEEN.get((law.name, m, side), "")
                     yield Start(f"{law.name}: {m}-covered circle", m, m * limit, at, strip, seen, False)
-        if law is RIBBON:
-            yield from (_buckled(law, m, n, "LP", 0, 1, seen) for m, n, seen in ((1, 2, SEEN_FOLD), (3, 4, "")))
-        if law is ISOTROPIC_ROD:  # the last two secondary bifurcations: a stable piece lies between them
-            yield from (_buckled(law, 3, 1, "SB", at, side) for at, side in ((-2, 1), (-1, -1)))
+        yield from (_buckled(law, *where) for where in BUCKLED.get(law, ()))
 
 
 def _past(limit: float, side: int) -> float:
@@ -105,8 +108,7 @@ def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str
     monitors = Watch(law, system, x).monitors if label == "SB" else ()
     branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-60, 60)}, monitors=monitors), tangent)
     point = branch.labelled(label)[at]
-    solution = point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
-    strip = discretized(from_solution(law, *solution), SEGMENTS)
+    strip = discretized(Solution.of(point).equilibrium(), SEGMENTS)
     kappa_n = _past(point["kappa_n"], side)
     strip = replace(strip, kappa_n=kappa_n)
     return Start(f"{law.name}: buckled ({m}, {n})", m, point["kappa_n"], kappa_n, strip, seen, True)
@@ -164,7 +166,6 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
     from matplotlib.figure import Figure
 
     from branches.draw_branch import draw_strip
-    from branches.files import write_picture
 
     films = sorted(films, key=lambda film: film[0].m)
     figure = Figure(figsize=(2 * frames, 2.3 * len(films)), layout="constrained")
@@ -177,9 +178,7 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
             draw_strip(axes, shape, 0.25 * reach)
             axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
             axes.set_title(f"energy {strip.energy:.3f}", fontsize=9, y=0.95)
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"snaps{suffix}")
-    return "snaps"
+    return keep(figure, folder, "snaps")
 
 
 def _frames(descent: Descent, count: int) -> list[Strip]:

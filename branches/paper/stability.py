@@ -8,21 +8,18 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.diagram import run_diagram
 from branches.display import Display
-from branches.files import write_picture
 from branches.job import run_branch
 from branches.paper.diagram import FIG12, LAWS, NU, WINDOW
-from branches.paper.draw import STABLE, UNSTABLE
+from branches.paper.draw import STABLE, UNSTABLE, keep
 from branches.paper.page import Row, Section
 from branches.read import read_branch
 from ribbon_model.laws import LAWS as LAW_OBJECTS
 from ribbon_model.linear import energy_interval
 from ribbon_model.linear import index as index_of_circle
-from ribbon_model.second_variation import from_solution
-from ribbon_model.stability import index
 
 COVERINGS = (1, 3, 5, 7)
 #: A solution of every so many points is looked at.
@@ -94,7 +91,7 @@ def _stable_pieces(graph, folder: Path, law) -> dict[tuple[int, int], list[tuple
         if family[0] != law:
             continue
         pieces = [data for _, _, data in graph.edges(data=True) if (data["law"], data["m"], data["n"]) == (law, *family[2:4])]
-        values = _indices(read_branch(folder / pieces[0]["file"]), LAW_OBJECTS[law])
+        values = _indices(read_branch(folder / pieces[0]["file"]))
         seen = [_seen(values, data) for data in pieces]
         if any(0 in indices and indices != {0} for indices in seen):  # it changes between folds: locate where
             pieces = _with_secondary_bifurcations(folder, *family[:4])
@@ -120,14 +117,14 @@ def _with_secondary_bifurcations(folder: Path, law, nu, m, n) -> list[dict]:
     return [data for _, _, data in graph.edges(data=True)]
 
 
-def _indices(branch, law):
+def _indices(branch):
     """(arclength, index or None where undecided) of kept regular points inside the window."""
     result = []
     with threadpool_limits(1, "blas"):
         for number in branch.kept():
             row = branch.points[number]
             if row["label"] == b"" and WINDOW[0] <= row["kappa_n"] <= WINDOW[1]:
-                found = index(from_solution(law, *branch.solution(int(number))))
+                found = branch.solution(int(number)).index()
                 result.append((row["arclength"], found.index if found.decided else None))
     return result
 
@@ -154,6 +151,4 @@ def _draw(found, folder: Path) -> str:
     handles = [Patch(facecolor=STABLE, label="stable circle"), Patch(facecolor=UNSTABLE, hatch="////", edgecolor="white",
                label="stable buckled state of the branch (m, n)")]  # fmt: skip
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
-    for suffix in (".png", ".svg"):
-        write_picture(figure, folder / f"fig12b{suffix}")
-    return "fig12b"
+    return keep(figure, folder, "fig12b")

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from branches.paper.page import Row, Section
 from ribbon_model import exact
-from ribbon_model.dispersion import tangent_moduli
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.linear import stability_interval, thresholds
 
@@ -52,7 +51,7 @@ def table2(folder: Path) -> Section:
     rows = []
     for law, formula in ((RIBBON, "2(1 − νκₙr₀)"), (FLAT_ROD, "2/(1 + ν)"), (ISOTROPIC_ROD, "1/(1 + ν)")):
         for ratio in (0.0, 2.0):
-            g, t = tangent_moduli(law, ratio, NU)
+            g, t = law.tangent_moduli(ratio, NU)
             _, _, omega_2, omega_3, _ = law.response(1 - ratio, 1e-5, 1e-5, ratio, NU)  # omega_3 is odd in M_3
             where = f"ν = .3, κₙr₀ = {ratio:g}"
             rows.append(Row(f"{law.name}, t at {where}", f"{t:.6f}", 1e-5 / omega_3, f"published: t = {formula}"))

@@ -8,7 +8,6 @@ import numpy as np
 
 from branches.paper.draw import STABLE, UNSTABLE_FILL, pyplot, save
 from branches.paper.page import Row, Section
-from ribbon_model.dispersion import tangent_moduli
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.unfolding import HINGED, factors, first_root
 
@@ -49,7 +48,7 @@ def sign(law, nu, xi):
     Without the change of sign at xi = 1 that belongs to the scaling (shape of nu and xi broadcast).
     """
     even, odd = factors(law, nu, xi)
-    _, t = tangent_moduli(law, 1 / (1 - xi), nu)
+    _, t = law.tangent_moduli(1 / (1 - xi), nu)
     near_natural = np.sign(np.prod(factors(law, nu, np.float64(1e-3)), axis=0))
     return np.sign(even * odd * t) * near_natural * np.where(xi > 1, -1, 1)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.measure import SCRIPTS, environment, in_turn, median
 
-PACKAGES = ("numpy", "scipy.integrate", "numba", "contin", "ribbon_model.equilibrium", "branches.job")
+PACKAGES = ("numpy", "scipy.integrate", "numba", "contin", "ribbon_model.domains", "branches.job")
 CONFIG = SCRIPTS.parent / "configs" / "m1_n2.yaml"
 MODULES = """\
 import sys

@@ -1,11 +1,13 @@
 """Scenes: what is accepted, and the one sentence that a mistake gets."""
 
 import math
+from typing import get_args
 
 import pytest
 from pydantic import ValidationError
 
 from branches.config import Config, ConfigError, dump, load, parse
+from ribbon_model.domains import DOMAINS, LOOP
 
 SCENE = "m: 1\nn: 2\n"
 HUGE = "1" + "0" * 5000
@@ -155,6 +157,10 @@ def test_the_start_of_a_branch():
 def test_a_scene_is_not_changed_once_made():
     with pytest.raises(ValidationError):
         Config(m=1, n=2).nu = 0.1
+
+
+def test_domains_are_those_of_the_model():
+    assert {*get_args(Config.model_fields["domain"].annotation), LOOP.name} == set(DOMAINS)
 
 
 def test_the_half_loop_takes_what_the_cell_cannot():

@@ -13,15 +13,17 @@ import numpy as np
 import pytest
 
 from branches import diagram as diagrams
+from branches import diagram_graph as diagram
 from branches import draw_diagram
 from branches import executor as executors
-from branches import graph as diagram
 from branches.config import ConfigError, parse
-from branches.diagram import file_name, run_diagram
+from branches.diagram import run_diagram
 from branches.display import Display
 from branches.executor import ExecutorError, executor
 from branches.explore.gather import gather
 from branches.files import StoreError, only_run
+from branches.graph import main as graph_command
+from branches.names import primary_file
 from branches.preview import preview
 from branches.read import read_branch
 from ribbon_model import exact
@@ -107,7 +109,7 @@ def test_exports(folder):
 
 def test_a_second_run_computes_what_is_missing_only(folder, capsys):
     scene = parse(SCENE, "scene")
-    gone = folder / file_name(scene.branches[1])
+    gone = folder / primary_file(scene.branches[1])
     before = {path: path.stat().st_mtime_ns for path in folder.glob("*.h5") if path != gone}
     image = read_branch(gone).points
     gone.unlink()
@@ -125,11 +127,11 @@ def computed_here(tmp_path_factory):
     """Two branches, computed by this process: their points."""
     folder, scene = tmp_path_factory.mktemp("one"), parse(PAIR, "scene")
     run_diagram(scene, folder, Display(silent=True), workers=1)
-    return [read_branch(folder / file_name(config)).points for config in scene.branches]
+    return [read_branch(folder / primary_file(config)).points for config in scene.branches]
 
 
 def points_of(folder):
-    return [read_branch(folder / file_name(config)).points for config in parse(PAIR, "scene").branches]
+    return [read_branch(folder / primary_file(config)).points for config in parse(PAIR, "scene").branches]
 
 
 def test_a_cluster_makes_no_difference(computed_here, tmp_path):
@@ -157,7 +159,7 @@ def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatc
     graph = diagram.read(tmp_path)
     assert [family[2:] for family in diagram.families(graph)] == [(1, 2)]
     failed = json.loads(graph.graph["failed"])
-    reasons = [failed[file_name(scene.branches[i])] for i in (1, 3)]
+    reasons = [failed[primary_file(scene.branches[i])] for i in (1, 3)]
     assert reasons == ["its process died (exit code -9)", "not finished within the time limit"]
     assert "failed" in capsys.readouterr().out
     monkeypatch.undo()
@@ -278,7 +280,7 @@ def test_values_that_agree_in_six_digits_are_two_branches(close, capsys):
     for nu in (0.3, 0.3000001):
         (branch,) = diagram.course(graph, 1, 2, nu=nu)
         assert branch["nodes"][0]["kappa_n"] == pytest.approx(exact.bifurcation(1, 2, nu), abs=1e-9)
-    assert diagram.main([str(close)]) == 0
+    assert graph_command([str(close)]) == 0
     said = capsys.readouterr().out
     assert said.startswith("2 branches, 6 special points\n")
     assert "  ribbon, nu = 0.3, (1, 2): " in said and "  ribbon, nu = 0.3000001, (1, 2): " in said

@@ -95,7 +95,8 @@ def test_shapes_are_the_kept_solutions(pages):
         found = decoded(about)
         assert len(found) == len(branch.points)
         for point in branch.kept():
-            shape, (_, states, _, parameters) = branch.shape(point), branch.solution(point)
+            shape, solution = branch.shape(point), branch.solution(point)
+            states, parameters = solution.states, solution.parameters
             last = np.argmin(np.abs(shape.arclength - 3 * parameters["length"]))  # S = 0 lies in the middle of a wave
             assert np.abs(found[point, -1, :4] - states[-1]).max() < 2e-5
             assert abs(found[point, -1, 4] - shape.eta[last]) < 2e-5 * (1 + np.abs(found[point, :, 4]).max())

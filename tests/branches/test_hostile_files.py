@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import Config
 from branches.files import StoreError
 from branches.job import run_branch

@@ -6,12 +6,13 @@ import json
 import numpy as np
 import pytest
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import Config, ConfigError, dump, parse
 from branches.display import Display
 from branches.job import run_branch
+from branches.names import secondary_file
 from branches.read import read_branch
-from branches.secondary import _file_name, main
+from branches.secondary import main
 
 PAIR = "{m: 5, n: 2, stability: true, limits: {kappa_n: [-21, 100]}, stride: 20}"
 ORIGIN = "origin: {kappa_n: -21.62681748, kappa_star: 2.78375737, mode: wavenumber 1 even}"
@@ -79,7 +80,7 @@ def test_the_command_follows_both_kinds_of_a_pair_and_says_so(command, tmp_path)
 def test_places_that_agree_in_six_digits_have_files_of_their_own():
     config, taken = parse(SCENE, "scene"), set()
     for place in ("-21.6268", "-21.62681748", "-21.62681748_2.78375737"):
-        name = _file_name(config, taken)
+        name = secondary_file(config, taken)
         assert name == f"ribbon_nu0.3_m3_n1_from{place}_half_loop.h5"
         taken.add(name)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from branches import graph as diagram
+from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.display import Display
 from branches.job import run_branch

@@ -59,7 +59,8 @@ def test_solutions_belong_to_their_points(results):
     labelled = np.flatnonzero(branch.points["label"] != b"")
     assert branch.kept().tolist() == sorted({*range(0, len(branch.points), 5), *labelled})
     for point in branch.kept():
-        t, states, degree, parameters = branch.solution(point)
+        solution = branch.solution(point)
+        t, states, degree, parameters = solution.t, solution.states, solution.degree, solution.parameters
         assert (len(t) - 1) // degree == branch.points[point]["intervals"] and t[0] == 0 and t[-1] == 1
         assert states.shape == (len(t), 7)
         assert np.abs(np.linalg.norm(states[::degree, :4], axis=1) - 1).max() < 1e-10

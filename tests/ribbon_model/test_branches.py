@@ -6,11 +6,12 @@ from scipy.integrate import solve_ivp
 
 from contin import Settings, correct, follow, trace
 from ribbon_model import exact
-from ribbon_model.equilibrium import directors, half_loop, on_directors
+from ribbon_model.domains import HALF_LOOP, LOOP
+from ribbon_model.equilibrium import directors, on_directors
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.linear import thresholds
-from ribbon_model.seeds import half_loop_branch, primary_branch, whole_loop
-from ribbon_model.shape import closed_strip, invariants
+from ribbon_model.seeds import half_loop_branch, primary_branch
+from ribbon_model.solution import Solution
 
 NU = 0.3
 
@@ -20,10 +21,6 @@ def branch():
     """(1, 2), the branch of Fig. 11, at the settings that scenes use by default."""
     system, x, tangent = primary_branch(RIBBON, 1, 2, NU, 10, 7)
     return follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, errors=True), tangent)
-
-
-def solution(point):
-    return point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
 
 
 def test_fold_and_end_of_m1_n2(branch):
@@ -40,11 +37,11 @@ def test_fold_and_end_of_m1_n2(branch):
 def test_conserved_quantities_and_closure_along_the_branch(branch):
     assert len(branch) > 20
     for point in branch.points[1:-1]:
-        t, states, degree, parameters = solution(point)
-        kept = invariants(RIBBON, t[::degree], states[::degree], degree, parameters)
+        solution = Solution.of(point)
+        kept = {name: values[:: solution.degree] for name, values in solution.invariants().items()}  # at mesh points
         assert np.abs(kept["norm"] - 1).max() < 1e-10
         assert np.ptp(kept["hamiltonian"]) < 1e-10
-        strip = closed_strip(RIBBON, t, states, degree, parameters)
+        strip = solution.shape()
         assert strip.arclength[-1] == pytest.approx(2 * np.pi, abs=1e-12)
         assert strip.closure() < 1e-10
 
@@ -69,7 +66,7 @@ def test_the_loop_closes_by_an_independent_integration(branch):
 def test_the_full_loop_confirms_a_shape_and_finds_it_from_afar(branch):
     """Gauge and phase fixed: the unfolded cell satisfies the loop's equations with R = 0, and Newton returns to it."""
     point = branch.points[9]
-    system, guess = whole_loop(RIBBON, *solution(point))
+    system, guess = Solution.of(point).on(LOOP).discretized()
     row = np.zeros(system.size)
     row[system.parameter_index("kappa_n")] = 1.0
     assert np.abs(system.residual(guess)).max() < 1e-10
@@ -82,10 +79,9 @@ def test_the_full_loop_confirms_a_shape_and_finds_it_from_afar(branch):
 
 def test_the_half_loop_finds_every_wavenumber_and_follows_the_same_branch(branch):
     """Circle bifurcations 2.5, 2.931, 3.1 of m = 1 from (27), as simple branch points; then (1, 2), with R3 free but zero."""
-    domain = half_loop(RIBBON)
-    system = domain.discretize(12, 6, {"nu": NU})
+    system = HALF_LOOP.discretize(RIBBON, 12, 6, {"nu": NU})
     settings = Settings(limits={"kappa_n": (0, 3.15)}, max_step=0.05)
-    points = follow(system, domain.circle(system, 1, 2.0), settings).labelled("BP")
+    points = follow(system, HALF_LOOP.circle(system, 1, 2.0), settings).labelled("BP")
     expected = [thresholds(RIBBON, 1, n, NU)[0] for n in (2, 3, 4)]
     assert [point["kappa_n"] for point in points] == pytest.approx(expected, abs=1e-9)
     system, x, tangent = half_loop_branch(RIBBON, 1, 2, NU, 16, 6)

@@ -13,8 +13,9 @@ from ribbon_model.descent import METRICS, descend, identify, modes, perturbed
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON
 from ribbon_model.linear import index
 from ribbon_model.seeds import primary_branch
-from ribbon_model.segments import Strip, discretized, strain_energy
+from ribbon_model.segments import Strip, discretized
 from ribbon_model.shape import quaternions
+from ribbon_model.solution import Solution
 
 NU = 0.3
 LAWS = pytest.mark.parametrize("law", PAPER_LAWS.values(), ids=list(PAPER_LAWS))
@@ -45,9 +46,7 @@ def buckled(law, m, n, label="UZ", kappa_n=None):
     zeros = {} if kappa_n is None else {"kappa_n": [kappa_n]}
     branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-20, 20)}, zeros=zeros), tangent)
     point = branch.labelled(label)[0]
-    return second_variation.from_solution(
-        law, point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
-    )
+    return Solution.of(point).equilibrium()
 
 
 # --- energy and closure, and their derivatives ------------------------------------------------------------------------
@@ -61,7 +60,7 @@ def test_energy_is_the_legendre_transform_of_the_law(law):
     kappa_n = 0.7
     strain, compliance = law.linearized(moment, kappa_n, NU)
     H = np.array([law.response(*M, kappa_n, NU)[0] for M in moment])
-    energy, back, stiffness = strain_energy(law, strain, kappa_n, NU)
+    energy, back, stiffness = law.strain_energy(strain, kappa_n, NU)
     free = [0, 2] if law.constrained else [0, 1, 2]
     assert energy == pytest.approx(np.sum(moment[:, free] * strain[:, free], axis=1) - H, abs=1e-13)
     assert back[:, free] == pytest.approx(moment[:, free], abs=1e-13)
@@ -75,7 +74,7 @@ def test_gradient_of_the_energy_by_complex_steps(law):
     step = 1e-30
     direction = random.standard_normal(strip.strains.shape)
     direction[:, [i for i in range(3) if i not in strip.free]] = 0
-    U, moment, _ = strain_energy(law, strip.strains + 1j * step * direction, strip.kappa_n, NU)
+    U, moment, _ = law.strain_energy(strip.strains + 1j * step * direction, strip.kappa_n, NU)
     _, exactly, stiffness = strip.density
     assert U.imag / step == pytest.approx(np.sum(exactly * direction, axis=1), abs=1e-13)
     assert moment.imag / step == pytest.approx(np.einsum("kij,kj->ki", stiffness, direction), abs=1e-13)
@@ -85,10 +84,10 @@ def test_the_ribbon_is_linear_where_it_is_not_convex():
     """The convex envelope: same value and slope at c = nu kappa_n, and the moment that minimizes H beyond."""
     kappa_n = 3.0
     strains = np.array([[0.9 - 1e-9, 0, 0], [0.9 + 1e-9, 0, 0], [0.3, 0, 0.2]])  # nu kappa_n = 0.9
-    U, moment, stiffness = strain_energy(RIBBON, strains, kappa_n, NU)
+    U, moment, stiffness = RIBBON.strain_energy(strains, kappa_n, NU)
     assert U[0] == pytest.approx(U[1], abs=1e-8) and moment[0] == pytest.approx(moment[1], abs=1e-8)
     assert U[2] == pytest.approx(-(1 - NU) * kappa_n * 0.3 - (NU * kappa_n) ** 2 / 2) and not stiffness[2].any()
-    assert strain_energy(RIBBON, np.array([-1.0, 0, 0]), kappa_n, NU)[0] == np.inf
+    assert RIBBON.strain_energy(np.array([-1.0, 0, 0]), kappa_n, NU)[0] == np.inf
 
 
 @LAWS

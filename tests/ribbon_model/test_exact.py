@@ -36,7 +36,7 @@ def test_branch_leaves_its_circle(m, n):
     start = curve(m, n, 0.3, kappa_limits=(-200, 100))[0]
     assert (start.label, start.eta_max_squared) == ("BP", 0)
     assert (start.kappa_n, start.kappa_star, start.c) == pytest.approx((bifurcation(m, n, 0.3), m, m), rel=1e-14)
-    one, two, four = (solve(m, n, 0.3, start, eta_max_squared=k * 2e-5) for k in (1, 2, 4))
+    one, two, four = (solve(m, n, 0.3, start, amplitude=k * 2e-5) for k in (1, 2, 4))
     for name, limit in (("kappa_n", start.kappa_n), ("kappa_star", m)):
         at = [getattr(point, name) for point in (one, two, four)]
         assert (8 * at[0] - 6 * at[1] + at[2]) / 3 == pytest.approx(limit, rel=1e-10)
@@ -230,7 +230,7 @@ def test_solve():
     """A point of the curve is found again from a rough guess, by either target, from an ExactPoint or a triple."""
     here = next(p for p in curve(1, 2) if p.kappa_star > 2)
     rough = here.c * 1.01, here.eta_max_squared * 0.98, here.kappa_n + 0.02
-    for target in ({"kappa_n": here.kappa_n}, {"eta_max_squared": here.eta_max_squared}):
+    for target in ({"kappa_n": here.kappa_n}, {"amplitude": here.eta_max_squared}):
         found = solve(1, 2, 0.3, rough, **target)
         for name, value in dataclasses.asdict(here).items():
             assert name == "label" or getattr(found, name) == pytest.approx(value, rel=1e-11)

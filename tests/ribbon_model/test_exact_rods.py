@@ -221,6 +221,6 @@ def test_refusals():
     with pytest.raises(ValueError, match="multiple of 2n"):
         end(2, 1, 0.3, "isotropic rod")
     with pytest.raises(ValueError, match="exactly one"):
-        solve(1, 2, 0.3, curve(1, 2, law="flat rod")[3], eta_max_squared=0.1, law="flat rod")
+        solve(1, 2, 0.3, curve(1, 2, law="flat rod")[3], kappa_n=1.0, amplitude=0.1, law="flat rod")
     with pytest.raises(ValueError, match="starts at"):
         curve(1, 2, kappa_limits=(0, 1), law="isotropic rod")

@@ -10,12 +10,12 @@ import pytest
 import contin
 from contin import Settings, follow
 from ribbon_model import convexity, exact_finite_width, finite_width
-from ribbon_model.equilibrium import half_loop
+from ribbon_model.domains import HALF_LOOP
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, from_label, label
 from ribbon_model.linear import circle, covering, index, stability_interval, thresholds
 from ribbon_model.seeds import primary_branch
-from ribbon_model.shape import closed_strip
-from ribbon_model.unfolding import factors, first_root, first_zero_of_t, shooting_determinant
+from ribbon_model.solution import Solution
+from ribbon_model.unfolding import factors, first_root, shooting_determinant
 
 NU = 0.3
 
@@ -152,8 +152,8 @@ def test_thresholds_from_the_flat_rod_to_the_ribbon():
 
 
 def test_the_half_loop_bifurcates_at_the_thresholds():
-    system = half_loop(FINITE_WIDTH).discretize(12, 6, {"nu": NU, "Gamma": 10.0})
-    start = half_loop(FINITE_WIDTH).circle(system, 1, 2.0, circle(FINITE_WIDTH, 1, 2.0, NU, 10.0)["M1"])
+    system = HALF_LOOP.discretize(FINITE_WIDTH, 12, 6, {"nu": NU, "Gamma": 10.0})
+    start = HALF_LOOP.circle(system, 1, 2.0, circle(FINITE_WIDTH, 1, 2.0, NU, 10.0)["M1"])
     found = follow(system, start, Settings(limits={"kappa_n": (0, 4.6)}, max_step=0.1)).labelled("BP")
     expected = [thresholds(FINITE_WIDTH, 1, n, NU, 10.0)[0] for n in (2, 3)]
     assert [point["kappa_n"] for point in found] == pytest.approx(expected, abs=1e-9)
@@ -188,9 +188,7 @@ def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
     assert found.points[-1]["kappa_n"] == pytest.approx(points[-1].kappa_n, abs=1e-9)
     assert found.stop.reason == "trivial branch" and points[-1].omega == 2 * n - m
     middle = found.points[len(found.points) // 2]
-    system = middle.system
-    strip = closed_strip(FINITE_WIDTH, system.nodes, system.states(middle.x), system.degree, middle.parameters)
-    assert strip.closure() < 1e-10
+    assert Solution.of(middle).shape().closure() < 1e-10
 
 
 def test_a_branch_stops_where_the_law_ends():
@@ -243,4 +241,4 @@ def test_the_unfolding_arc():
     assert first_root(FINITE_WIDTH, NU, width=50.0, largest=0.99) is None
     # the smallest widths at which t vanishes somewhere in 0 < xi < 1, from a scan of the formula
     for nu, low, high in ((0.1, 173, 174), (0.2, 81, 82), (0.3, 51, 52), (0.4, 36, 37)):
-        assert first_zero_of_t(nu, low) is None and first_zero_of_t(nu, high) is not None
+        assert finite_width.first_zero_of_t(nu, low) is None and finite_width.first_zero_of_t(nu, high) is not None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ribbon_model import exact
-from ribbon_model.dispersion import coefficients, determinant, mode_matrix, squared_frequencies, tangent_moduli
+from ribbon_model.dispersion import coefficients, determinant, mode_matrix, squared_frequencies
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON, Law
 from ribbon_model.linear import energy_interval, index, stability_interval, thresholds
 
@@ -78,7 +78,7 @@ def test_naturally_straight_isotropic_rods():
 def test_table_2_follows_from_the_laws(law):
     """Table 2 against d omega_i / d M_i of the law itself on a circle of radius 1 (M_3 / omega_3 is even in M_3)."""
     for ratio, nu in ((0.0, 0.3), (1.0, 0.3), (2.0, 0.3), (2.0, -0.3)):
-        g, t = tangent_moduli(law, ratio, nu)
+        g, t = law.tangent_moduli(ratio, nu)
         tiny = 1e-5
         _, _, omega_2, omega_3, _ = law.response(1 - ratio, tiny, tiny, ratio, nu)
         assert tiny / omega_3 == pytest.approx(t, rel=1e-8)
@@ -87,7 +87,7 @@ def test_table_2_follows_from_the_laws(law):
 
 def test_a_law_outside_table_2_is_refused():
     other = Law("other", lambda M1, M2, M3, kappa_n, nu: M1, constrained=True)
-    for attempt in (lambda: tangent_moduli(other, 1.0, 0.3), lambda: index(other, 1, 1.0, 0.3)):
+    for attempt in (lambda: other.tangent_moduli(1.0, 0.3), lambda: index(other, 1, 1.0, 0.3)):
         with pytest.raises(ValueError, match="'other'"):
             attempt()
 
@@ -134,7 +134,7 @@ def test_c_is_no_root_of_the_static_determinant():
 def published_stable(law, m, ratio, nu):
     """Every root (26b) up to n = 12 m is positive, rigid modes left out."""
     k = np.array([n for n in range(1, 12 * m + 12) if n != m]) / m
-    g, t = tangent_moduli(law, ratio, nu)
+    g, t = law.tangent_moduli(ratio, nu)
     return bool(np.all(squared_frequencies(1 - ratio, g, t, k)[1] > 0))
 
 
@@ -175,7 +175,7 @@ def index_by_assembly(law, m, kappa_n, nu, highest=40):
     of n = m.
     """
     ratio = kappa_n / m
-    g, t = tangent_moduli(law, ratio, nu)
+    g, t = law.tangent_moduli(ratio, nu)
     moment = 1 - ratio
     count = 0
     for n in range(highest * m + 1):
@@ -202,7 +202,7 @@ def test_index_against_an_assembled_second_variation():
     for law in (RIBBON, FLAT_ROD, ISOTROPIC_ROD):
         for _ in range(60):
             m, nu, ratio = int(random.integers(1, 6)), random.uniform(-0.4, 0.49), random.uniform(-6, 6)
-            if law is RIBBON and tangent_moduli(law, ratio, nu)[1] < 0.05:
+            if law is RIBBON and law.tangent_moduli(ratio, nu)[1] < 0.05:
                 continue
             assert index(law, m, m * ratio, nu) == index_by_assembly(law, m, m * ratio, nu), (law.name, m, nu, ratio)
 
@@ -224,7 +224,7 @@ def test_isotropic_ring_inside_out():
 
 def test_beyond_c_equal_0_the_published_root_misses_a_negative_direction():
     """m = 3, n = 1, isotropic: for -t/9 > kappa_n r0 > -.199 (26b) is positive, and the energy has a negative direction."""
-    g, t = tangent_moduli(ISOTROPIC_ROD, -0.15, 0.3)
+    g, t = ISOTROPIC_ROD.tangent_moduli(-0.15, 0.3)
     b, c = coefficients(1.15, g, t, 1 / 3)
     assert squared_frequencies(1.15, g, t, 1 / 3)[1] > 0
     assert c < 0 and b * (1 - 1 / 9) < 0

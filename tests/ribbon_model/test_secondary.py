@@ -8,19 +8,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from contin import ConvergenceError, MeshControl, Newton, Settings, correct, follow
+from ribbon_model.domains import HALF_LOOPS, LOOP
 from ribbon_model.equilibrium import directors, on_directors
 from ribbon_model.laws import FLAT_ROD, RIBBON
-from ribbon_model.second_variation import Symmetry, from_solution
-from ribbon_model.secondary import Breaking, breaking, force, secondary_branch, unfolded
-from ribbon_model.seeds import primary_branch, whole_loop
-from ribbon_model.shape import closed_strip
+from ribbon_model.modes import Mode
+from ribbon_model.second_variation import Symmetry
+from ribbon_model.secondary import force, secondary_branch
+from ribbon_model.seeds import primary_branch
+from ribbon_model.solution import Solution
 from ribbon_model.stability import index
 
 NU = 0.3
-
-
-def solution(point):
-    return point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters
 
 
 @functools.cache
@@ -36,7 +34,7 @@ def at(law, m, n, kappa_n):
 @functools.cache
 def leave(law, m, n, kappa_n, reversal, sense=1, zeros=()):
     """The first points of a secondary branch."""
-    system, x, tangent = secondary_branch(law, *solution(at(law, m, n, kappa_n)), reversal)
+    system, x, tangent = secondary_branch(Solution.of(at(law, m, n, kappa_n)), HALF_LOOPS[reversal])
     newton = Newton(1e-8)  # beside the bifurcation round-off is that large along its kernel
     settings = Settings(max_points=12, mesh=MeshControl(1e-11), newton=newton, zeros={"kappa_n": zeros})
     return follow(system, x, settings, sense * tangent)
@@ -54,9 +52,9 @@ PLACES = [
 @pytest.mark.parametrize(("law", "m", "n", "kappa_n", "reversal"), PLACES)
 def test_a_bifurcation_is_simple_on_the_half_loop_with_its_symmetry(law, m, n, kappa_n, reversal):
     primary = at(law, m, n, kappa_n)
-    system, x = unfolded(law, *solution(primary), reversal)
+    system, x = Solution.of(primary).on(HALF_LOOPS[reversal]).discretized()
     assert np.abs(system.residual(x)).max() < 1e-9
-    system, x, tangent = secondary_branch(law, *solution(primary), reversal)
+    system, x, tangent = secondary_branch(Solution.of(primary), HALF_LOOPS[reversal])
     assert x[system.parameter_index("kappa_n")] == pytest.approx(kappa_n, abs=3e-7)
     values = dict(zip(system.problem.functionals, system.functionals(x)))
     assert values["energy"] == pytest.approx(primary["energy"], abs=1e-5)
@@ -66,7 +64,7 @@ def test_a_bifurcation_is_simple_on_the_half_loop_with_its_symmetry(law, m, n, k
 @pytest.mark.parametrize(("m", "kappa_n", "other"), [(3, -21.6268175, "axis"), (5, -24.4451886, "mirror")])
 def test_a_simple_mode_does_not_leave_the_other_half_loop(m, kappa_n, other):
     with pytest.raises((ValueError, ConvergenceError)):
-        secondary_branch(RIBBON, *solution(at(RIBBON, m, 1, kappa_n)), other)
+        secondary_branch(Solution.of(at(RIBBON, m, 1, kappa_n)), HALF_LOOPS[other])
 
 
 @pytest.mark.parametrize(("m", "n", "kappa_n", "reversal"), [(5, 1, -24.4451886, "axis"), (5, 2, -20.0441574, "mirror")])
@@ -74,8 +72,8 @@ def test_the_loop_closes_and_is_in_equilibrium(m, n, kappa_n, reversal):
     """The half loop unfolded satisfies the equations of the whole loop, and an integration by DOP853 comes back."""
     point = leave(RIBBON, m, n, kappa_n, reversal).points[-1]
     assert force(point) > 0.5
-    assert closed_strip(RIBBON, *solution(point)).closure() < 1e-9
-    system, guess = whole_loop(RIBBON, *solution(point))
+    assert Solution.of(point).shape().closure() < 1e-9
+    system, guess = Solution.of(point).on(LOOP).discretized()
     assert np.abs(system.residual(guess)).max() < 1e-8
     assert system.functionals(guess) == pytest.approx([point["kappa_star"], point["energy"]], abs=1e-8)
     p = point.parameters
@@ -93,7 +91,7 @@ def test_the_loop_closes_and_is_in_equilibrium(m, n, kappa_n, reversal):
 def test_newton_on_the_whole_loop_stays():
     """Between mirrors only: on a two-fold axis M3, which fixes the phase of the loop, is stationary."""
     point = leave(RIBBON, 5, 2, -20.0441574, "mirror").points[-1]
-    system, guess = whole_loop(RIBBON, *solution(point))
+    system, guess = Solution.of(point).on(LOOP).discretized()
     row = np.zeros(system.size)
     row[system.parameter_index("kappa_n")] = 1.0
     done = correct(system, guess, row, point["kappa_n"], Newton(1e-8))
@@ -103,7 +101,7 @@ def test_newton_on_the_whole_loop_stays():
 @pytest.mark.parametrize("reversal", ["mirror", "axis"])
 def test_the_index_by_symmetry_is_that_of_the_loop_without(reversal):
     point = leave(RIBBON, 5, 2, -20.0441574, reversal).points[-1]
-    equilibrium = from_solution(RIBBON, *solution(point))
+    equilibrium = Solution.of(point).equilibrium()
     assert equilibrium.symmetry == Symmetry(mirror=reversal == "mirror", axis=reversal == "axis")
     plain = dataclasses.replace(equilibrium, symmetry=Symmetry())
     ours, theirs = index(equilibrium), index(plain)
@@ -122,10 +120,10 @@ def test_stability_is_exchanged(law, m, n, kappa_n, reversal, more):
 
     Of the two kinds of branches that leave by a pair of modes, one has another, from the mode that is not its own.
     """
-    before, after = (index(from_solution(law, *solution(at(law, m, n, kappa_n + d)))).index for d in (0.2, -0.2))
+    before, after = (Solution.of(at(law, m, n, kappa_n + d)).index().index for d in (0.2, -0.2))
     assert before - after == (1 if n == 1 else 2)
     point = leave(law, m, n, kappa_n, reversal).points[-1]
-    found = index(from_solution(law, *solution(point)))
+    found = Solution.of(point).index()
     assert found.decided
     assert found.index == (after + more if point["kappa_n"] < kappa_n else before - more)
 
@@ -140,27 +138,27 @@ def test_both_ways_along_the_kernel_are_images():
 
 
 def test_what_modes_keep():
-    assert breaking(1, "wavenumber 1 even") == Breaking(1, 1, "even")
-    one = breaking(2, "wavenumber 1 pair")
+    assert Mode.parse(1, "wavenumber 1 even") == Mode(1, 1, "even")
+    one = Mode.parse(2, "wavenumber 1 pair")
     assert (one.dimension, one.keeps, one.symmetric) == (2, ("mirror", "axis"), True)
     assert one.kept("axis") == "one two-fold axis"
     assert one.broken("axis") == "2 mirrors, one two-fold axis, 4-fold rotary reflection"
-    assert breaking(3, "wavenumber 3 odd").kept("axis") == "3 two-fold axes, 3-fold rotation"
-    assert breaking(1, "wavenumber 0 odd").keeps == ()
-    third = breaking(3, "wavenumber 2 pair")  # comes back after three rotary reflections, which exchange mirrors and axes
+    assert Mode.parse(3, "wavenumber 3 odd").kept("axis") == "3 two-fold axes, 3-fold rotation"
+    assert Mode.parse(1, "wavenumber 0 odd").keeps == ()
+    third = Mode.parse(3, "wavenumber 2 pair")  # comes back after three rotary reflections, which exchange mirrors and axes
     assert (third.keeps, third.symmetric) == (("mirror",), False)
     assert third.kept("mirror") == "one mirror, one two-fold axis, 2-fold rotary reflection"
 
 
 def test_a_mode_that_is_none_is_named():
     with pytest.raises(ValueError, match="must be .*wavenumber 1 pair"):
-        breaking(2, "wavenumber 1 even")
+        Mode.parse(2, "wavenumber 1 even")
 
 
 def test_a_rod_loses_its_symmetry_too():
     """The flat rod's (3, 1) changes its index by one, and there the half loop between mirrors has a branch point."""
     kappa_n = 1.0104548
-    counts = [index(from_solution(FLAT_ROD, *solution(at(FLAT_ROD, 3, 1, kappa_n + d)))).index for d in (0.01, -0.01)]
+    counts = [Solution.of(at(FLAT_ROD, 3, 1, kappa_n + d)).index().index for d in (0.01, -0.01)]
     assert abs(counts[0] - counts[1]) == 1
-    system, x, _ = secondary_branch(FLAT_ROD, *solution(at(FLAT_ROD, 3, 1, kappa_n)), "mirror")
+    system, x, _ = secondary_branch(Solution.of(at(FLAT_ROD, 3, 1, kappa_n)), HALF_LOOPS["mirror"])
     assert x[system.parameter_index("kappa_n")] == pytest.approx(kappa_n, abs=1e-6)

@@ -13,10 +13,12 @@ from scipy.optimize import brentq
 from contin import Settings, correct, follow, trace
 from ribbon_model import linear
 from ribbon_model.conjugate import conjugate_index
+from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON
 from ribbon_model.second_variation import circle, coupling, from_solution
-from ribbon_model.seeds import half_loop_branch, primary_branch, whole_loop
+from ribbon_model.seeds import half_loop_branch, primary_branch
+from ribbon_model.solution import Solution
 from ribbon_model.stability import index
 
 NU = 0.3
@@ -189,7 +191,7 @@ def test_domains_agree():
     """The same state as a cell, and as a whole loop of which no symmetry is known."""
     point = between_ends(branch(1, 2))[15]
     part = index(equilibrium(point), accuracy=1e-8)
-    system, x = whole_loop(RIBBON, point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters)
+    system, x = Solution.of(point).on(LOOP).discretized()
     values = dict(zip(system.problem.parameters, system.all_parameters(x)))
     whole = index(from_solution(RIBBON, system.nodes, system.states(x), system.degree, values), accuracy=1e-8)
     assert whole.index == part.index

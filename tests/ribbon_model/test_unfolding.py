@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import contin
-from ribbon_model.dispersion import tangent_moduli
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.unfolding import CLAMPED, HINGED, factors, first_root, shooting_determinant, system_matrix
 
@@ -21,7 +20,7 @@ def test_closed_form_is_the_shooting_determinant(law, theta_n):
     nu = random.uniform(-0.3, 0.49, 60)
     xi = np.concatenate([random.uniform(0.02, 0.45, 30), random.uniform(1.6, 4, 30)])
     even, odd = factors(law, nu, xi, theta_n)
-    _, t = tangent_moduli(law, 1 / (1 - xi), nu)
+    _, t = law.tangent_moduli(1 / (1 - xi), nu)
     closed = -8 * (1 - xi) ** 4 / t * even * odd
     direct = shooting_determinant(law, nu, xi, theta_n)
     assert np.max(np.abs(direct - closed) / (np.abs(direct) + 1e-3)) < 1e-8
@@ -86,7 +85,7 @@ def test_the_root_as_an_eigenvalue_of_a_boundary_value_problem(law):
             0.0 * y.r1,
         )
 
-    g, t = tangent_moduli(law, 1 / (1 - root), nu)
+    g, t = law.tangent_moduli(1 / (1 - root), nu)
     problem = contin.BoundaryValueProblem(
         rhs,
         lambda a, b, p: (a.x1, a.psi2, a.psi3, b.x1, b.psi2, b.psi3),

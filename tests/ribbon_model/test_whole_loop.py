@@ -5,7 +5,7 @@ import pytest
 
 import contin
 from ribbon_model import exact
-from ribbon_model.equilibrium import loop
+from ribbon_model.domains import LOOP
 from ribbon_model.laws import RIBBON
 from ribbon_model.linear import thresholds
 
@@ -16,8 +16,7 @@ FREE = ("kappa_n", "M1", "M2", "M3", "R1", "R2", "R3")
 
 @pytest.fixture(scope="module")
 def circle():
-    domain = loop(RIBBON)
-    system = contin.Collocation(domain.problem, np.linspace(0, 1, 13), 7, FREE, {"nu": NU})
+    system = contin.Collocation(LOOP.problem(RIBBON), np.linspace(0, 1, 13), 7, FREE, {"nu": NU})
     values = {"kappa_n": 2.0, "M1": 1 - 2.0}
     half = np.pi * system.nodes
     zero = 0 * half
@@ -38,14 +37,13 @@ def test_every_primary_bifurcation_is_passed_and_reported(circle):
 def test_with_a_phase_the_branch_is_followed_from_there(circle):
     """M3 = 0 at S = 0 and ``unfold`` take one solution of each circle: its fold is that of the cell (quadrature)."""
     point = next(point for point in circle if point.label == "BP")
-    domain = loop(RIBBON)
     first, second = point.details.kernel
     third = point.system.parameter_index("M3")
     tangent = second[third] * first - first[third] * second  # no M3
-    system, x = point.system.with_free(domain.free, point.x)
+    system, x = point.system.with_free(LOOP.free, point.x)
     size = point.system.state_size
     parts = dict(zip(FREE, tangent[size:]))
-    tangent = np.append(tangent[:size], [parts.get(name, 0.0) for name in domain.free])
+    tangent = np.append(tangent[:size], [parts.get(name, 0.0) for name in LOOP.free])
     run = contin.Continuation(system, x, contin.Settings(limits={"kappa_n": (0, 4.5), "kappa_star": (0.5, 2)}), tangent)
     labels = {p.label: p["kappa_n"] for p in run}
     (fold,) = exact.folds(1, 2, NU)

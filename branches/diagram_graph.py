@@ -1,0 +1,363 @@
+"""The bifurcation diagram as a graph: where branches start, turn and end, and the pieces between; and questions put to it.
+
+Nodes are circle bifurcations, folds, branch points and other ends; edges are the pieces of branches between them and carry
+their columns. ``python -m branches.graph DIR`` (`branches.graph`) answers from the command line.
+"""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from branches.files import StoreError, write_bytes
+from branches.labels import SPECIAL, kind_of
+from branches.names import DIAGRAM, GRAPHML
+from contin import exact_text
+from ribbon_model.laws import from_label, label
+from ribbon_model.linear import circle, covering
+
+#: Columns of a branch that an edge carries.
+COLUMNS = ("arclength", "kappa_n", "kappa_star", "energy")
+#: Where a secondary branch meets a primary one, the second where the diagram holds no such point of a primary branch.
+_MEETINGS = ("secondary bifurcation", "primary branch")
+#: Points that agree in kappa_n, kappa* and energy to this, relative to 1 + their size, are one up to symmetry.
+_SAME = 1e-6
+
+
+def new_graph(title: str = ""):
+    """An empty diagram."""
+    import networkx
+
+    return networkx.MultiGraph(title=title, format="ribbon bifurcation diagram", format_version=1)
+
+
+def add_branch(graph, branch, name: str) -> bool:
+    """Add a stored branch to the diagram.
+
+    Parameters
+    ----------
+    graph : networkx.MultiGraph
+    branch : branches.read.StoredBranch
+    name : str
+        Its file, kept with every edge.
+
+    Returns
+    -------
+    bool
+        False if it is in the diagram already, computed from its other end. (From a bifurcation one branch emanates on each
+        domain, and its images under the symmetries of the primary branch.)
+    """
+    config = branch.config
+    family = {"law": label(config["law"], config["Gamma"]), "nu": config["nu"], "m": config["m"], "n": config["n"]}
+    if config["origin"]:
+        family |= {"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"], "domain": config["domain"]}
+    special = [event for event in branch.events if event["label"].decode() in SPECIAL]
+    if config["origin"]:
+        nodes = _nodes_of_secondary(graph, special, family, branch)
+        start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
+        if any(data.get("domain") == family["domain"] for _, _, data in start):
+            return False
+    else:
+        nodes = [_node_of(event, family, branch.reason) for event in special]
+    rows = [branch.points[first["point"] : last["point"] + 1] for first, last in pairwise(special)]
+    pieces = [{column: piece[column].tolist() for column in COLUMNS} for piece in rows]
+    if config["origin"]:
+        for piece, values in zip(pieces, rows):
+            piece["force"] = np.sqrt(values["R1"] ** 2 + values["R2"] ** 2 + values["R3"] ** 2).tolist()
+    if "index" in branch.points.dtype.names:
+        for piece, values in zip(pieces, rows):
+            piece["index"] = _common_index(values["index"])
+    return connect(graph, family, nodes, pieces, file=name)
+
+
+def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str, dict]]:
+    """The nodes of a secondary branch, those that the diagram holds already among them.
+
+    The identifiers of new ones tell its origin in nine digits, or exactly where another branch has these identifiers.
+    """
+    origin = branch.config["origin"]
+    exact = f"{exact_text(origin['kappa_n'])}, {exact_text(origin['kappa_star'])}"
+    for place in (f"{origin['kappa_n']:.9g}", exact):
+        own = [_node_of(event, family, branch.reason, place) for event in special]
+        nodes = [_known(graph, node) or node for node in own]
+        if not any(node is new and node[0] in graph for node, new in zip(nodes, own)):
+            break
+    return nodes
+
+
+def _known(graph, node):
+    """The node of a diagram that is where a secondary branch meets a primary one, if it holds that."""
+    _, values = node
+    if values["kind"] not in _MEETINGS:
+        return None
+    for name, other in graph.nodes(data=True):
+        same_strip = (other["law"], other["nu"]) == (values["law"], values["nu"])
+        if other["kind"] in _MEETINGS and same_strip and same_place(other, values):
+            return name, other
+    return None
+
+
+def same_place(a: dict, b: dict) -> bool:
+    """Whether two special points agree in what neither a rigid motion nor another start on the loop changes."""
+    columns = [column for column in COLUMNS[1:] if column in a and column in b]
+    return all(abs(a[column] - b[column]) < _SAME * (1 + abs(b[column])) for column in columns)
+
+
+def _common_index(values) -> int:
+    """The index on a piece between special points: one number, or -1 where it is undecided or changes unexplained."""
+    decided = set(values[1:-1][values[1:-1] >= 0].tolist())
+    return decided.pop() if len(decided) == 1 else -1
+
+
+def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dict], **attributes) -> bool:
+    """Add a branch: its nodes from end to end, as of `node`, and the columns of the pieces between; see `add_branch`."""
+    if _circle(family, family["m"]) in graph and nodes[-1][1]["kind"] == "circle" and nodes[-1][0] in graph:
+        return False
+    graph.add_nodes_from(nodes)
+    for (a, _), (b, _), columns in zip(nodes, nodes[1:], pieces):
+        graph.add_edge(a, b, **family, **attributes, **columns)
+    return True
+
+
+def holds_circle(graph, law: str, nu: float, covering: int, mode: int) -> bool:
+    """Whether some branch of the diagram leaves or reaches the circle of this covering index with this wavenumber."""
+    return _circle({"law": law, "nu": nu, "n": mode}, covering) in graph
+
+
+def _circle(family, covering: int) -> str:
+    return f"{_strip(family)} circle {covering} mode {family['n']}"
+
+
+def _strip(family) -> str:
+    """The law and nu of a branch in identifiers of nodes: exact, so that they can be looked up by them."""
+    return f"{family['law']} nu={exact_text(family['nu'])}"
+
+
+def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -> tuple[str, dict]:
+    """Identifier and attributes of a special point, the ``number``-th point of its branch.
+
+    A circle has one identifier whichever branch meets it there: its covering index (negative where it is curled against its
+    natural curvature) and the wavenumber. Other points name the branch (m, n) that they were found on and, on a secondary
+    branch, its ``origin``.
+    """
+    attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
+    if kind == "circle":
+        index = covering(attributes["kappa_n"], attributes["kappa_star"], attributes["energy"])
+        return _circle(family, index), attributes | {"covering": index, "mode": family["n"]}
+    branch = f"({family['m']},{family['n']})"
+    if origin:
+        branch += f" from {origin} on the {family['domain']}"
+    return f"{_strip(family)} {branch} {kind} {number}", attributes | {"m": family["m"], "n": family["n"]}
+
+
+def _node_of(event, family, reason, origin: str = ""):
+    """The node of a labelled point of a branch file."""
+    values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
+    values |= {"error": float(event["error_kappa_n"]), "what": event["name"].decode()}
+    kind = kind_of(event["label"].decode(), values["what"], reason, "origin" in family)
+    return node(family, kind, values, int(event["point"]), origin)
+
+
+# --- questions ----------------------------------------------------------------------------------------------------
+
+
+def families(graph) -> list[tuple]:
+    """The (law, nu, m, n) of all primary branches, in order; each is known by the end it was followed from."""
+    return sorted({family_of(data) for _, _, data in graph.edges(data=True) if "origin" not in data})
+
+
+def pieces(graph, family: tuple) -> list[tuple]:
+    """The edges (a, b, columns) of the primary branch (law, nu, m, n), from end to end."""
+    found = [edge for edge in graph.edges(data=True) if family_of(edge[2]) == family and "origin" not in edge[2]]
+    return sorted(found, key=lambda edge: edge[2]["arclength"][0])
+
+
+def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """The secondary branches: what they left and where (family, origin, mode, domain, file), edges from end to end, nodes."""
+    found = {}
+    for edge in graph.edges(data=True):
+        data = edge[2]
+        if "origin" in data and law in (None, data["law"]) and nu in (None, data["nu"]):
+            found.setdefault(data["file"], []).append(edge)
+    result = []
+    for edges in found.values():
+        edges.sort(key=lambda edge: edge[2]["arclength"][0])
+        first = edges[0][2]
+        about = {name: first[name] for name in ("origin", "mode", "domain", "file")}
+        result.append({"family": family_of(first), **about, "edges": edges, "nodes": _in_order(graph, edges)})
+    return sorted(result, key=lambda branch: (branch["family"], -branch["origin"], branch["domain"]))
+
+
+def course(graph, m: int, n: int, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """The special points along the branch (m, n), in order from the m-covered circle; for every law and nu asked for.
+
+    Raises
+    ------
+    KeyError
+        The diagram has no such branch.
+    """
+    result = []
+    for law_, nu_, m_, n_ in families(graph):
+        if n_ != n or law not in (None, law_) or nu not in (None, nu_):
+            continue
+        nodes = _in_order(graph, pieces(graph, (law_, nu_, m_, n_)))
+        if nodes[-1].get("covering") == m:
+            nodes.reverse()
+        if nodes[0].get("covering") == m:
+            result.append({"law": law_, "nu": nu_, "nodes": nodes})
+    if not result:
+        raise KeyError(f"the diagram has no branch (m, n) = ({m}, {n})")
+    return result
+
+
+def family_of(data) -> tuple:
+    return data["law"], data["nu"], data["m"], data["n"]
+
+
+def _in_order(graph, edges) -> list[dict]:
+    """The nodes along consecutive edges (whose ends networkx may give either way round)."""
+    nodes = []
+    for a, b, data in edges:
+        ends = sorted((a, b), key=lambda node: abs(graph.nodes[node]["kappa_star"] - data["kappa_star"][0]))
+        nodes = nodes or [graph.nodes[ends[0]]]
+        nodes.append(graph.nodes[ends[1]])
+    return nodes
+
+
+def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """All equilibria of the diagram at a natural curvature: planar circles and points on branches, by energy.
+
+    Values between computed points come from a cubic spline over arclength.
+    """
+    found = []
+    for law_, nu_ in sorted({family[:2] for family in families(graph)}):
+        if law not in (None, law_) or nu not in (None, nu_):
+            continue
+        coverings = {
+            d["covering"] for _, d in graph.nodes(data=True) if d["kind"] == "circle" and (d["law"], d["nu"]) == (law_, nu_)
+        }
+        for m in sorted(coverings):
+            found.append({"law": law_, "nu": nu_, "circle": m, **_planar(law_, nu_, m, kappa_n)})
+    for _, _, data in graph.edges(data=True):
+        if law in (None, data["law"]) and nu in (None, data["nu"]):
+            for place in _crossings(data, kappa_n):
+                left = {"origin": data["origin"]} if "origin" in data else {}
+                found.append({"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **left, **place})
+    return sorted(found, key=lambda state: (state["law"], state["nu"], state["energy"]))
+
+
+def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
+    """kappa* and energy of a planar circle."""
+    material, Gamma = from_label(law)
+    values = circle(material, m, kappa_n, nu, Gamma)
+    return {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
+
+
+def _crossings(data, kappa_n):
+    """Places on one piece of a branch where kappa_n takes a value."""
+    from scipy.interpolate import CubicSpline
+
+    s, keep = np.unique(data["arclength"], return_index=True)
+    columns = {name: np.asarray(data[name])[keep] for name in COLUMNS[1:]}
+    if len(s) < 4:
+        inside = (columns["kappa_n"][:-1] - kappa_n) * (columns["kappa_n"][1:] - kappa_n) < 0
+        places = [float(np.interp(0, *zip(*sorted(zip(columns["kappa_n"][i : i + 2] - kappa_n, s[i : i + 2])))))
+                  for i in np.flatnonzero(inside)]  # fmt: skip
+    else:
+        places = CubicSpline(s, columns["kappa_n"] - kappa_n).roots(extrapolate=False)
+    for place in places:
+        values = {n: float(CubicSpline(s, columns[n])(place) if len(s) > 3 else np.interp(place, s, columns[n]))
+                  for n in COLUMNS[2:]}  # fmt: skip
+        yield values
+
+
+def folds(graph, low: float, high: float, law: str | None = None, nu: float | None = None) -> list[dict]:
+    """The folds with low <= kappa_n <= high, in order of kappa_n."""
+    nodes = [dict(data) for _, data in graph.nodes(data=True) if data["kind"] == "fold" and low <= data["kappa_n"] <= high]
+    nodes = [data for data in nodes if law in (None, data["law"]) and nu in (None, data["nu"])]
+    return sorted(nodes, key=lambda data: data["kappa_n"])
+
+
+# --- in words ------------------------------------------------------------------------------------------------------
+
+
+def describe(graph, m: int, n: int, law: str, nu: float) -> str:
+    """Where one branch goes, in a line."""
+    return " -> ".join(map(describe_node, course(graph, m, n, law, nu)[0]["nodes"]))
+
+
+def describe_secondary(branch: dict) -> str:
+    """Where a secondary branch, as of `secondaries`, goes, in a line."""
+    return f"{branch['mode']}, {branch['domain']}: " + " -> ".join(map(describe_node, branch["nodes"]))
+
+
+def describe_node(node) -> str:
+    """A special point in words."""
+    if node["kind"] == "circle":
+        return f"circle {node['covering']} at {node['kappa_n']:.6f}"
+    if node["kind"] == "leaves":
+        return f"leaves at {node['kappa_n']:.10g}"
+    return f"{node['kind']} at {node['kappa_n']:.6f}"
+
+
+# --- files --------------------------------------------------------------------------------------------------------
+
+
+def save(graph, folder: Path) -> tuple[Path, Path]:
+    """Write ``diagram.json`` (networkx node-link form, columns as lists) and ``diagram.graphml`` (columns as JSON text)."""
+    import networkx
+
+    folder = Path(folder)
+    text = json.dumps(networkx.node_link_data(graph, edges="edges"), indent=1)
+    plain = networkx.MultiGraph(**graph.graph)
+    plain.add_nodes_from(graph.nodes(data=True))
+    for a, b, data in graph.edges(data=True):
+        plain.add_edge(a, b, **{k: json.dumps(v) if isinstance(v, list) else v for k, v in data.items()})
+    paths = folder / DIAGRAM, folder / GRAPHML
+    write_bytes(paths[0], text.encode())
+    write_bytes(paths[1], "\n".join(networkx.generate_graphml(plain)).encode())
+    return paths
+
+
+def read(folder: str | Path):
+    """The diagram in a folder, or in a ``diagram.json``.
+
+    Raises
+    ------
+    StoreError
+        There is none.
+    """
+    import networkx
+
+    path = Path(folder)
+    path = path / DIAGRAM if path.is_dir() else path
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        if data["graph"]["format"] != "ribbon bifurcation diagram":
+            raise KeyError("format")
+        graph = networkx.node_link_graph(data, edges="edges")
+        _check(graph)
+        return graph
+    except OSError as error:
+        raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, networkx.NetworkXException) as error:
+        raise StoreError(f"cannot read {str(path)!r}: it is no diagram written by this program") from error
+
+
+def _check(graph) -> None:
+    """ValueError, KeyError or TypeError unless nodes and edges have what the questions ask for."""
+    for _, data in graph.nodes(data=True):
+        if not (isinstance(data["kind"], str) and isinstance(data["law"], str)):
+            raise TypeError("kind and law are texts")
+        for name in ("nu", "kappa_n", "kappa_star", *(("covering",) if data["kind"] == "circle" else ())):
+            float(data[name])
+    for *_, data in graph.edges(data=True):
+        if not all(isinstance(data[name], kind) for name, kind in (("law", str), ("m", int), ("n", int))):
+            raise TypeError("a branch is known by its law, m and n")
+        columns = np.array([data[name] for name in COLUMNS], dtype=float)
+        if columns.ndim != 2 or not columns.shape[1] or not np.isfinite(columns).all():
+            raise ValueError("columns are as long as each other, and numbers")
+        float(data["nu"])

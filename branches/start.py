@@ -1,0 +1,114 @@
+"""Where the branch of a scene starts, and how the engine follows it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from branches.config import Config, ConfigError
+from contin import BranchPoint, ContinError, Continuation, ConvergenceError, MeshControl, Newton, Settings, Stop
+from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
+from ribbon_model.laws import LAWS
+from ribbon_model.secondary import force, secondary_branch
+from ribbon_model.seeds import half_loop_branch, primary_branch
+from ribbon_model.solution import Solution
+
+#: The first points of primary branches, by domain.
+_SEEDS = {CELL.name: primary_branch, HALF_LOOP.name: half_loop_branch}
+#: A force below this is none: what branches from a primary one has |R| of order one.
+_NO_FORCE = 1e-7
+#: Closer than this to a primary branch, kappa_n turns because the bifurcation is a pitchfork.
+_BESIDE = 1e-2
+#: Two values of kappa* closer than this, relative to 1 + their size, are the same place at the same kappa_n.
+_SAME_PLACE = 1e-6
+
+
+def settings_of(config: Config, monitors=()) -> Settings:
+    """The engine's settings for a scene, with further events."""
+    mesh, steps = config.mesh, config.steps
+    # beside a bifurcation that the branch leaves slowly, round-off moves solutions by as much along its kernel
+    newton = Newton(1e-8) if config.origin else Newton()
+    return Settings(
+        primary="kappa_n", step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
+        max_points=steps.max_points, angle=steps.angle, limits=config.limits, zeros=config.zeros, errors=True,
+        trivial=None if config.origin else "M2", monitors=monitors, newton=newton,
+        mesh=MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every),
+    )  # fmt: skip
+
+
+def seed(config: Config):
+    """System, first point and tangent of a scene's branch.
+
+    Raises
+    ------
+    ConfigError
+        The first mesh is too coarse to see the mode, or sees another one in its place; an origin that is none.
+    """
+    if config.origin:
+        return _leave_primary(config)
+    coarse = ConfigError(
+        f"mesh: {config.mesh.intervals} intervals of degree {config.mesh.degree} do not resolve the mode "
+        f"(m, n) = ({config.m}, {config.n}) on the {config.domain}; take more intervals"
+    )
+    try:
+        system, x, tangent = _SEEDS[config.domain](
+            LAWS[config.law], config.m, config.n, config.nu, config.mesh.intervals, config.mesh.degree, Gamma=config.Gamma
+        )
+    except (ConvergenceError, ValueError) as error:
+        raise coarse from error
+    expected = config.at_bifurcation()["kappa_n"]
+    if abs(x[system.parameter_index("kappa_n")] - expected) > 1e-4 * (1 + abs(expected)):
+        raise coarse
+    return system, x, tangent
+
+
+# --- secondary branches ---------------------------------------------------------------------------------------------
+
+
+class UntilPrimary(Continuation):
+    """A run along a secondary branch that ends where it comes to a primary one: at a branch point with R = 0.
+
+    Beyond it the branch would be its own image.
+    """
+
+    def __iter__(self):
+        for point in super().__iter__():
+            if point.label == "LP" and force(point) < _BESIDE:
+                continue
+            if point.name != "start" and isinstance(point.details, BranchPoint) and force(point) < _NO_FORCE:
+                self.stop = Stop("primary branch", "came to a primary branch, where R = 0")
+                point = dataclasses.replace(point, label="EP", name="primary branch")
+            yield point
+            if self.stop is not None:
+                return
+
+
+def _leave_primary(config: Config):
+    """System, first point and tangent of the scene of a secondary branch; the primary one is followed to its origin.
+
+    Raises
+    ------
+    ConfigError
+        The primary branch does not pass there, or nothing leaves it there.
+    """
+    solution = Solution.of(_at_origin(config))
+    try:
+        return secondary_branch(solution, DOMAINS[config.domain])
+    except (ContinError, ValueError) as error:
+        raise ConfigError(f"origin: {error}") from error
+
+
+def _at_origin(config: Config):
+    """The point of the primary branch."""
+    origin = config.origin
+    primary = Config(law=config.law, nu=config.nu, Gamma=config.Gamma, m=config.m, n=config.n, mesh=config.mesh)
+    reach = 10 * (1 + max(abs(origin.kappa_n), abs(primary.at_bifurcation()["kappa_n"])))
+    primary = primary.model_copy(update={"limits": {"kappa_n": (-reach, reach)}, "zeros": {"kappa_n": [origin.kappa_n]}})
+    system, x, tangent = seed(primary)
+    for point in Continuation(system, x, settings_of(primary), tangent):
+        same = abs(point["kappa_star"] - origin.kappa_star) < _SAME_PLACE * (1 + abs(origin.kappa_star))
+        if point.label == "UZ" and same:
+            return point
+    raise ConfigError(
+        f"origin: kappa_n = {origin.kappa_n:.10g}, kappa_star = {origin.kappa_star:.10g} is no point of the branch "
+        f"(m, n) = ({config.m}, {config.n})"
+    )
