@@ -16,6 +16,7 @@ see docs/stability.md. v is free: two functions (three for a law without omega_2
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -29,6 +30,12 @@ from ribbon_model.laws import Law
 from ribbon_model.shape import frames
 
 _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
+#: Degree on the mesh of a circle; and the phase, in radians, that the highest wave of interest turns by on an interval. There
+#: eight Gauss points give a wave to (8! / 16!)^2 2^17 / 17 = 3e-14; ten times the phase would leave 1e3 of nothing right.
+_CIRCLE_DEGREE, _PHASE = 8, 2.0
+#: Length, relative to the loop, and winding may be off by this much. A guess beside a branch has some defect; half a turn more
+#: would be another winding number.
+_LENGTH_DEFECT, _WINDING_DEFECT = 1e-6, 0.25
 
 
 @dataclass(frozen=True)
@@ -71,6 +78,12 @@ class Equilibrium:
         directors(S) for S (K,) gives (K, 3, 3), rows d1, d2, d3 on the lab axes; periodic.
     moment, force : ndarray, shape (3,)
         M and R at S = 0 on the lab axes.
+    symmetry : Symmetry
+    mesh : ndarray, shape (N + 1,)
+        S at the mesh points of the collocation that the equilibrium comes from, on the piece [0, mesh[-1]] that symmetry repeats:
+        half a part of the loop where there is a mirror or an axis, else a part.
+    degree : int
+        Of that collocation, which is the discretization of the second variation, too.
     """
 
     law: Law
@@ -80,6 +93,8 @@ class Equilibrium:
     moment: np.ndarray
     force: np.ndarray
     symmetry: Symmetry
+    mesh: np.ndarray
+    degree: int
     Gamma: float | None = None
 
     def response(self, moment):
@@ -100,7 +115,10 @@ def cross_matrix(a) -> np.ndarray:
 
 
 def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = None) -> Equilibrium:
-    """The planar m-covered circle.
+    """The planar m-covered circle, on a uniform mesh that is fine enough for the highest wavenumber that can lower the energy.
+
+    A wave of wavenumber l has theta ~ u / l, so the moment contributes |M| m |K| / l^2 of the stiffness: above
+    l^2 = m^2 + |M| m |K| nothing is unstable.
 
     Raises
     ------
@@ -115,13 +133,16 @@ def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = No
         return np.array([[zero, zero, one], normal, tangent]).transpose(2, 0, 1)
 
     moment = np.array([0.0, 0.0, linear.circle(law, m, kappa_n, nu, Gamma)["M1"]])
-    found = Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), Symmetry(order=m, mirror=True), Gamma)
-    strain = found.response(directors(np.zeros(1)) @ moment)[0][0]
+    piece, symmetry = LENGTH / (2 * m), Symmetry(order=m, mirror=True)
+    found = Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), symmetry, np.array([0, piece]), _CIRCLE_DEGREE, Gamma)
+    strain, compliance = (values[0] for values in found.response(directors(np.zeros(1)) @ moment))
     if not np.abs(strain - [m, 0, 0]).max() < 1e-9 * m:
         raise ValueError(
             f"{law.name}: no {m}-covered circle at kappa_n = {kappa_n:g}, nu = {nu:g} on the root that the law takes"
         )
-    return found
+    highest = math.sqrt(m * m + abs(moment[2]) * m * np.linalg.norm(compliance))
+    intervals = math.ceil(piece * highest / _PHASE) + 1
+    return dataclasses.replace(found, mesh=np.linspace(0, piece, intervals + 1))
 
 
 def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
@@ -151,7 +172,8 @@ def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, flo
         axes, directors, symmetry = _unfolded_cell(sample, p["length"])
     else:
         axes, directors, symmetry = _unfolded_half(sample, "axes" in p)
-    return Equilibrium(law, p["nu"], p["kappa_n"], directors, axes @ moment, axes @ force, symmetry, p.get("Gamma"))
+    loads = axes @ moment, axes @ force
+    return Equilibrium(law, p["nu"], p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree, p.get("Gamma"))
 
 
 def _unfolded_half(sample, between_axes: bool):
@@ -184,7 +206,7 @@ def _unfolded_cell(sample, length):
     turn = half_turn @ np.diag([1.0, -1.0, -1.0])  # after the half turn about e1 = d3(0)
     part, order = 2 * length, round(LENGTH / (2 * length))
     winding = math.atan2(turn[1, 0], turn[0, 0]) * order / (2 * math.pi)
-    if abs(winding - round(winding)) > 1e-6:
+    if abs(order * part / LENGTH - 1) > _LENGTH_DEFECT or abs(winding - round(winding)) > _WINDING_DEFECT:
         raise ValueError(f"a part of the loop turns by {winding:.9g} times 2 pi / {order}: it does not close")
     turns = [np.linalg.matrix_power(turn, k).T for k in range(order)]
     signs = np.array([np.ones(3), _HALF_TURN])[:, :, None]
