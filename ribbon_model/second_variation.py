@@ -117,8 +117,8 @@ def cross_matrix(a) -> np.ndarray:
 def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = None) -> Equilibrium:
     """The planar m-covered circle, on a uniform mesh that is fine enough for the highest wavenumber that can lower the energy.
 
-    A wave of wavenumber l has theta ~ u / l, so the moment contributes |M| m |K| / l^2 of the stiffness: above
-    l^2 = m^2 + |M| m |K| nothing is unstable.
+    A wave of wavenumber l has theta ~ u / l. The moment, along d1, couples two components of u where omega_2 is free, by |M| |K| / l
+    of the stiffness, and otherwise by |M| m |K| / l^2: above l^2 = m^2 + |M| m |K|, plus |M|^2 |K|^2, nothing is unstable.
 
     Raises
     ------
@@ -140,7 +140,8 @@ def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = No
         raise ValueError(
             f"{law.name}: no {m}-covered circle at kappa_n = {kappa_n:g}, nu = {nu:g} on the root that the law takes"
         )
-    highest = math.sqrt(m * m + abs(moment[2]) * m * np.linalg.norm(compliance))
+    softened = abs(moment[2]) * np.linalg.norm(compliance)
+    highest = math.sqrt(m * m + m * softened + (0 if law.constrained else softened**2))
     intervals = math.ceil(piece * highest / _PHASE) + 1
     return dataclasses.replace(found, mesh=np.linspace(0, piece, intervals + 1))
 
