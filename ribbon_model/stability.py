@@ -40,7 +40,9 @@ _NO_MOTION = 1e-8
 #: Singular values of conditions, which are of order 1 or zero, below this are zero.
 _DEPENDENT = 1e-9
 #: The eliminated form of an interval is the identity plus O(h^2). Where an eigenvalue of it is below this, nothing is eliminated.
-_DEFINITE = 0.05
+_DEFINITE = 0.2
+#: Rigid motions, and components of E.
+_RIGID = 6
 #: A gap of the closed loop above this is more than a corrector leaves.
 _CLOSED = 1e-6
 
@@ -268,33 +270,86 @@ def _symmetric(matrix, symmetry: Symmetry) -> np.ndarray:
 # --- the form -----------------------------------------------------------------------------------------------------------
 
 
-def _interval_forms(points: _Points, matrix, degree: int):
-    """Q on each interval after elimination, S (N, r, r); increments of E, W (N, 6, r); and y of the shift of phase, (N, r).
+@dataclass(frozen=True)
+class _Intervals:
+    """Q on neighbouring intervals of the piece, as many unknowns K on each.
 
-    With v multiplied by the root of its Gauss weight, Q of an interval is the identity plus l c_ij G_j^T N G_i / 2 between the
-    Gauss points j and i, l the length and c_ij = a_ij sqrt(w_i / w_j) - a_ji sqrt(w_j / w_i). The increment of E is B v. By a QR
-    factorization of B^T the first r = 6 of orthonormal coordinates y give B v; r = k d if that is less.
+    Attributes
+    ----------
+    local : ndarray, shape (N, K, K)
+        Q on the perturbations of one interval.
+    increments : ndarray, shape (N, 6, K)
+        The increment of E over it.
+    motion : ndarray, shape (N, K)
+        The shift of phase.
+    """
+
+    local: np.ndarray
+    increments: np.ndarray
+    motion: np.ndarray
+
+    def condensed(self) -> _Intervals | None:
+        """With what does not change the increments eliminated: 6 unknowns on each; None where that is not positive definite.
+
+        By a QR factorization of B^T, B the increments, the first 6 of K orthonormal coordinates y give all increments.
+        """
+        if self.local.shape[1] <= _RIGID:
+            return self
+        axes = np.linalg.qr(self.increments.transpose(0, 2, 1), mode="complete")[0]
+        local, motion = axes.transpose(0, 2, 1) @ self.local @ axes, np.einsum("eij,ei->ej", axes, self.motion)
+        values, vectors = np.linalg.eigh(local[:, _RIGID:, _RIGID:])
+        if values.min() < _DEFINITE:
+            return None
+        coupled = local[:, :_RIGID, _RIGID:] @ vectors
+        local = local[:, :_RIGID, :_RIGID] - coupled / values[:, None] @ coupled.transpose(0, 2, 1)
+        return _Intervals(local, self.increments @ axes[:, :, :_RIGID], motion[:, :_RIGID])
+
+    def paired(self, coupling) -> _Intervals:
+        """Two intervals as one each time; their number is even."""
+        first, last = self.increments[::2], self.increments[1::2]
+        across = first.transpose(0, 2, 1) @ coupling @ last / 2
+        rows = np.concatenate([self.local[::2], across], axis=2), np.concatenate([across.transpose(0, 2, 1), self.local[1::2]], axis=2)
+        increments, motion = np.concatenate([first, last], axis=2), np.concatenate([self.motion[::2], self.motion[1::2]], axis=1)
+        return _Intervals(np.concatenate(rows, axis=1), increments, motion)
+
+    def split(self, at: int) -> tuple[_Intervals, _Intervals]:
+        """The first intervals, ``at`` of them, and the others."""
+        parts = self.local, self.increments, self.motion
+        return _Intervals(*(part[:at] for part in parts)), _Intervals(*(part[at:] for part in parts))
+
+    def joined(self, other: _Intervals) -> _Intervals:
+        """These intervals and others behind them."""
+        parts = zip((self.local, self.increments, self.motion), (other.local, other.increments, other.motion))
+        return _Intervals(*(np.concatenate(pair) for pair in parts))
+
+
+def _of_mesh(points: _Points, coupling, degree: int) -> _Intervals:
+    """Q on each interval of the mesh; unknowns are v at the Gauss points times the roots of their weights.
+
+    It is the identity plus l c_ij G_j^T N G_i / 2 between the Gauss points j and i, l the length and
+    c_ij = a_ij sqrt(w_i / w_j) - a_ji sqrt(w_j / w_i), with the Runge-Kutta method's matrix a and weights w.
     """
     tables, runge_kutta = basis(degree), _partial_integrals(degree)
     count, _, _, controls = points.generator.shape
-    ratio = np.sqrt(tables.weights[:, None] / tables.weights)
-    skew = runge_kutta * ratio - (runge_kutta * ratio).T  # c_ij
+    scaled = runge_kutta * np.sqrt(tables.weights[:, None] / tables.weights)
     generator = points.generator.transpose(0, 2, 1, 3).reshape(count, 6, -1)  # columns: Gauss point, function
-    local = generator.transpose(0, 2, 1) @ (matrix @ generator) * np.kron(skew.T, np.ones((controls, controls)))
+    local = generator.transpose(0, 2, 1) @ (coupling @ generator) * np.kron(scaled.T - scaled, np.ones((controls, controls)))
     local = np.eye(degree * controls) + points.lengths[:, None, None] / 2 * local
     roots = np.sqrt(points.lengths[:, None] * np.repeat(tables.weights, controls))
-    increments = generator * roots[:, None]
-    axes = np.linalg.qr(increments.transpose(0, 2, 1), mode="complete")[0]
-    local = axes.transpose(0, 2, 1) @ local @ axes
-    increments, motion = increments @ axes, np.einsum("eij,ei->ej", axes, points.motion.reshape(count, -1) * roots)
-    r = 6
-    if degree * controls > r:
-        values, vectors = np.linalg.eigh(local[:, r:, r:])
-        if values.min() > _DEFINITE:
-            coupled = local[:, :r, r:] @ vectors
-            local = local[:, :r, :r] - coupled / values[:, None] @ coupled.transpose(0, 2, 1)
-            increments, motion = increments[:, :, :r], motion[:, :r]
-    return local, increments, motion
+    return _Intervals(local, generator * roots[:, None], points.motion.reshape(count, -1) * roots)
+
+
+def _condensed(intervals: _Intervals, coupling) -> _Intervals:
+    """Intervals of the mesh with six unknowns each, joined in pairs as long as what is eliminated is positive definite."""
+    found = intervals.condensed()
+    while found is not None:
+        intervals, even = found, len(found.local) // 2 * 2
+        if even == 0 or found.local.shape[1] < _RIGID:
+            break
+        pairs, rest = intervals.split(even)
+        found = pairs.paired(coupling).condensed()
+        found = found.joined(rest) if found is not None and len(rest.local) else found
+    return intervals
 
 
 class _Form:
@@ -303,14 +358,15 @@ class _Form:
     def __init__(self, equilibrium: Equilibrium, points: _Points):
         self.symmetry = equilibrium.symmetry
         self.coupling = _symmetric(coupling(points.momentum, equilibrium.force), self.symmetry)
-        local, increments, motion = _interval_forms(points, self.coupling, equilibrium.degree)
+        intervals = _condensed(_of_mesh(points, self.coupling, equilibrium.degree), self.coupling)
+        local = intervals.local
         count, r, _ = local.shape
-        self.increments = increments.transpose(1, 0, 2).reshape(6, -1)
+        self.increments = intervals.increments.transpose(1, 0, 2).reshape(6, -1)
         order = np.repeat(np.arange(count), r)
         self.matrix = self.increments.T @ self.coupling @ self.increments / 2 * np.sign(order - order[:, None])
         blocks = self.matrix.reshape(count, r, count, r)
         blocks[range(count), :, range(count)] += (local + local.transpose(0, 2, 1)) / 2
-        self.motion = motion.ravel()
+        self.motion = intervals.motion.ravel()
         self.residual = 0.0
 
     def classes(self) -> tuple[SymmetryClass, ...]:
@@ -351,12 +407,15 @@ class _Form:
         form = form + (increments.conj().T @ (closing @ increments)).real
         rows = rows @ increments
         _, sizes, rows = np.linalg.svd(np.vstack([rows.real, rows.imag]), full_matrices=False)
-        rows = rows[sizes > _DEPENDENT]
+        out = rows[sizes > _DEPENDENT].T
         length = np.linalg.norm(known)
         if length > _NO_MOTION:
-            known = known - rows.T @ (rows @ known)
+            known = known - out @ (out.T @ known)
             known /= np.linalg.norm(known)
             self.residual = max(self.residual, abs(float(known @ form @ known)))
-            rows = np.vstack([rows, known])
-        free = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
-        return np.linalg.eigvalsh(free.T @ form @ free)
+            out = np.column_stack([out, known])
+        # between the projectors; the directions projected out get the eigenvalue 1, at which all others accumulate
+        image = form @ out
+        crossed = image @ out.T
+        inner = out @ (out.T @ image + np.eye(out.shape[1])) @ out.T
+        return np.linalg.eigvalsh(form - crossed - crossed.T + inner)
