@@ -19,8 +19,6 @@ from ribbon_model.stability import Stability, index
 LABEL = "SB"
 #: The column's value where the index could not be decided (on a bifurcation, an eigenvalue is zero).
 UNDECIDED = -1
-#: An eigenvalue this close to zero is wanted to this part of itself, so that its zero can be located; but no better than that.
-_NEAR_ZERO, _PART, _FINEST = 1e-4, 1e-3, 1e-11
 _ON_CIRCLE = 1e-6
 #: Beside a primary branch, with less force than this, ...
 _LITTLE_FORCE = 0.5
@@ -32,6 +30,11 @@ _FULL = (0, "even")
 _CONVEX = 1e-6
 
 
+#: Places inside a step where the sign is looked at: two secondary bifurcations in one step leave it as it was at the ends. Closer
+#: pairs than a quarter of a step still pass unseen.
+_LOOKS = 3
+#: Points whose stability is kept: the looks of all symmetry classes are at the same places of a step.
+_KEPT = 2 * _LOOKS + 4
 #: Distance along the branch at which the index beside a bifurcation is taken, relative to 1 + |x|.
 _BESIDE = 1e-3
 
@@ -70,25 +73,24 @@ class Watch:
     """
 
     def __init__(self, law: Law, system, x, from_circle: bool = True):
-        self._law, self._known, self._blas, self._from_circle = law, [], ThreadpoolController(), from_circle
+        self._law, self._blas, self._from_circle = law, ThreadpoolController(), from_circle
+        self._known: dict = {}
         self._margin = margin(law)
         names = [entry.name for entry in self.at(system, x).classes]
         self.monitors = [self._monitor(name) for name in names if name != _FULL]
 
     def at(self, system, x) -> Stability:
-        """The stability of a point; with sharp eigenvalues where one is close to zero."""
-        for known, result in self._known:
-            if known is x:
-                return result
-        parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
-        equilibrium = from_solution(self._law, system.nodes, system.states(x), system.degree, parameters)
-        with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
-            result = index(equilibrium)
-            smallest = min(abs(entry.eigenvalues[entry.nearest]) for entry in result.classes if entry.name != _FULL)
-            if smallest < _NEAR_ZERO:
-                result = index(equilibrium, max(_PART * smallest, _FINEST))
-        self._known = [*self._known[-3:], (x, result)]
-        return result
+        """The stability of a point."""
+        key = id(system), x.tobytes()
+        if key not in self._known:
+            parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+            equilibrium = from_solution(self._law, system.nodes, system.states(x), system.degree, parameters)
+            with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
+                result = index(equilibrium)
+            while len(self._known) >= _KEPT:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = system, result  # the system, lest another one should get its id
+        return self._known[key][1]
 
     def _within_law(self, system, x) -> Stability | None:
         """The stability of a point; None at the end of a law whose energy is convex no further, where there is no index."""
@@ -130,7 +132,10 @@ class Watch:
         """The determinant of one symmetry class, whose zeros are bifurcations that break the symmetry."""
 
         def determinant(trial):
-            result = self._within_law(trial.system, trial.x)
+            try:
+                result = self._within_law(trial.system, trial.x)
+            except ValueError:  # a guess too far beside the branch: no closed loop, or no convex energy
+                return np.nan
             if result is None:
                 return np.nan  # no event: the run ends before
             entry = result[name]
@@ -143,7 +148,7 @@ class Watch:
             return float(np.prod(values))
 
         wavenumber, parity = name
-        return TestFunction(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant, estimated=False)
+        return TestFunction(LABEL, f"wavenumber {wavenumber} {parity or 'pair'}", determinant, looks=_LOOKS)
 
 
 def _broken(point) -> tuple[int, str]:
