@@ -103,15 +103,18 @@ class Stability:
         False where an eigenvalue is zero as far as the state is known, or the loop is not closed.
     reason : str
         If not decided: what could not be told.
-    defect : float
-        The largest of: the gap of the closed loop; Q of the shift of phase, which is zero, over |v|^2: the error of eigenvalues.
+    residual : float
+        |Q| of the shift of phase over |v|^2. It would be zero without discretization: this is the error of eigenvalues.
+    gap : float
+        By how much the loop does not close.
     classes : tuple of SymmetryClass
     """
 
     index: int
     decided: bool
     reason: str
-    defect: float
+    residual: float
+    gap: float
     classes: tuple[SymmetryClass, ...]
 
     def __getitem__(self, name: tuple[int, str]) -> SymmetryClass:
@@ -145,7 +148,7 @@ def index(equilibrium: Equilibrium) -> Stability:
             label = f"class {entry.wavenumber} {entry.parity}".strip()
             reasons.append(f"{label}: an eigenvalue {nearest:.1e} cannot be told from zero")
     total = sum(entry.multiplicity * entry.negative for entry in classes)
-    return Stability(total, not reasons, "; ".join(reasons), max(points.gap, form.residual), classes)
+    return Stability(total, not reasons, "; ".join(reasons), form.residual, points.gap, classes)
 
 
 # --- fields at the Gauss points -----------------------------------------------------------------------------------------
