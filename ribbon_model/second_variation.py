@@ -17,13 +17,14 @@ see docs/stability.md. v is free: two functions (three for a law without omega_2
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from contin import basis, interpolation
+from contin import Batch, basis, interpolation
 from ribbon_model import linear
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
@@ -99,7 +100,25 @@ class Equilibrium:
 
     def response(self, moment):
         """Strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""
-        return self.law.linearized(moment, self.kappa_n, *self.law.values(self.nu, self.Gamma).values())
+        values = self.law.values(self.nu, self.Gamma).values()
+        if not self.law.gradient:
+            return self.law.linearized(moment, self.kappa_n, *values)
+        batch, colours = _compiled(self.law)  # a response with loops and decisions, a hundred times faster than in plain Python
+        arguments = np.ascontiguousarray(moment), np.empty((0, 3)), np.array([self.kappa_n, *values])
+        return batch.jacobian(np.zeros(len(moment)), *arguments, colours)
+
+
+@functools.cache
+def _compiled(law: Law) -> tuple:
+    """The strains of a law as compiled functions of M1, M2, M3, and the colouring of their Jacobian."""
+    response = law.response_at
+
+    def strains(u, p):
+        H, w1, w2, w3, conjugate = response(u.M1, u.M2, u.M3, p)
+        return w1, w2, w3
+
+    batch = Batch([strains], [3], ("M1", "M2", "M3"), ("kappa_n", *law.parameters), times=False)
+    return batch, batch.colouring([])
 
 
 def coupling(moment, force) -> np.ndarray:
