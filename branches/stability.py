@@ -29,12 +29,12 @@ _FULL = (0, "even")
 #: A strain energy with a smaller margin of convexity is at its end: there is no index.
 _CONVEX = 1e-6
 
-#: Places inside a step where the sign is looked at: two secondary bifurcations in one step leave it as it was at the ends. Closer
-#: pairs than a quarter of a step still pass unseen.
+#: Places inside a step where the sign is looked at: two secondary bifurcations in one step leave it as it was at the ends.
+#: Pairs closer than a quarter of a step pass unseen.
 _LOOKS = 3
-#: The zero that is known, of the shift of phase, comes out as the error of the eigenvalues. Where that is larger than this, the mesh
-#: of the state is too coarse for its index, and halved so often at most. (Laws of finite width, where the strip is nearly folded:
-#: on the mesh of the run the zero is 1e-2 there, and an eigenvalue of 1e-3 changes its sign twice.)
+#: The known zero, of the shift of phase, comes out as the error of the eigenvalues. Where it is larger than this, the mesh of
+#: the state is too coarse for its index, and is halved so often at most. (It happens to strips of finite width that are nearly
+#: folded: the zero is 1e-2 there, and an eigenvalue of 1e-3 changed its sign twice.)
 _RESOLVED, _HALVINGS = 1e-6, 4
 #: A point with a larger residual is a guess beside the branch, whose known zero is none.
 _ON_BRANCH = 1e-7

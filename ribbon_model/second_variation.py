@@ -81,8 +81,8 @@ class Equilibrium:
         M and R at S = 0 on the lab axes.
     symmetry : Symmetry
     mesh : ndarray, shape (N + 1,)
-        S at the mesh points of the collocation that the equilibrium comes from, on the piece [0, mesh[-1]] that symmetry repeats:
-        half a part of the loop where there is a mirror or an axis, else a part.
+        S at the mesh points of the collocation that the equilibrium comes from, on the piece [0, mesh[-1]] that the symmetry
+        repeats: half a part of the loop where there is a mirror or an axis, else a part.
     degree : int
         Of that collocation, which is the discretization of the second variation, too.
     """
@@ -136,8 +136,8 @@ def cross_matrix(a) -> np.ndarray:
 def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = None) -> Equilibrium:
     """The planar m-covered circle, on a uniform mesh that is fine enough for the highest wavenumber that can lower the energy.
 
-    A wave of wavenumber l has theta ~ u / l. The moment, along d1, couples two components of u where omega_2 is free, by |M| |K| / l
-    of the stiffness, and otherwise by |M| m |K| / l^2: above l^2 = m^2 + |M| m |K|, plus |M|^2 |K|^2, nothing is unstable.
+    A wave of wavenumber l has theta ~ u / l. The moment M, along d1, contributes |M| m |K| / l^2 of the stiffness and, where
+    omega_2 is free, |M| |K| / l: above l^2 = m^2 + |M| m |K| (+ |M|^2 |K|^2) nothing is unstable.
 
     Raises
     ------

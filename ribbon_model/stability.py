@@ -1,26 +1,27 @@
 """The index of an equilibrium: negative directions of its energy on closed perturbations, by symmetry class.
 
-The second variation (`ribbon_model.second_variation`), Q = int |v|^2 + E . N E' dS with E' = G v, is discretized as the equilibrium
-is: by collocation at the d Gauss points of each interval of the same mesh. The values of v at the Gauss points are free, E is the
-continuous piecewise polynomial of degree d with E' = G v there, and the integral is the Gauss sum. So there is no cutoff, and what
-the discretization changes in an eigenvalue is O(h^(2 d)), as in the equilibrium.
+The second variation (`ribbon_model.second_variation`), Q = int |v|^2 + E . N E' dS with E' = G v, is discretized as the
+equilibrium is: by collocation at the d Gauss points of each interval of the same mesh. The values of v at the Gauss points are
+free, E is the continuous piecewise polynomial of degree d with E' = G v there, and the integral is the sum over Gauss points.
+There is no cutoff, and the places of zero eigenvalues have the error O(h^(2 d)), like the equilibrium at its mesh points.
 
 Steps:
 
-1. `_interval_forms`: Q on the functions v of one interval. Of the k d values, k the number of functions v, six combinations y give
-   the increment of E over the interval. The rest, which couples to nothing outside, is eliminated (Schur complement, positive
-   definite), so the unknowns of an interval are y, and its part of Q is a matrix S_e.
-2. `_Form`: the piece of the loop that the symmetry repeats, intervals 1 ... n with increments W_e y_e, and E at the left end of an
-   interval the sum of those before:
+1. `_of_mesh`: Q on the functions v of one interval of the mesh, (k d, k d) for k functions v.
+2. `_condensed`: 6 combinations y of their values give the increment of E over the interval. The others couple to nothing
+   outside it, and are eliminated (Schur complement). Then two neighbours are one interval with 12 unknowns, of which 6 are
+   eliminated, and so on, as long as what is eliminated is positive definite: then no negative direction is lost (Haynsworth).
+3. `_Form`: the piece of the loop that the symmetry repeats. With S_e (6, 6) of an interval, its increment W_e y_e (6,), and E
+   at the left end of an interval the sum of the increments before, the matrix of Q is
 
        S_1         W_1^T N W_2 / 2   W_1^T N W_3 / 2   ...
        (sym.)      S_2               W_2^T N W_3 / 2   ...
                                      S_3               ...
 
-3. `_Form.classes`: for each symmetry class the matrix with the image of the piece under its reversal, and with E at S = 0, which
-   the increment over a part of the loop and the class determine: E(part) = rho T E(0), T the motion from a part to the next.
-4. Closure, where rho T has the eigenvalue 1, and the shift of phase, whose vector C^T M' is known, are projected out: no
-   eigenvalue is zero but at a bifurcation.
+4. `_Form.classes`: for each symmetry class the matrix with the image of the piece under its reversal, and with E at S = 0. That
+   follows from the increment over a part of the loop: E(part) = rho T E(0), T the motion from a part to the next.
+5. Conditions of closure, where rho T has the eigenvalue 1, and the shift of phase, whose vector C^T M' is known, are projected
+   out. So no eigenvalue is zero but at a bifurcation.
 """
 
 from __future__ import annotations
@@ -33,13 +34,15 @@ import numpy as np
 from contin import basis, interpolation
 from ribbon_model.second_variation import Equilibrium, Symmetry, coupling
 
-#: An eigenvalue below this is zero as far as equilibria are known: Newton's method leaves 1e-11, times condition numbers of 100.
+#: An eigenvalue below this is zero as far as equilibria are known: Newton's method leaves 1e-11, times a condition of 100. Ten
+#: times larger, states within 1e-8 of a bifurcation would be undecided.
 _NEUTRAL = 1e-9
 #: Below this |C^T M'| the equilibrium is a circle, and a shift of phase a rigid rotation.
 _NO_MOTION = 1e-8
-#: Singular values of conditions, which are of order 1 or zero, below this are zero.
+#: Singular values of conditions below this are zero. They are of order 1 or round-off.
 _DEPENDENT = 1e-9
-#: The eliminated form of an interval is the identity plus O(h^2). Where an eigenvalue of it is below this, nothing is eliminated.
+#: The form that is eliminated is the identity plus O(h^2). Where an eigenvalue of it is below this, nothing is. Ten times
+#: smaller, Schur complements could be large, and lose digits.
 _DEFINITE = 0.2
 #: Rigid motions, and components of E.
 _RIGID = 6
@@ -61,8 +64,8 @@ class SymmetryClass:
     multiplicity : int
         2 if the class -j, which has the same eigenvalues, is another one: then modes come in pairs.
     eigenvalues : ndarray
-        Of the discrete Q after elimination, over |y|^2, ascending: pure numbers that accumulate at 1. Their signs, and what is
-        zero, are those of Q. Smooth along a branch on one mesh where they are simple.
+        Of the discrete Q after elimination, over |y|^2, ascending: pure numbers. Their signs, and which of them are zero, are
+        those of Q; their sizes depend on the mesh. Directions that are projected out have the eigenvalue 1.
     """
 
     wavenumber: int
@@ -82,7 +85,10 @@ class SymmetryClass:
 
     @property
     def determinant(self) -> float:
-        """The product of the eigenvalues: analytic along a branch on one mesh, also where eigenvalues cross each other."""
+        """The product of the eigenvalues: smooth along a branch on one mesh, also where eigenvalues cross each other.
+
+        It jumps, without a change of sign, where more or fewer intervals can be condensed.
+        """
         return float(np.prod(self.eigenvalues))
 
     @property
@@ -133,7 +139,7 @@ def index(equilibrium: Equilibrium) -> Stability:
     Raises
     ------
     ValueError
-        The energy is not convex in the strains at that state: then high wavenumbers lower it without end, and there is no index.
+        The energy is not convex in the strains at that state: high wavenumbers lower it without end, and there is no index.
     """
     points = _at_gauss_points(equilibrium)
     form = _Form(equilibrium, points)
@@ -223,8 +229,8 @@ def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
 def _reversal(symmetry: Symmetry) -> np.ndarray:
     """The matrix (6, 6) that takes E'(S) to E'(-S) for perturbations that keep the mirror or axis at S = 0.
 
-    Lab axes: the mirror is normal to e1, the axis is e1. With X the mirror's matrix, u(-S) = X u(S) for both, x(-S) = X x(S) for
-    the mirror and -X x(S) for the axis, so that u x x is multiplied by -X or X.
+    The mirror is normal to e1, or the axis is e1. With X the mirror's matrix, u(-S) = X u(S) for both, x(-S) = X x(S) for the
+    mirror and -X x(S) for the axis, so that u x x is multiplied by -X or X.
     """
     image = np.diag([-1.0, 1.0, 1.0])
     return np.kron(np.diag([1.0, -1.0 if symmetry.mirror else 1.0]), image)
@@ -292,7 +298,7 @@ class _Intervals:
     motion: np.ndarray
 
     def condensed(self) -> _Intervals | None:
-        """With what does not change the increments eliminated: 6 unknowns on each; None where that is not positive definite.
+        """What does not change the increments eliminated: 6 unknowns on each; None where that is not positive definite.
 
         By a QR factorization of B^T, B the increments, the first 6 of K orthonormal coordinates y give all increments.
         """
@@ -311,9 +317,10 @@ class _Intervals:
         """Two intervals as one each time; their number is even."""
         first, last = self.increments[::2], self.increments[1::2]
         across = first.transpose(0, 2, 1) @ coupling @ last / 2
-        rows = np.concatenate([self.local[::2], across], axis=2), np.concatenate([across.transpose(0, 2, 1), self.local[1::2]], axis=2)
-        increments, motion = np.concatenate([first, last], axis=2), np.concatenate([self.motion[::2], self.motion[1::2]], axis=1)
-        return _Intervals(np.concatenate(rows, axis=1), increments, motion)
+        upper = np.concatenate([self.local[::2], across], axis=2)
+        lower = np.concatenate([across.transpose(0, 2, 1), self.local[1::2]], axis=2)
+        motion = np.concatenate([self.motion[::2], self.motion[1::2]], axis=1)
+        return _Intervals(np.concatenate([upper, lower], axis=1), np.concatenate([first, last], axis=2), motion)
 
     def split(self, at: int) -> tuple[_Intervals, _Intervals]:
         """The first intervals, ``at`` of them, and the others."""
@@ -359,18 +366,15 @@ class _Form:
     """The second variation on the piece: its matrix and W (6, n), for n unknowns; ``residual`` is Q of the shift of phase."""
 
     def __init__(self, equilibrium: Equilibrium, points: _Points):
-        self.symmetry = equilibrium.symmetry
+        self.symmetry, self.residual = equilibrium.symmetry, 0.0
         self.coupling = _symmetric(coupling(points.momentum, equilibrium.force), self.symmetry)
         intervals = _condensed(_of_mesh(points, self.coupling, equilibrium.degree), self.coupling)
-        local = intervals.local
-        count, r, _ = local.shape
-        self.increments = intervals.increments.transpose(1, 0, 2).reshape(6, -1)
+        self.increments, self.motion = intervals.increments.transpose(1, 0, 2).reshape(_RIGID, -1), intervals.motion.ravel()
+        count, r, _ = intervals.local.shape
         order = np.repeat(np.arange(count), r)
         self.matrix = self.increments.T @ self.coupling @ self.increments / 2 * np.sign(order - order[:, None])
         blocks = self.matrix.reshape(count, r, count, r)
-        blocks[range(count), :, range(count)] += (local + local.transpose(0, 2, 1)) / 2
-        self.motion = intervals.motion.ravel()
-        self.residual = 0.0
+        blocks[range(count), :, range(count)] += (intervals.local + intervals.local.transpose(0, 2, 1)) / 2
 
     def classes(self) -> tuple[SymmetryClass, ...]:
         """Every class; sets ``residual``."""
@@ -379,15 +383,15 @@ class _Form:
             own = 2 * j % symmetry.order == 0
             for parity in ("even", "odd") if own and symmetry.reverses else ("",):
                 form, increments = self._part(j, parity)
-                known = self.motion if j == 0 and parity != "even" else np.zeros(0)
+                known = self.motion if j == 0 and parity != "even" else np.zeros(len(form))
                 found.append(SymmetryClass(j, parity, 1 if own else 2, self._eigenvalues(form, increments, j, known)))
         return tuple(found)
 
     def _part(self, j: int, parity: str):
         """The matrix (n, n) on a part of the loop without what closes it, and W (6, n) of the part.
 
-        With a reversal, v on the image of the piece is v on the piece times 1 or -1 (``parity``), or both kinds are unknowns, the
-        second times i, which makes everything real.
+        With a reversal, v on the image of the piece is v on the piece times 1 or -1 (``parity``). Without a parity both kinds
+        are unknowns, the second times i, which makes the matrix real.
         """
         if not self.symmetry.reverses:
             return self.matrix, self.increments
@@ -411,13 +415,12 @@ class _Form:
         rows = rows @ increments
         _, sizes, rows = np.linalg.svd(np.vstack([rows.real, rows.imag]), full_matrices=False)
         out = rows[sizes > _DEPENDENT].T
-        length = np.linalg.norm(known)
-        if length > _NO_MOTION:
-            known = known - out @ (out.T @ known)
+        known = known - out @ (out.T @ known)
+        if np.linalg.norm(known) > _NO_MOTION:
             known /= np.linalg.norm(known)
             self.residual = max(self.residual, abs(float(known @ form @ known)))
             out = np.column_stack([out, known])
-        # between the projectors; the directions projected out get the eigenvalue 1, at which all others accumulate
+        # between the projectors, and the identity on what they project out
         image = form @ out
         crossed = image @ out.T
         inner = out @ (out.T @ image + np.eye(out.shape[1])) @ out.T

@@ -209,9 +209,7 @@ def test_a_change_of_index_is_located():
 
     (name,) = [c.name for c in index(equilibrium(above)).classes if c.negative != index(equilibrium(below))[c.name].negative]
     assert name == (1, "even")
-    place = brentq(
-        lambda kappa_n: index(state(kappa_n))[name].determinant, below["kappa_n"], above["kappa_n"], xtol=1e-12
-    )
+    place = brentq(lambda kappa_n: index(state(kappa_n))[name].determinant, below["kappa_n"], above["kappa_n"], xtol=1e-12)
     leaves, _ = secondary()
     assert place == pytest.approx(leaves["kappa_n"], abs=1e-9)
 
