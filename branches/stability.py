@@ -20,8 +20,6 @@ from ribbon_model.stability import Stability, index
 LABEL = "SB"
 #: The column's value where the index could not be decided (on a bifurcation, an eigenvalue is zero).
 UNDECIDED = -1
-#: An eigenvalue this close to zero is wanted to this part of itself, so that its zero can be located; but no better than that.
-_NEAR_ZERO, _PART, _FINEST = 1e-4, 1e-3, 1e-11
 _ON_CIRCLE = 1e-6
 #: Beside a primary branch, with less force than this, ...
 _LITTLE_FORCE = 0.5
@@ -32,7 +30,17 @@ _FULL = (0, "even")
 #: A strain energy with a smaller margin of convexity is at its end: there is no index.
 _CONVEX = 1e-6
 
-
+#: Places inside a step where the sign is looked at: two secondary bifurcations in one step leave it as it was at the ends.
+#: Pairs closer than a quarter of a step pass unseen.
+_LOOKS = 3
+#: The known zero, of the shift of phase, comes out as the error of the eigenvalues. Where it is larger than this, the mesh of
+#: the state is too coarse for its index, and is halved so often at most. (It happens to strips of finite width that are nearly
+#: folded: the zero is 1e-2 there, and an eigenvalue of 1e-3 changed its sign twice.)
+_RESOLVED, _HALVINGS = 1e-6, 4
+#: A point with a larger residual is a guess beside the branch, whose known zero is none.
+_ON_BRANCH = 1e-7
+#: Points whose stability is kept: the looks of all symmetry classes are at the same places of a step.
+_KEPT = 2 * _LOOKS + 4
 #: Distance along the branch at which the index beside a bifurcation is taken, relative to 1 + |x|.
 _BESIDE = 1e-3
 
@@ -71,41 +79,62 @@ class Watch:
     """
 
     def __init__(self, law: Law, system, x, from_circle: bool = True):
-        self._law, self._known, self._blas, self._from_circle = law, [], ThreadpoolController(), from_circle
+        self._law, self._blas, self._from_circle = law, ThreadpoolController(), from_circle
+        self._known: dict = {}
         self._margin = margin(law)
         self._n = system.problem.on.wavenumber(Solution.at(system, x).parameters)
         names = [entry.name for entry in self.at(system, x).classes]
         self.monitors = [self._monitor(name) for name in names if name != _FULL]
 
-    def at(self, system, x) -> Stability:
-        """The stability of a point; with sharp eigenvalues where one is close to zero."""
-        for known, result in self._known:
-            if known is x:
-                return result
+    def at(self, system, x, tangent=None) -> Stability:
+        """The stability of a point, on the mesh that its index needs if the branch's tangent is given."""
+        key = id(system), x.tobytes()
+        if key not in self._known:
+            result = self._resolved(system, x, tangent)
+            while len(self._known) >= _KEPT:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = system, result  # the system, lest another one should get its id
+        return self._known[key][1]
+
+    def _resolved(self, system, x, tangent) -> Stability:
+        """The stability on the system's mesh; on a finer one where a point of the branch has a known zero that is not small."""
+        result = self._evaluated(system, x)
+        if tangent is None or result.residual <= _RESOLVED or np.abs(system.residual(x)).max() > _ON_BRANCH:
+            return result
+        for _ in range(_HALVINGS):
+            system, carry = system.refined()
+            x, tangent = carry(x), carry(tangent)
+            row = system.weights * tangent
+            try:
+                x = correct(system, x, row, row @ x).x
+            except ConvergenceError:
+                break
+            result = self._evaluated(system, x)
+            if result.residual <= _RESOLVED:
+                break
+        return result
+
+    def _evaluated(self, system, x) -> Stability:
+        """The stability on the system's mesh."""
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
         equilibrium = from_solution(self._law, system.nodes, system.states(x), system.degree, parameters)
         with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
-            result = index(equilibrium)
-            smallest = min(abs(entry.eigenvalues[entry.nearest]) for entry in result.classes if entry.name != _FULL)
-            if smallest < _NEAR_ZERO:
-                result = index(equilibrium, max(_PART * smallest, _FINEST))
-        self._known = [*self._known[-3:], (x, result)]
-        return result
+            return index(equilibrium)
 
-    def _within_law(self, system, x) -> Stability | None:
+    def _within_law(self, system, x, tangent=None) -> Stability | None:
         """The stability of a point; None at the end of a law whose energy is convex no further, where there is no index."""
         if self._margin is None:
-            return self.at(system, x)
+            return self.at(system, x, tangent)
         if not self._margin(system, x) > _CONVEX:
             return None
         try:
-            return self.at(system, x)
+            return self.at(system, x, tangent)
         except ValueError:  # not convex somewhere between the places where the margin was looked at
             return None
 
     def index(self, point) -> int:
         """The index of a point, or `UNDECIDED`."""
-        result = self._within_law(point.system, point.x)
+        result = self._within_law(point.system, point.x, point.tangent)
         return result.index if result is not None and result.decided else UNDECIDED
 
     def change(self, point) -> Change:
@@ -125,14 +154,17 @@ class Watch:
             there = correct(point.system, point.x + distance * tangent, tangent, tangent @ point.x + distance)
         except ConvergenceError:  # at a bifurcation that could not be located, say
             return UNDECIDED
-        result = self._within_law(point.system, there.x)
+        result = self._within_law(point.system, there.x, tangent)
         return result.index if result is not None and result.decided else UNDECIDED
 
     def _monitor(self, name) -> TestFunction:
         """The determinant of one symmetry class, whose zeros are bifurcations that break the symmetry."""
 
         def determinant(trial):
-            result = self._within_law(trial.system, trial.x)
+            try:
+                result = self._within_law(trial.system, trial.x, trial.tangent)
+            except ValueError:  # a guess too far beside the branch: no closed loop, or no convex energy
+                return np.nan
             if result is None:
                 return np.nan  # no event: the run ends before
             entry = result[name]
@@ -145,7 +177,7 @@ class Watch:
             return float(np.prod(values))
 
         mode = Mode(self._n, *name)
-        return TestFunction(LABEL, str(mode), determinant, estimated=False, describe=lambda trial: mode)
+        return TestFunction(LABEL, str(mode), determinant, looks=_LOOKS, describe=lambda trial: mode)
 
 
 def _broken(point) -> tuple[int, str]:

@@ -16,19 +16,27 @@ see docs/stability.md. v is free: two functions (three for a law without omega_2
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from contin import basis, interpolation
+from contin import Batch, basis, interpolation
 from ribbon_model import linear
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
 from ribbon_model.shape import frames
 
 _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
+#: Degree on the mesh of a circle; and the phase, in radians, that the highest wave of interest turns by on an interval. There
+#: eight Gauss points give a wave to (8! / 16!)^2 2^17 / 17 = 3e-14; ten times the phase would leave 1e3 of nothing right.
+_CIRCLE_DEGREE, _PHASE = 8, 2.0
+#: Length, relative to the loop, and winding may be off by this much. A guess beside a branch has some defect; half a turn more
+#: would be another winding number.
+_LENGTH_DEFECT, _WINDING_DEFECT = 1e-6, 0.25
 
 
 @dataclass(frozen=True)
@@ -71,6 +79,12 @@ class Equilibrium:
         directors(S) for S (K,) gives (K, 3, 3), rows d1, d2, d3 on the lab axes; periodic.
     moment, force : ndarray, shape (3,)
         M and R at S = 0 on the lab axes.
+    symmetry : Symmetry
+    mesh : ndarray, shape (N + 1,)
+        S at the mesh points of the collocation that the equilibrium comes from, on the piece [0, mesh[-1]] that the symmetry
+        repeats: half a part of the loop where there is a mirror or an axis, else a part.
+    degree : int
+        Of that collocation, which is the discretization of the second variation, too.
     """
 
     law: Law
@@ -80,11 +94,31 @@ class Equilibrium:
     moment: np.ndarray
     force: np.ndarray
     symmetry: Symmetry
+    mesh: np.ndarray
+    degree: int
     Gamma: float | None = None
 
     def response(self, moment):
         """Strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""
-        return self.law.linearized(moment, self.kappa_n, *self.law.values(self.nu, self.Gamma).values())
+        values = self.law.values(self.nu, self.Gamma).values()
+        if not self.law.gradient:
+            return self.law.linearized(moment, self.kappa_n, *values)
+        batch, colours = _compiled(self.law)  # a response with loops and decisions, a hundred times faster than in plain Python
+        arguments = np.ascontiguousarray(moment), np.empty((0, 3)), np.array([self.kappa_n, *values])
+        return batch.jacobian(np.zeros(len(moment)), *arguments, colours)
+
+
+@functools.cache
+def _compiled(law: Law) -> tuple:
+    """The strains of a law as compiled functions of M1, M2, M3, and the colouring of their Jacobian."""
+    response = law.response_at
+
+    def strains(u, p):
+        H, w1, w2, w3, conjugate = response(u.M1, u.M2, u.M3, p)
+        return w1, w2, w3
+
+    batch = Batch([strains], [3], ("M1", "M2", "M3"), ("kappa_n", *law.parameters), times=False)
+    return batch, batch.colouring([])
 
 
 def coupling(moment, force) -> np.ndarray:
@@ -100,7 +134,10 @@ def cross_matrix(a) -> np.ndarray:
 
 
 def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = None) -> Equilibrium:
-    """The planar m-covered circle.
+    """The planar m-covered circle, on a uniform mesh that is fine enough for the highest wavenumber that can lower the energy.
+
+    A wave of wavenumber l has theta ~ u / l. The moment M, along d1, contributes |M| m |K| / l^2 of the stiffness and, where
+    omega_2 is free, |M| |K| / l: above l^2 = m^2 + |M| m |K| (+ |M|^2 |K|^2) nothing is unstable.
 
     Raises
     ------
@@ -115,13 +152,17 @@ def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = No
         return np.array([[zero, zero, one], normal, tangent]).transpose(2, 0, 1)
 
     moment = np.array([0.0, 0.0, linear.circle(law, m, kappa_n, nu, Gamma)["M1"]])
-    found = Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), Symmetry(order=m, mirror=True), Gamma)
-    strain = found.response(directors(np.zeros(1)) @ moment)[0][0]
+    piece, symmetry = LENGTH / (2 * m), Symmetry(order=m, mirror=True)
+    found = Equilibrium(law, nu, kappa_n, directors, moment, np.zeros(3), symmetry, np.array([0, piece]), _CIRCLE_DEGREE, Gamma)
+    strain, compliance = (values[0] for values in found.response(directors(np.zeros(1)) @ moment))
     if not np.abs(strain - [m, 0, 0]).max() < 1e-9 * m:
         raise ValueError(
             f"{law.name}: no {m}-covered circle at kappa_n = {kappa_n:g}, nu = {nu:g} on the root that the law takes"
         )
-    return found
+    softened = abs(moment[2]) * np.linalg.norm(compliance)
+    highest = math.sqrt(m * m + m * softened + (0 if law.constrained else softened**2))
+    intervals = math.ceil(piece * highest / _PHASE) + 1
+    return dataclasses.replace(found, mesh=np.linspace(0, piece, intervals + 1))
 
 
 def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
@@ -151,7 +192,8 @@ def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, flo
         axes, directors, symmetry = _unfolded_cell(sample, p["length"])
     else:
         axes, directors, symmetry = _unfolded_half(sample, "axes" in p)
-    return Equilibrium(law, p["nu"], p["kappa_n"], directors, axes @ moment, axes @ force, symmetry, p.get("Gamma"))
+    loads = axes @ moment, axes @ force
+    return Equilibrium(law, p["nu"], p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree, p.get("Gamma"))
 
 
 def _unfolded_half(sample, between_axes: bool):
@@ -184,7 +226,7 @@ def _unfolded_cell(sample, length):
     turn = half_turn @ np.diag([1.0, -1.0, -1.0])  # after the half turn about e1 = d3(0)
     part, order = 2 * length, round(LENGTH / (2 * length))
     winding = math.atan2(turn[1, 0], turn[0, 0]) * order / (2 * math.pi)
-    if abs(winding - round(winding)) > 1e-6:
+    if abs(order * part / LENGTH - 1) > _LENGTH_DEFECT or abs(winding - round(winding)) > _WINDING_DEFECT:
         raise ValueError(f"a part of the loop turns by {winding:.9g} times 2 pi / {order}: it does not close")
     turns = [np.linalg.matrix_power(turn, k).T for k in range(order)]
     signs = np.array([np.ones(3), _HALF_TURN])[:, :, None]

@@ -107,9 +107,9 @@ class Solution:
         """The equilibrium along the whole loop, for its second variation; raises as `from_solution`."""
         return from_solution(self.law, self.t, self.states, self.degree, self.parameters)
 
-    def index(self, accuracy: float | None = None) -> Stability:
+    def index(self) -> Stability:
         """Number of negative directions of the energy; see `ribbon_model.stability.index`."""
-        return stability.index(self.equilibrium(), accuracy)
+        return stability.index(self.equilibrium())
 
     def functionals(self) -> dict[str, float]:
         """kappa_star (28) and energy (mean of U, without kappa_n**2/2), by the Gauss points of the collocation."""

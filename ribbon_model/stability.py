@@ -1,33 +1,53 @@
 """The index of an equilibrium: negative directions of its energy on closed perturbations, by symmetry class.
 
-The second variation (`ribbon_model.second_variation`) is the identity plus a compact form: in Fourier coefficients on the loop,
+The second variation (`ribbon_model.second_variation`), Q = int |v|^2 + E . N E' dS with E' = G v, is discretized as the
+equilibrium is: by collocation at the d Gauss points of each interval of the same mesh. The values of v at the Gauss points are
+free, E is the continuous piecewise polynomial of degree d with E' = G v there, and the integral is the sum over Gauss points.
+There is no cutoff, and the places of zero eigenvalues have the error O(h^(2 d)), like the equilibrium at its mesh points.
 
-    Q = sum over l of |v_l|^2 + sum over p != 0 of (1/p) e_p . (i N) e_p,    e = G v,   e_0 = 0.
+Steps:
 
-It is taken on the v with |l| up to a cutoff. High wavenumbers cannot lower the energy, and raising the cutoff can only raise
-the count. A loop of ``order`` equal parts couples only wavenumbers that are equal modulo ``order``: one small matrix for each
-class j = 0 ... order/2, real if there is a mirror, in two where the mirror keeps the class. The six conditions e_0 = 0 and the
-shift of phase, whose vector C^T M' is known, are projected out. So no eigenvalue is zero but at a bifurcation.
+1. `_of_mesh`: Q on the functions v of one interval of the mesh, (k d, k d) for k functions v.
+2. `_condensed`: 6 combinations y of their values give the increment of E over the interval. The others couple to nothing
+   outside it, and are eliminated (Schur complement). Then two neighbours are one interval with 12 unknowns, of which 6 are
+   eliminated, and so on, as long as what is eliminated is positive definite: then no negative direction is lost (Haynsworth).
+3. `_Form`: the piece of the loop that the symmetry repeats. With S_e (6, 6) of an interval, its increment W_e y_e (6,), and E
+   at the left end of an interval the sum of the increments before, the matrix of Q is
 
-Instead of S the variable is a tau that runs faster where the strip is more curved; that changes nothing but the cutoff needed.
+       S_1         W_1^T N W_2 / 2   W_1^T N W_3 / 2   ...
+       (sym.)      S_2               W_2^T N W_3 / 2   ...
+                                     S_3               ...
+
+4. `_Form.classes`: for each symmetry class the matrix with the image of the piece under its reversal, and with E at S = 0. That
+   follows from the increment over a part of the loop: E(part) = rho T E(0), T the motion from a part to the next.
+5. Conditions of closure, where rho T has the eigenvalue 1, and the shift of phase, whose vector C^T M' is known, are projected
+   out. So no eigenvalue is zero but at a bifurcation.
 """
 
 from __future__ import annotations
 
-import math
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
-from ribbon_model.equilibrium import LENGTH
-from ribbon_model.second_variation import Equilibrium, coupling
+from contin import basis, interpolation
+from ribbon_model.second_variation import Equilibrium, Symmetry, coupling
 
-_CUTOFFS = (6, 9, 13, 19, 28, 42, 63, 94, 141, 212, 318, 477)  # wavenumbers in units of order
-_SAMPLES = (128, 256, 512, 1024, 2048, 4096)  # stations on a part
-_TAIL = 1e-10  # of the coefficients of G: where the samples are enough
-_NEUTRAL = 1e-9  # an eigenvalue below this is zero as far as equilibria are known
-_RESIDUAL = 1e-3  # of the known null vector
-_NO_MOTION = 1e-8  # below this |C^T M'| the equilibrium is a circle, and a shift of phase a rigid rotation
+#: An eigenvalue below this is zero as far as equilibria are known: Newton's method leaves 1e-11, times a condition of 100. Ten
+#: times larger, states within 1e-8 of a bifurcation would be undecided.
+_NEUTRAL = 1e-9
+#: Below this |C^T M'| the equilibrium is a circle, and a shift of phase a rigid rotation.
+_NO_MOTION = 1e-8
+#: Singular values of conditions below this are zero. They are of order 1 or round-off.
+_DEPENDENT = 1e-9
+#: The form that is eliminated is the identity plus O(h^2). Where an eigenvalue of it is below this, nothing is. Ten times
+#: smaller, Schur complements could be large, and lose digits.
+_DEFINITE = 0.2
+#: Rigid motions, and components of E.
+_RIGID = 6
+#: A gap of the closed loop above this is more than a corrector leaves.
+_CLOSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,19 +64,14 @@ class SymmetryClass:
     multiplicity : int
         2 if the class -j, which has the same eigenvalues, is another one: then modes come in pairs.
     eigenvalues : ndarray
-        Of Q over int |v|^2, ascending: pure numbers that accumulate at 1. Smooth along a branch where they are simple.
-    errors : ndarray
-        By how much they fell when the cutoff was last raised.
-    floor : float
-        What cannot be told from zero: the residual of the known null vector, and round-off.
+        Of the discrete Q after elimination, over |y|^2, ascending: pure numbers. Their signs, and which of them are zero, are
+        those of Q; their sizes depend on the mesh. Directions that are projected out have the eigenvalue 1.
     """
 
     wavenumber: int
     parity: str
     multiplicity: int
     eigenvalues: np.ndarray
-    errors: np.ndarray
-    floor: float
 
     @property
     def name(self) -> tuple[int, str]:
@@ -70,7 +85,10 @@ class SymmetryClass:
 
     @property
     def determinant(self) -> float:
-        """The product of the eigenvalues, which converges: analytic along a branch, also where eigenvalues cross each other."""
+        """The product of the eigenvalues: smooth along a branch on one mesh, also where eigenvalues cross each other.
+
+        It jumps, without a change of sign, where more or fewer intervals can be condensed.
+        """
         return float(np.prod(self.eigenvalues))
 
     @property
@@ -88,20 +106,21 @@ class Stability:
     index : int
         Number of negative directions. 0 is a local minimum of the energy.
     decided : bool
+        False where an eigenvalue is zero as far as the state is known, or the loop is not closed.
     reason : str
         If not decided: what could not be told.
-    cutoff : int
-        Largest wavenumber of the perturbations.
-    defect : float
-        The larger of: mean of d3 (zero on a closed loop), relative residual of the known null vector.
+    residual : float
+        |Q| of the shift of phase over |v|^2. It would be zero without discretization: this is the error of eigenvalues.
+    gap : float
+        By how much the loop does not close.
     classes : tuple of SymmetryClass
     """
 
     index: int
     decided: bool
     reason: str
-    cutoff: int
-    defect: float
+    residual: float
+    gap: float
     classes: tuple[SymmetryClass, ...]
 
     def __getitem__(self, name: tuple[int, str]) -> SymmetryClass:
@@ -114,270 +133,295 @@ class Stability:
         return min(self.classes, key=lambda entry: abs(entry.eigenvalues[entry.nearest]))
 
 
-def index(equilibrium: Equilibrium, accuracy: float | None = None) -> Stability:
-    """Number of negative directions of the energy of a closed equilibrium.
-
-    The cutoff is raised until, in every class, the eigenvalue nearest to zero moves by less than a quarter of its distance from
-    zero and the count stays; the known null vector leaves a residual below 1e-3; and the wavenumbers left out are those that a
-    local estimate says cannot be unstable. Where that cannot be reached, or an eigenvalue is zero, the result is not decided.
-
-    Parameters
-    ----------
-    accuracy : float, optional
-        Besides, in every class the eigenvalue nearest to zero, if below 1/2, moves by less than this: to find roots.
+def index(equilibrium: Equilibrium) -> Stability:
+    """Number of negative directions of the energy of a closed equilibrium, on the mesh of the equilibrium.
 
     Raises
     ------
     ValueError
-        A loop that is not closed, or an energy that is not convex in the strains at that state: then high wavenumbers lower it
-        without end, and there is no index.
+        The energy is not convex in the strains at that state: high wavenumbers lower it without end, and there is no index.
     """
-    form = _transformed(equilibrium)
-    start = min(np.searchsorted(_CUTOFFS, max(form.bandwidth / 2, form.reach)), len(_CUTOFFS) - 2)
-    coarse = form.classes(_CUTOFFS[start])
-    for cutoff in _CUTOFFS[start + 1 :]:
-        fine = form.classes(cutoff)
-        result, settled = _compared(form, coarse, fine, cutoff, accuracy)
-        if settled:
-            break
-        coarse = fine
-    return result
-
-
-def _compared(form: _Form, coarse, fine, cutoff, accuracy) -> tuple[Stability, bool]:
-    """The result at a cutoff, judged by the one before, and whether a higher cutoff is of no use."""
-    classes, doubts, neutral, residual = [], [], [], 0.0
-    for (j, parity, multiplicity, low, _), (_, _, _, high, rest) in zip(coarse, fine):
-        errors = np.full(len(high), np.inf)
-        errors[: len(low)] = np.abs(low - high[: len(low)])
-        floor = max(rest, _NEUTRAL)
-        entry = SymmetryClass(j, parity, multiplicity, high, errors, floor)
-        k, residual = entry.nearest, max(residual, rest)
-        distance = abs(high[k])
-        label = f"class {j} {parity}".strip()
-        if max(distance, errors[k]) <= _NEUTRAL:
-            neutral.append(f"{label}: an eigenvalue {high[k]:.1e} cannot be told from zero")
-        elif distance <= max(4 * errors[k], floor) or np.sum(low < 0) != entry.negative:
-            doubts.append(f"{label}: an eigenvalue {high[k]:.1e} is not known better than {max(errors[k], floor):.1e}")
-        if accuracy is not None and errors[k] > accuracy and distance < 0.5:
-            doubts.append(f"{label}: an eigenvalue {high[k]:.1e} still moves by {errors[k]:.1e}")
-        classes.append(entry)
-    if residual > _RESIDUAL:
-        doubts.append(f"the shift of phase leaves a residual of {residual:.1e}")
-    if cutoff < form.reach:
-        doubts.append(f"wavenumbers up to {form.reach * form.order:.0f} may be unstable")
-    if form.rank != 6:
-        neutral.append(f"{form.rank} of the six conditions of closure are independent")
+    points = _at_gauss_points(equilibrium)
+    form = _Form(equilibrium, points)
+    classes = form.classes()
+    floor = max(_NEUTRAL, form.residual)
+    reasons = []
+    if points.gap > _CLOSED:
+        reasons.append(f"the loop is not closed: a gap of {points.gap:.1e}")
+    for entry in classes:
+        nearest = entry.eigenvalues[entry.nearest]
+        if abs(nearest) <= floor:
+            label = f"class {entry.wavenumber} {entry.parity}".strip()
+            reasons.append(f"{label}: an eigenvalue {nearest:.1e} cannot be told from zero")
     total = sum(entry.multiplicity * entry.negative for entry in classes)
-    defect = max(form.closure, residual)
-    reasons = doubts + neutral
-    return Stability(total, not reasons, "; ".join(reasons), cutoff * form.order, defect, tuple(classes)), not doubts
+    return Stability(total, not reasons, "; ".join(reasons), form.residual, points.gap, classes)
 
 
-class _Form:
-    """The second variation in Fourier coefficients, and its matrices.
-
-    A coefficient of G from column c to row r, at the wavenumber r_shift - c_shift + order * k, is ``generator[k, r, c]``.
-    ``reach`` is the largest wavenumber, over order, at which a local estimate finds instability.
-    """
-
-    def __init__(self, symmetry, generator, motion, coupling, rows, columns, signs, closure, reach):
-        self.symmetry, self.order, self.closure, self.reach = symmetry, symmetry.order, closure, reach / symmetry.order
-        self.generator, self.motion, self.coupling = generator, motion, coupling
-        self.rows, self.columns, self.signs = rows, columns, signs
-        self.coupled = np.flatnonzero(np.abs(coupling).max(axis=0) > 1e-13 * np.abs(coupling).max())
-        size = np.abs(generator).max(axis=(1, 2))
-        large = np.flatnonzero(size > 1e-3 * size.max())
-        self.bandwidth = int(np.minimum(large, len(size) - large).max())
-        self.rank = 0
-        if np.any(np.abs(coupling[(rows[:, None] - rows) % self.order != 0]) > 1e-6 * (1 + np.abs(coupling).max())):
-            raise ValueError("the moment and force do not have the symmetry that the frame has")
-
-    def classes(self, cutoff):
-        """(j, parity, multiplicity, eigenvalues, residual) of every class; counts the conditions of closure in ``rank``."""
-        a, b = np.arange(-cutoff - 1, cutoff + 2), np.arange(-2 * cutoff - 1, 2 * cutoff + 2)
-        k, count = b[:, None] - a, len(self.generator)
-        toeplitz = self.generator[k % count]  # (rows' b, columns' a, 6, c)
-        toeplitz[np.abs(k) >= count // 2] = 0
-        motion = np.where(np.abs(a)[:, None] < count // 2, self.motion[a % count], 0)
-        matrix = toeplitz.transpose(2, 0, 3, 1).reshape(6, len(b), -1)  # columns ordered by c, then a
-        found, self.rank = [], 0
-        for j in range(self.order // 2 + 1):
-            wavenumbers = (j + self.columns[:, None] + self.order * a).ravel()
-            p = j + self.rows[:, None] + self.order * b
-            weights = np.where((p == 0) | (np.abs(p) > self.order * (2 * cutoff + 0.5)), 0.0, 1 / np.where(p == 0, 1, p))
-            own = 2 * j % self.order == 0
-            for parity in ("even", "odd") if own and self.symmetry.reverses else ("",):
-                basis = self._basis(wavenumbers, len(a), cutoff, parity)
-                e, conditions = self._combined(matrix[self.coupled], basis), self._combined(matrix[p == 0], basis)
-                vector = self._combined(motion.T.ravel(), basis) if j == 0 else np.zeros(0)
-                eigenvalues, residual, rank = self._eigenvalues(e, weights[self.coupled], conditions, vector)
-                multiplicity = 1 if own else 2
-                found.append((j, parity, multiplicity, eigenvalues, residual))
-                self.rank += multiplicity * rank
-        return found
-
-    def _basis(self, wavenumbers, count, cutoff, parity):
-        """Columns of the class up to the cutoff as sums of two: their numbers (2, K) and weights (2, K)."""
-        inside = np.flatnonzero(np.abs(wavenumbers) <= self.order * (cutoff + 0.5))
-        if not parity:
-            return inside, inside, np.ones(len(inside)), np.zeros(len(inside))
-        sign = (1 if parity == "even" else -1) * self.signs[inside // count]
-        place = {(i // count, wavenumbers[i]): i for i in inside}
-        opposite = np.array([place[i // count, -wavenumbers[i]] for i in inside])
-        keep = (wavenumbers[inside] > 0) | ((wavenumbers[inside] == 0) & (sign > 0))
-        inside, opposite, sign = inside[keep], opposite[keep], sign[keep]
-        scale = np.where(inside == opposite, 0.5, math.sqrt(0.5))
-        return inside, opposite, scale, scale * sign
-
-    @staticmethod
-    def _combined(columns, basis):
-        """From columns (..., all) to those of a basis (..., K)."""
-        result = columns[..., basis[0]]
-        return result if basis[0] is basis[1] else result * basis[2] + columns[..., basis[1]] * basis[3]
-
-    def _eigenvalues(self, e, weights, conditions, vector):
-        """Eigenvalues under the conditions, the shift of phase left out; its residual; number of independent conditions."""
-        form = np.eye(e.shape[2], dtype=e.dtype)
-        strength = self.coupling[np.ix_(self.coupled, self.coupled)]
-        for r, s in np.argwhere(np.abs(strength) > 1e-13 * np.abs(strength).max(initial=0.0)):
-            form += strength[r, s] * (e[r].conj().T @ (weights[s][:, None] * e[s]))
-        basis, sizes, _ = np.linalg.svd(conditions.conj().T, full_matrices=False)
-        basis = basis[:, sizes > 1e-9]
-        rank, residual = basis.shape[1], 0.0
-        length = np.linalg.norm(vector)
-        if length > _NO_MOTION:
-            vector = vector / length
-            against = np.linalg.norm(basis.conj().T @ vector)
-            vector = vector - basis @ (basis.conj().T @ vector)
-            image = form @ vector
-            residual = float(max(against, np.linalg.norm(image - basis @ (basis.conj().T @ image))))
-            basis = np.hstack([basis, vector[:, None] / np.linalg.norm(vector)])
-        # between the projectors, the directions projected out get the eigenvalue 1, which is where all others accumulate
-        image = form @ basis
-        crossed = image @ basis.conj().T
-        inner = basis @ (basis.conj().T @ image + np.eye(basis.shape[1])) @ basis.conj().T
-        return np.linalg.eigvalsh(form - crossed - crossed.conj().T + inner), residual, rank
-
-
-_CIRCULAR = np.array([[1, 1j, 0], [1, -1j, 0], [0, 0, math.sqrt(2)]]) * math.sqrt(0.5)  # (x + iy, x - iy, z)
+# --- fields at the Gauss points -----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class _Samples:
-    """Fields at tau = part * i / count on one part of the loop: S' = dS/dtau, and what `_sampled` finds."""
+class _Points:
+    """Fields at the Gauss points of the piece, shapes (N, d, ...), lengths (N,) of the intervals, and the gap of the loop.
 
-    tau: np.ndarray
-    speed: np.ndarray
-    directors: np.ndarray
-    centreline: np.ndarray
+    ``generator`` (N, d, 6, k) is G, ``motion`` (N, d, k) is C^T M', the shift of phase; ``momentum`` (3,) is mu.
+    """
+
+    lengths: np.ndarray
+    generator: np.ndarray
+    motion: np.ndarray
     momentum: np.ndarray
-    moment: np.ndarray
-    strain: np.ndarray
-    compliance: np.ndarray
-    closure: float
+    gap: float
 
 
-def _sampled(equilibrium: Equilibrium, count: int, stretch) -> _Samples:
-    """Frame, centreline (by Fourier series, mean zero), mu, body components of M, strains and compliance."""
-    symmetry = equilibrium.symmetry
-    tau = np.arange(count) * (LENGTH / symmetry.order / count)
-    shift, speed = stretch(count)
-    d = equilibrium.directors(tau + shift)
-    turns = _shifts(symmetry)[3:]
-    carrier = np.exp(1j * turns[:, None] * tau)
-    series = np.fft.fft((_CIRCULAR @ (d[:, 2].T * speed)) / carrier) / count
-    p = turns[:, None] + symmetry.order * np.fft.fftfreq(count, 1 / count).round().astype(int)
-    constant = p == 0
-    integral = np.where(constant, 0, series / np.where(constant, 1, 1j * p))
-    x = (_CIRCULAR.conj().T @ (np.fft.ifft(integral) * count * carrier)).real.T
-    momentum = equilibrium.moment + np.cross(x[0], equilibrium.force)
+def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
+    """Frame, centreline by the collocation's own quadrature, strains and compliance, and what Q is made of."""
+    tables, mesh = basis(equilibrium.degree), equilibrium.mesh
+    lengths = np.diff(mesh)
+    stations = mesh[:-1, None] + lengths[:, None] * tables.points
+    d = equilibrium.directors(stations.ravel()).reshape(*stations.shape, 3, 3)
+    ends = np.cumsum(lengths[:, None] * np.einsum("i,eik->ek", tables.weights, d[:, :, 2]), axis=0)
+    inside = lengths[:, None, None] * np.einsum("ij,ejk->eik", _partial_integrals(equilibrium.degree), d[:, :, 2])
+    inside[1:] += ends[:-1, None]
+    origin, gap = _origin(equilibrium.symmetry, ends[-1])
+    x = (inside + origin).reshape(-1, 3)
+    d = d.reshape(-1, 3, 3)
+    momentum = equilibrium.moment + np.cross(origin, equilibrium.force)
     moment = np.einsum("kij,kj->ki", d, momentum - np.cross(x, equilibrium.force))
     strain, compliance = equilibrium.response(moment)
-    closure = float(np.abs(series[constant]).max(initial=0.0))
-    return _Samples(tau, speed, d, x, momentum, moment, strain, compliance, closure)
+    free = [0, 2] if equilibrium.law.constrained else [0, 1, 2]
+    try:
+        factor = np.linalg.cholesky(compliance[:, free][:, :, free])
+    except np.linalg.LinAlgError as error:
+        raise ValueError("the energy is not convex in the strains along this equilibrium: it has no index") from error
+    u = d[:, free].transpose(0, 2, 1) @ factor
+    generator = np.concatenate([u, np.cross(u, x[:, :, None], axis=1)], axis=1)
+    rate = np.cross(moment, strain) + np.cross(d @ equilibrium.force, [0.0, 0.0, 1.0])  # M'
+    motion = np.einsum("kab,ka->kb", factor, rate[:, free])
+    shape = stations.shape
+    return _Points(lengths, generator.reshape(*shape, 6, -1), motion.reshape(*shape, -1), momentum, gap)
 
 
-def _shifts(symmetry) -> np.ndarray:
-    """Wavenumber modulo ``order`` of the rows (6,) of G v on the circular axes, for v of the class 0."""
+@functools.cache
+def _partial_integrals(degree: int) -> np.ndarray:
+    """The matrix a (d, d) of the Runge-Kutta method: integrals from 0 to the Gauss points of the unit interval."""
+    tables = basis(degree)
+    lagrange = 1 / np.prod(tables.points[:, None] - tables.points + np.eye(degree), axis=1)
+    return np.array([
+        point * tables.weights @ interpolation(tables.points, lagrange, point * tables.points) for point in tables.points
+    ])  # fmt: skip
+
+
+def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
+    """x(0) from a centre of all symmetries, given x(end) - x(0) of the piece; and the gap of the loop."""
+    if not symmetry.reverses:
+        return np.zeros(3), float(np.linalg.norm(end))
+    start, middle = (np.eye(3) + each[3:, 3:] for each in (_reversal(symmetry), _motion(symmetry) @ _reversal(symmetry)))
+    rows, values = np.vstack([start, middle]), np.concatenate([np.zeros(3), -middle @ end])
+    origin = np.linalg.lstsq(rows, values, rcond=_DEPENDENT)[0]
+    return origin, float(np.linalg.norm(rows @ origin - values))
+
+
+# --- symmetry -----------------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _reversal(symmetry: Symmetry) -> np.ndarray:
+    """The matrix (6, 6) that takes E'(S) to E'(-S) for perturbations that keep the mirror or axis at S = 0.
+
+    The mirror is normal to e1, or the axis is e1. With X the mirror's matrix, u(-S) = X u(S) for both, x(-S) = X x(S) for the
+    mirror and -X x(S) for the axis, so that u x x is multiplied by -X or X.
+    """
+    image = np.diag([-1.0, 1.0, 1.0])
+    return np.kron(np.diag([1.0, -1.0 if symmetry.mirror else 1.0]), image)
+
+
+@functools.cache
+def _motion(symmetry: Symmetry) -> np.ndarray:
+    """The matrix T (6, 6) that takes E'(S) to E' one part further for perturbations of class 0; x turns like w."""
+    angle = 2 * np.pi * symmetry.winding / symmetry.order
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    return np.kron(np.diag([1.0, -1.0 if symmetry.flip else 1.0]), turn)
+
+
+#: x + i y, x - i y, z on the axes of theta and of w: there T is diagonal.
+_CIRCULAR = np.kron(np.eye(2), np.array([[1, 1j, 0], [1, -1j, 0], [0, 0, np.sqrt(2)]]) * np.sqrt(0.5))
+
+
+@functools.cache
+def _phases(symmetry: Symmetry) -> np.ndarray:
+    """T on the circular axes is exp(2 pi i p / order): the whole numbers p (6,)."""
     turning = np.array([symmetry.winding, -symmetry.winding, 0])
     return np.concatenate([turning, turning + (symmetry.order // 2 if symmetry.flip else 0)])
 
 
-def _uniform(count):
-    return np.zeros(count), np.ones(count)
+@functools.cache
+def _closing(symmetry: Symmetry, wavenumber: int) -> tuple[np.ndarray, np.ndarray]:
+    """From the increment D of E over a part, E(0) = Z D in a class: Z (6, 6), and the rows (c, 6) whose product with D is zero.
 
-
-def _stretched(equilibrium: Equilibrium, count: int = 512, modes: int = 40):
-    """A smooth S(tau), stretch(count) = (S - tau, dS/dtau), with dtau/dS about |omega|^2 over its mean + 0.1."""
-    at = _sampled(equilibrium, count, _uniform)
-    part = LENGTH / equilibrium.symmetry.order
-    density = np.sum(at.strain**2, axis=1)
-    density = density / density.mean() + 0.1
-    tau = np.concatenate([[0.0], np.cumsum((density + np.roll(density, -1)) / 2)])
-    inverse = np.interp(at.tau, part * tau / tau[-1], np.append(at.tau, part))
-    series = np.fft.rfft(inverse - at.tau)[:modes] / count * np.exp(-36 * (np.arange(modes) / modes) ** 8)
-    if equilibrium.symmetry.reverses:
-        series = 1j * series.imag
-    slope = series * (2j * math.pi / part * np.arange(modes))
-
-    def stretch(count):
-        return np.fft.irfft(series * count, count), 1 + np.fft.irfft(slope * count, count)
-
-    return stretch if stretch(count)[1].min() > 0 else _uniform
-
-
-def _transformed(equilibrium: Equilibrium) -> _Form:
-    """The second variation of an equilibrium in Fourier coefficients, from as many samples as it takes."""
-    stretch = _stretched(equilibrium)
-    for count in _SAMPLES:
-        form = _form(equilibrium, _sampled(equilibrium, count, stretch))
-        size = np.abs(form.generator)
-        if size[3 * count // 8 : 5 * count // 8].max() < _TAIL * size.max():
-            break
-    if form.closure > 1e-6:
-        raise ValueError(f"the loop is not closed: the mean of d3 is {form.closure:.1e}")
-    return form
-
-
-def _form(equilibrium: Equilibrium, at: _Samples) -> _Form:
-    """Fourier coefficients of G, of C^T M' and of N on circular axes, real if there is a mirror."""
-    symmetry, d = equilibrium.symmetry, at.directors
-    free = np.array([0, 2] if equilibrium.law.constrained else [0, 1, 2])
-    try:
-        factor = np.linalg.cholesky(at.compliance[:, free][:, :, free])
-    except np.linalg.LinAlgError as error:
-        raise ValueError("the energy is not convex in the strains along this equilibrium: it has no index") from error
-    root = np.sqrt(at.speed)[:, None]
-    u = np.einsum("kai,kab->ikb", d[:, free], factor) * root
-    w = np.cross(u, at.centreline.T[:, :, None], axis=0)
-    fields = np.einsum("ij,fjkb->fikb", _CIRCULAR, [u, w]).reshape(6, len(at.tau), -1)
-    rows, columns = _shifts(symmetry), np.array([0, 1, 1])[free] * (symmetry.order // 2 if symmetry.flip else 0)
-    carrier = np.exp(-1j * (rows[:, None, None] - columns) * at.tau[:, None])
-    generator = np.fft.fft(fields * carrier, axis=1).transpose(1, 0, 2) / len(at.tau)
-    force = np.einsum("kij,j->ki", d, equilibrium.force)
-    rate = np.cross(at.moment, at.strain) + np.cross(force, [0.0, 0.0, 1.0])  # M'
-    motion = np.einsum("kab,ka->kb", factor, rate[:, free]) * root
-    motion = np.fft.fft(motion * np.exp(-1j * columns * at.tau[:, None]), axis=0) / len(at.tau)
-    circular = np.kron(np.eye(2), _CIRCULAR)
-    form = circular @ (1j * coupling(at.momentum, equilibrium.force)) @ circular.conj().T
-    signs = np.array([1, -1, 1] if symmetry.axis else [1, 1, -1])[free]  # of the functions v under S -> -S
-    if symmetry.reverses:  # phases that make everything real
-        row_phase = np.array([-1j, -1j, 1, *((-1j, -1j, 1) if symmetry.axis else (1, 1, -1j))])
-        phase = np.where(signs > 0, 1, 1j)
-        generator = (row_phase[:, None] * generator * phase).real
-        motion = (1j * motion / phase).real
-        form = (row_phase[:, None] * form / row_phase).real
-    return _Form(symmetry, generator, motion, form, rows, columns, signs, at.closure, _reach(at))
-
-
-def _reach(at: _Samples) -> float:
-    """The wavenumber above which waves on a short piece of the strip cost energy: from |M| and the compliance K there.
-
-    A wave of wavenumber l has theta ~ u/l, so N contributes M_2 |K| / l of the stiffness, and |M| |omega| |K| / l^2 in the next
-    order, which on a circle gives the threshold of the linear theory.
+    E(0) + D = rho T E(0). Where rho T has the eigenvalue 1, D is zero and E(0) a rigid motion, which does not matter.
     """
-    moment, curvature = np.linalg.norm(at.moment, axis=1), np.linalg.norm(at.strain, axis=1)
-    softness = np.linalg.norm(at.compliance, axis=(1, 2))
-    local = curvature**2 + moment * curvature * softness + (at.moment[:, 1] * softness) ** 2
-    return float((at.speed * np.sqrt(local)).max())
+    phases = (wavenumber + _phases(symmetry)) % symmetry.order
+    factors = np.exp(2j * np.pi * phases / symmetry.order) - 1
+    inverse = np.where(phases == 0, 0, 1 / np.where(phases == 0, 1, factors))
+    return _CIRCULAR.conj().T @ (inverse[:, None] * _CIRCULAR), _CIRCULAR[phases == 0]
+
+
+def _symmetric(matrix, symmetry: Symmetry) -> np.ndarray:
+    """The part of N (6, 6) that has the symmetry of the loop: all of it, but for what a state beside a branch lacks."""
+    phases = _phases(symmetry)
+    circular = _CIRCULAR @ matrix @ _CIRCULAR.conj().T
+    circular[(phases[:, None] - phases) % symmetry.order != 0] = 0
+    matrix = (_CIRCULAR.conj().T @ circular @ _CIRCULAR).real
+    return (matrix - _reversal(symmetry) @ matrix @ _reversal(symmetry)) / 2 if symmetry.reverses else matrix
+
+
+# --- the form -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Intervals:
+    """Q on neighbouring intervals of the piece, as many unknowns K on each.
+
+    Attributes
+    ----------
+    local : ndarray, shape (N, K, K)
+        Q on the perturbations of one interval.
+    increments : ndarray, shape (N, 6, K)
+        The increment of E over it.
+    motion : ndarray, shape (N, K)
+        The shift of phase.
+    """
+
+    local: np.ndarray
+    increments: np.ndarray
+    motion: np.ndarray
+
+    def condensed(self) -> _Intervals | None:
+        """What does not change the increments eliminated: 6 unknowns on each; None where that is not positive definite.
+
+        By a QR factorization of B^T, B the increments, the first 6 of K orthonormal coordinates y give all increments.
+        """
+        if self.local.shape[1] <= _RIGID:
+            return self
+        axes = np.linalg.qr(self.increments.transpose(0, 2, 1), mode="complete")[0]
+        local, motion = axes.transpose(0, 2, 1) @ self.local @ axes, np.einsum("eij,ei->ej", axes, self.motion)
+        values, vectors = np.linalg.eigh(local[:, _RIGID:, _RIGID:])
+        if values.min() < _DEFINITE:
+            return None
+        coupled = local[:, :_RIGID, _RIGID:] @ vectors
+        local = local[:, :_RIGID, :_RIGID] - coupled / values[:, None] @ coupled.transpose(0, 2, 1)
+        return _Intervals(local, self.increments @ axes[:, :, :_RIGID], motion[:, :_RIGID])
+
+    def paired(self, coupling) -> _Intervals:
+        """Two intervals as one each time; their number is even."""
+        first, last = self.increments[::2], self.increments[1::2]
+        across = first.transpose(0, 2, 1) @ coupling @ last / 2
+        upper = np.concatenate([self.local[::2], across], axis=2)
+        lower = np.concatenate([across.transpose(0, 2, 1), self.local[1::2]], axis=2)
+        motion = np.concatenate([self.motion[::2], self.motion[1::2]], axis=1)
+        return _Intervals(np.concatenate([upper, lower], axis=1), np.concatenate([first, last], axis=2), motion)
+
+    def split(self, at: int) -> tuple[_Intervals, _Intervals]:
+        """The first intervals, ``at`` of them, and the others."""
+        parts = self.local, self.increments, self.motion
+        return _Intervals(*(part[:at] for part in parts)), _Intervals(*(part[at:] for part in parts))
+
+    def joined(self, other: _Intervals) -> _Intervals:
+        """These intervals and others behind them."""
+        parts = zip((self.local, self.increments, self.motion), (other.local, other.increments, other.motion))
+        return _Intervals(*(np.concatenate(pair) for pair in parts))
+
+
+def _of_mesh(points: _Points, coupling, degree: int) -> _Intervals:
+    """Q on each interval of the mesh; unknowns are v at the Gauss points times the roots of their weights.
+
+    It is the identity plus l c_ij G_j^T N G_i / 2 between the Gauss points j and i, l the length and
+    c_ij = a_ij sqrt(w_i / w_j) - a_ji sqrt(w_j / w_i), with the Runge-Kutta method's matrix a and weights w.
+    """
+    tables, runge_kutta = basis(degree), _partial_integrals(degree)
+    count, _, _, controls = points.generator.shape
+    scaled = runge_kutta * np.sqrt(tables.weights[:, None] / tables.weights)
+    generator = points.generator.transpose(0, 2, 1, 3).reshape(count, 6, -1)  # columns: Gauss point, function
+    local = generator.transpose(0, 2, 1) @ (coupling @ generator) * np.kron(scaled.T - scaled, np.ones((controls, controls)))
+    local = np.eye(degree * controls) + points.lengths[:, None, None] / 2 * local
+    roots = np.sqrt(points.lengths[:, None] * np.repeat(tables.weights, controls))
+    return _Intervals(local, generator * roots[:, None], points.motion.reshape(count, -1) * roots)
+
+
+def _condensed(intervals: _Intervals, coupling) -> _Intervals:
+    """Intervals of the mesh with six unknowns each, joined in pairs as long as what is eliminated is positive definite."""
+    found = intervals.condensed()
+    while found is not None:
+        intervals, even = found, len(found.local) // 2 * 2
+        if even == 0 or found.local.shape[1] < _RIGID:
+            break
+        pairs, rest = intervals.split(even)
+        found = pairs.paired(coupling).condensed()
+        found = found.joined(rest) if found is not None and len(rest.local) else found
+    return intervals
+
+
+class _Form:
+    """The second variation on the piece: its matrix and W (6, n), for n unknowns; ``residual`` is Q of the shift of phase."""
+
+    def __init__(self, equilibrium: Equilibrium, points: _Points):
+        self.symmetry, self.residual = equilibrium.symmetry, 0.0
+        self.coupling = _symmetric(coupling(points.momentum, equilibrium.force), self.symmetry)
+        intervals = _condensed(_of_mesh(points, self.coupling, equilibrium.degree), self.coupling)
+        self.increments, self.motion = intervals.increments.transpose(1, 0, 2).reshape(_RIGID, -1), intervals.motion.ravel()
+        count, r, _ = intervals.local.shape
+        order = np.repeat(np.arange(count), r)
+        self.matrix = self.increments.T @ self.coupling @ self.increments / 2 * np.sign(order - order[:, None])
+        blocks = self.matrix.reshape(count, r, count, r)
+        blocks[range(count), :, range(count)] += (intervals.local + intervals.local.transpose(0, 2, 1)) / 2
+
+    def classes(self) -> tuple[SymmetryClass, ...]:
+        """Every class; sets ``residual``."""
+        symmetry, found = self.symmetry, []
+        for j in range(symmetry.order // 2 + 1):
+            own = 2 * j % symmetry.order == 0
+            for parity in ("even", "odd") if own and symmetry.reverses else ("",):
+                form, increments = self._part(j, parity)
+                known = self.motion if j == 0 and parity != "even" else np.zeros(len(form))
+                found.append(SymmetryClass(j, parity, 1 if own else 2, self._eigenvalues(form, increments, j, known)))
+        return tuple(found)
+
+    def _part(self, j: int, parity: str):
+        """The matrix (n, n) on a part of the loop without what closes it, and W (6, n) of the part.
+
+        With a reversal, v on the image of the piece is v on the piece times 1 or -1 (``parity``). Without a parity both kinds
+        are unknowns, the second times i, which makes the matrix real.
+        """
+        if not self.symmetry.reverses:
+            return self.matrix, self.increments
+        image = _motion(self.symmetry) @ _reversal(self.symmetry)
+        across = self.increments.T @ (self.coupling @ image) @ self.increments / 2
+        reflected = image @ self.increments
+        if parity:
+            sign = (1 if parity == "even" else -1) * (1 if j == 0 else -1)
+            return self.matrix + sign * across, (self.increments + sign * reflected) * np.sqrt(0.5)
+        n = len(self.matrix)
+        form = np.zeros((2 * n, 2 * n))
+        form[:n, :n], form[n:, n:] = self.matrix + across, self.matrix - across
+        return form, np.hstack([self.increments + reflected, 1j * (self.increments - reflected)]) * np.sqrt(0.5)
+
+    def _eigenvalues(self, form, increments, j: int, known):
+        """Eigenvalues of a class: closed, under the conditions of closure, the shift of phase ``known`` left out."""
+        closing, rows = _closing(self.symmetry, j)
+        closing = closing.conj().T @ self.coupling
+        closing = (closing + closing.conj().T) / 2
+        form = form + (increments.conj().T @ (closing @ increments)).real
+        rows = rows @ increments
+        _, sizes, rows = np.linalg.svd(np.vstack([rows.real, rows.imag]), full_matrices=False)
+        out = rows[sizes > _DEPENDENT].T
+        known = known - out @ (out.T @ known)
+        if np.linalg.norm(known) > _NO_MOTION:
+            known /= np.linalg.norm(known)
+            self.residual = max(self.residual, abs(float(known @ form @ known)))
+            out = np.column_stack([out, known])
+        # between the projectors, and the identity on what they project out
+        image = form @ out
+        crossed = image @ out.T
+        inner = out @ (out.T @ image + np.eye(out.shape[1])) @ out.T
+        return np.linalg.eigvalsh(form - crossed - crossed.T + inner)

@@ -78,8 +78,6 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         trial, details = better, found
         if np.all(steps <= settings.mesh.tolerance * size):
             break
-    if point.test is not None and not point.test.estimated:
-        errors = dict.fromkeys(trial.system.free, np.nan)
     return Refined(trial, errors, details)
 
 

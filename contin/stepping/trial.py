@@ -171,8 +171,6 @@ class TestFunction:
         sign does not tell them all.
     looks : int
         Number of places inside a step where the sign is looked at, too: two zeros in one step leave it as it was at the ends.
-    estimated : bool
-        The point's error is estimated on finer meshes. False for a function with errors of its own, which these do not show.
 
     Examples
     --------
@@ -193,7 +191,6 @@ class TestFunction:
     limit: bool = False
     search: Callable[..., Any] | None = None
     looks: int = 0
-    estimated: bool = True
 
     def passed(self, before: float, after: float) -> bool:
         """Return whether there is a zero between two neighbouring points where the function has these values."""

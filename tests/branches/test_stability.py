@@ -8,6 +8,13 @@ from branches.config import parse
 from branches.display import Display
 from branches.job import run_branch
 from branches.read import read_branch
+from branches.stability import LABEL, Watch
+from contin import Settings, follow, locate_branch_point
+from ribbon_model.domains import HALF_LOOPS
+from ribbon_model.laws import RIBBON
+from ribbon_model.secondary import secondary_branch
+from ribbon_model.seeds import primary_branch
+from ribbon_model.solution import Solution
 
 SCENE = "{m: 3, n: 1, stability: true, limits: {kappa_n: [-30, 0]}, stride: 50}"
 
@@ -22,9 +29,9 @@ def branch(tmp_path_factory):
 def test_a_secondary_bifurcation_is_located_and_changes_the_index_by_one(branch):
     """kappa_n from the half loop, whose equations see the same point as a branch point of their own."""
     (event,) = branch.events[branch.events["label"] == b"SB"]
-    assert event["kappa_n"] == pytest.approx(-21.62681748742, abs=1e-8)
+    assert event["kappa_n"] == pytest.approx(-21.62681748742, abs=3e-11)
     assert event["name"] == b"wavenumber 1 even"
-    assert np.isnan(event["error_kappa_n"])  # the index has errors of its own, which finer meshes of the state do not show
+    assert 0 < event["error_kappa_n"] < 1e-10
     at = int(event["point"])
     index = branch.points["index"]
     assert set(index[1:at]) == {2} and set(index[at + 1 :]) == {1} and index[0] == index[at] == -1
@@ -85,3 +92,58 @@ def test_the_index_ends_with_the_law(silent, tmp_path):
     assert run_branch(parse(scene, "scene"), tmp_path / "x.h5", silent()) == "complete"
     branch = read_branch(tmp_path / "x.h5")
     assert branch.events[-1]["name"] == b"the end of the convex strain energy" and branch.events[-1]["index"] == -1
+
+
+#: Primary branches of the ribbon and nu, and the number of their secondary bifurcations down to kappa_n = -150.
+AGREEMENT = {
+    (3, 1, 0.1): 3, (3, 1, 0.2): 3, (3, 1, 0.3): 2, (3, 1, 0.4): 0,
+    (5, 1, 0.1): 3, (5, 1, 0.2): 3, (5, 1, 0.3): 3, (5, 1, 0.4): 0,
+    (5, 2, 0.1): 1, (5, 2, 0.2): 1, (5, 2, 0.3): 2, (5, 2, 0.4): 0,
+    (7, 1, 0.1): 3, (7, 1, 0.2): 3, (7, 1, 0.3): 3, (7, 1, 0.4): 3,
+    (7, 2, 0.1): 1, (7, 2, 0.2): 1, (7, 2, 0.3): 1, (7, 2, 0.4): 0,
+    (7, 3, 0.1): 1, (7, 3, 0.2): 1, (7, 3, 0.3): 1, (7, 3, 0.4): 0,
+}  # fmt: skip
+#: Those that are computed without --full.
+QUICK = {(7, 1, 0.3), (5, 2, 0.3)}
+
+
+@pytest.mark.parametrize(("m", "n", "nu"), AGREEMENT)
+def test_the_index_changes_where_the_half_loop_branches(m, n, nu, request):
+    """Within the errors of both: located by an eigenvalue on the cell, and as a branch point of the half loop's equations."""
+    if (m, n, nu) not in QUICK and not request.config.getoption("--full"):
+        pytest.skip("with --full only")
+    system, x, tangent = primary_branch(RIBBON, m, n, nu, 10, 7)
+    settings = Settings(trivial="M2", limits={"kappa_n": (-150, 100)}, test_functions=Watch(RIBBON, system, x).monitors)
+    found = follow(system, x, settings, tangent).labelled(LABEL)
+    assert len(found) == AGREEMENT[m, n, nu]
+    for point in found:
+        for reversal in point.details.keeps:
+            half, start, _ = secondary_branch(Solution.of(point), HALF_LOOPS[reversal])
+            finer, carry = half.refined()
+            places = [
+                finer.parameter(locate_branch_point(finer, carry(start)).x, "kappa_n"), half.parameter(start, "kappa_n"),
+            ]  # fmt: skip
+            error = point.errors["kappa_n"] + abs(places[1] - places[0])
+            assert error < 1e-8
+            assert abs(point["kappa_n"] - places[0]) < 3 * error + 1e-12
+
+
+def test_a_pair_of_bifurcations_in_one_step(tmp_path):
+    """(5, 1) at nu = .302 loses its symmetry under the mirror, and twice under the axes, between two neighbouring points."""
+    scene = "{m: 5, n: 1, nu: 0.302, stability: true, limits: {kappa_n: [-40, 0]}}"
+    run_branch(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
+    events = [event for event in read_branch(tmp_path / "x.h5").events if event["label"] == b"SB"]
+    places = [event["kappa_n"] for event in events]
+    assert places == pytest.approx([-24.058306547949, -25.6395938179, -28.4919621576], abs=1e-9)
+    assert [event["name"].decode()[-4:].strip() for event in events] == ["even", "odd", "odd"]
+    assert [(event["index_before"], event["index_after"]) for event in events] == [(6, 5), (5, 4), (4, 5)]
+
+
+def test_a_mesh_too_coarse_for_the_index_is_halved(tmp_path):
+    """A strip of finite width beyond kappa_n = 14: on the mesh of the run an eigenvalue of 1e-3 has the error 1e-2."""
+    scene = "{m: 3, n: 1, law: finite width, Gamma: 3, stability: true, limits: {kappa_n: [-5, 40]}}"
+    run_branch(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
+    branch = read_branch(tmp_path / "x.h5")
+    (event,) = branch.events[branch.events["label"] == b"SB"]
+    assert event["kappa_n"] == pytest.approx(2.5185316810, abs=1e-8) and event["error_kappa_n"] < 1e-11
+    assert set(branch.points["index"][branch.points["kappa_n"] > 4][:-1]) == {2}

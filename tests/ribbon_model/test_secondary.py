@@ -103,11 +103,9 @@ def test_the_index_by_symmetry_is_that_of_the_loop_without(reversal):
     point = leave(RIBBON, 5, 2, -20.0441574, reversal).points[-1]
     equilibrium = Solution.of(point).equilibrium()
     assert equilibrium.symmetry == Symmetry(mirror=reversal == "mirror", axis=reversal == "axis")
-    plain = dataclasses.replace(equilibrium, symmetry=Symmetry())
-    ours, theirs = index(equilibrium), index(plain)
+    mesh = np.concatenate([equilibrium.mesh, 2 * equilibrium.mesh[-1] - equilibrium.mesh[-2::-1]])
+    ours, theirs = index(equilibrium), index(dataclasses.replace(equilibrium, symmetry=Symmetry(), mesh=mesh))
     assert ours.decided and theirs.decided and ours.index == theirs.index
-    both = np.sort(np.concatenate([entry.eigenvalues for entry in ours.classes]))[:8]
-    assert both == pytest.approx(theirs.classes[0].eigenvalues[:8], abs=1e-7)
 
 
 @pytest.mark.parametrize(
