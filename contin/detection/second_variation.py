@@ -239,9 +239,10 @@ class _Profile:
         n = self.inside.shape[2]
         x, y = self.starts[:-1] @ unknowns, unknowns[n:].reshape(len(self.starts) - 1, -1)
         for recovery in reversed(self.recoveries):
-            x, y = recovery.back(x, y)
+            count = len(recovery.inside)  # an odd number of pieces was filled up before they were joined
+            x, y = recovery.back(x[:count], y[:count])
         count = len(self.inside)
-        x, y = x[:count], y[:count]  # an odd number of pieces was filled up
+        x, y = x[:count], y[:count]
         at_points = np.einsum("eijk,ek->eij", self.inside, np.concatenate([x, y], axis=1))
         nodes = np.append(0.0, self.points)
         weights = 1 / np.prod(nodes[:, None] - nodes + np.eye(len(nodes)), axis=1)
