@@ -394,9 +394,10 @@ def _condensed(pieces: _Pieces) -> tuple[_Pieces, int, float, _Recovery | None]:
     whole[:, n:, n:] = turn
     q = whole.swapaxes(1, 2) @ pieces.q @ whole
     inner = q[:, n + kept :, n + kept :]
-    values = np.linalg.eigvalsh(inner)
+    values, vectors = np.linalg.eigh(inner)
     cross = q[:, n + kept :, : n + kept]
-    rest: Any = np.linalg.solve(inner, cross)
+    nonzero = np.where(values == 0, 1.0, values)  # pieces with a zero among them are not joined
+    rest: Any = vectors @ (vectors.swapaxes(1, 2) @ cross / nonzero[:, :, None])
     reduced = q[:, : n + kept, : n + kept] - cross.swapaxes(1, 2) @ rest
     turned = _Pieces(
         pieces.phi, pieces.b @ turn[:, :, :kept], (reduced + reduced.swapaxes(1, 2)) / 2,
