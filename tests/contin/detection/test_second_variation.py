@@ -217,7 +217,7 @@ def test_modes_are_eigenfunctions_on_every_mesh(intervals):
     t = np.linspace(0, 1, 41)
     mode = found.modes(1, t)[0, :, 0]
     assert found.index(1) == 2
-    np.testing.assert_allclose(mode * np.sign(mode[0]), np.cos(3 * math.pi * t), atol=3e-4 if intervals < 10 else 1e-6)
+    np.testing.assert_allclose(mode * np.sign(mode[0]), np.cos(3 * math.pi * t), atol=3 * intervals**-5.0 + 1e-8)
 
 
 def test_files_keep_what_a_point_says(straight, tmp_path):
