@@ -114,7 +114,7 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
     rows[:, :, :, size:] -= by[:, :, : 2 * n, 2 * n :]
     residual = (rates - field[:, :, : 2 * n]) * weights[:, :, None]
     rows *= weights[:, :, None, None]
-    residual[:, :, n:] *= share
+    residual[:, :, n:] *= share if np.all(np.isfinite(residual)) else 1.0
     rows[:, :, n:] *= share
     ends = problem.batch("boundary")
     value, by_ends = ends.jacobian(np.zeros(1), u[:1], u[-1:], p, ends.colouring(places))

@@ -14,13 +14,14 @@ from contin.detection.second_variation import degeneracy
 from contin.discretization.basis import DEGREES
 from contin.discretization.collocation import Collocation
 from contin.discretization.mesh import MOST_INTERVALS, MeshControl
+from contin.discretization.system import System
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import with_multipliers
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point, point_of, system_of
-from contin.stepping.newton import Newton, correct
+from contin.stepping.newton import Corrected, Newton, correct
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 4
@@ -79,11 +80,7 @@ def solve(
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
     for _ in range(_ROUNDS):
-        try:
-            done = correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, unscaled=True)
-        except ConvergenceError as error:
-            _explain(system, x)
-            raise error
+        done = _corrected(system, x, others, newton)
         adapted = system.adapted(done.x, control)
         if adapted is None:
             break
@@ -92,12 +89,23 @@ def solve(
     return point_of(system, done.x, done.iterations, done.error)
 
 
-def _explain(system: object, x: Array) -> None:
-    """Raise ProblemError where a guess at which Newton's method fails makes a variational problem singular."""
-    if isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
-        reason = degeneracy(system, x)
-        if reason:
-            raise ProblemError(f"{reason}: no solution was found from this guess")
+def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
+    """Return the solution near x.
+
+    Raises
+    ------
+    ProblemError
+        Newton's method fails at a guess that makes a variational problem singular; the message says why.
+    ConvergenceError
+    """
+    try:
+        return correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, unscaled=True)
+    except ConvergenceError:
+        if isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
+            reason = degeneracy(system, x)
+            if reason:
+                raise ProblemError(f"{reason}: no solution was found from this guess") from None
+        raise
 
 
 def _check_options(problem: object, intervals: object, degree: object, control: object, newton: object) -> None:
