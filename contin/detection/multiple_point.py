@@ -280,22 +280,26 @@ def _zeros(linear: Array, quadratic: Array, radius: float, starts: Array) -> lis
 
     beta = 1/2 G_1(s).s + 1/3 G_2(s, s).s, with the terms of G of first and second order.
     """
-    found: list[Array] = []
     scale = max(np.abs(linear).max(), radius * np.abs(quadratic).max(), 1e-300)
-    for start in starts:
-        a = start.copy()
-        for _ in range(_MOST_ITERATIONS):
-            first = np.einsum("kij,j->ki", linear, a)
-            second = np.einsum("kijl,j,l->ki", quadratic, a, a) * radius
-            value = np.append((first @ a / 2 + second @ a / 3) / scale, (a @ a - 1) / 2)
-            slope = np.vstack([(first + second) / scale, a])
-            step = np.linalg.lstsq(slope, value, rcond=1e-10)[0]
-            length = float(np.linalg.norm(step))
-            a = a - step * min(1.0, _LONGEST / max(length, _LONGEST))
-            if length < _SETTLED:
-                break
-        else:
-            continue
-        if np.max(np.abs(value)) < 1e-9 and all(np.linalg.norm(a - other) > _SAME for other in found):
-            found.append(a)
+    ends, errors = starts.copy(), np.full(len(starts), np.inf)
+    moving = np.arange(len(starts))
+    for _ in range(_MOST_ITERATIONS):
+        a = ends[moving]
+        first = np.einsum("kij,sj->ski", linear, a)
+        second = np.einsum("kijl,sj,sl->ski", quadratic, a, a) * radius
+        on_branch = np.einsum("ski,si->sk", first / 2 + second / 3, a) / scale
+        value = np.column_stack([on_branch, (np.sum(a * a, axis=1) - 1) / 2])
+        slope = np.concatenate([(first + second) / scale, a[:, None]], axis=1)
+        step = np.einsum("sij,sj->si", np.linalg.pinv(slope, rcond=1e-10), value)
+        length = np.linalg.norm(step, axis=1)
+        ends[moving] = a - step * np.minimum(1.0, _LONGEST / np.maximum(length, _LONGEST))[:, None]
+        settled = length < _SETTLED
+        errors[moving[settled]] = np.abs(value[settled]).max(axis=1)
+        moving = moving[~settled]
+        if not moving.size:
+            break
+    found: list[Array] = []
+    for end in ends[errors < 1e-9]:
+        if all(np.linalg.norm(end - other) > _SAME for other in found):
+            found.append(end)
     return found
