@@ -51,12 +51,26 @@ def _packed(system: Collocation, states: Array, lam: Array, multipliers: Array) 
 
 
 def _fitted(system: Collocation, states: Array) -> Array:
-    """Return the unknowns after damped Gauss-Newton steps from multipliers of zero."""
+    """Return the unknowns that fit the states: multipliers from the rates of the states first, then from all equations.
+
+    The rates are linear in the multipliers where the energy is quadratic in the controls; all equations are not, and far from
+    zero their least squares have other minima.
+    """
     lam, multipliers = np.zeros_like(states), np.zeros(len(system.problem.multipliers))
-    residual, jacobian = _equations(system, states, lam, multipliers)
+    for share in (0.0, 1.0):
+        lam, multipliers = _settled(system, states, (lam, multipliers), share)
+    return _packed(system, states, lam, multipliers)
+
+
+def _settled(system: Collocation, states: Array, start: tuple[Array, Array], share: float) -> tuple[Array, Array]:
+    """Return the multipliers after damped Gauss-Newton steps, all but the rates of the states weighted by ``share``."""
+    lam, multipliers = start
+    residual, jacobian = _equations(system, states, lam, multipliers, share)
     if not np.all(np.isfinite(residual)):
         raise ProblemError("guess: the equations have no finite value there (look for what divides by zero, or at `starts`)")
     for _ in range(_STEPS):
+        if not np.any(jacobian):
+            break
         normal = jacobian.T @ jacobian
         normal[np.diag_indices_from(normal)] += _LITTLE * np.trace(normal)
         step = np.linalg.solve(normal, -(jacobian.T @ residual))
@@ -64,7 +78,7 @@ def _fitted(system: Collocation, states: Array) -> Array:
         for _ in range(_HALVINGS):
             new_lam = lam + part * step[: lam.size].reshape(lam.shape)
             new_multipliers = multipliers + part * step[lam.size :]
-            new = _equations(system, states, new_lam, new_multipliers)
+            new = _equations(system, states, new_lam, new_multipliers, share)
             if np.all(np.isfinite(new[1])) and np.linalg.norm(new[0]) <= np.linalg.norm(residual):
                 break
             part /= 2
@@ -74,11 +88,14 @@ def _fitted(system: Collocation, states: Array) -> Array:
         lam, multipliers, (residual, jacobian) = new_lam, new_multipliers, new
         if gained <= _SETTLED * np.linalg.norm(residual) or np.linalg.norm(residual) < _SETTLED:
             break
-    return _packed(system, states, lam, multipliers)
+    return lam, multipliers
 
 
-def _equations(system: Collocation, states: Array, lam: Array, multipliers: Array) -> tuple[Array, Array]:
-    """Return the residual of all equations, and its derivatives by lam (K, n), flattened, and the multipliers."""
+def _equations(system: Collocation, states: Array, lam: Array, multipliers: Array, share: float) -> tuple[Array, Array]:
+    """Return the residual of all equations, and its derivatives by lam (K, n), flattened, and the multipliers.
+
+    All but the rates of the states are multiplied by ``share``.
+    """
     problem: Any = system.problem
     assert isinstance(problem, VariationalProblem)
     n, d, count, basis = problem.dimension, system.degree, system.intervals, system.basis
@@ -104,6 +121,8 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
     rows[:, :, :, size:] -= by[:, :, : 2 * n, 2 * n :]
     residual = (rates - field[:, :, : 2 * n]) * weights[:, :, None]
     rows *= weights[:, :, None, None]
+    residual[:, :, n:] *= share if np.all(np.isfinite(residual)) else 1.0
+    rows[:, :, n:] *= share
     ends = problem.batch("boundary")
     value, by_ends = ends.jacobian(np.zeros(1), u[:1], u[-1:], p, ends.colouring(places))
     last = np.zeros((len(by_ends[0]), size + len(places)))
@@ -111,5 +130,6 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
     last[:, size - n : size] += by_ends[0][:, 3 * n : 4 * n]
     last[:, size:] = by_ends[0][:, 4 * n :]
     return (
-        np.concatenate([residual.ravel(), value[0]]), np.vstack([rows.reshape(-1, size + len(places)), last])
+        np.concatenate([residual.ravel(), share * value[0]]),
+        np.vstack([rows.reshape(-1, size + len(places)), share * last]),
     )  # fmt: skip

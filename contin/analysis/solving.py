@@ -9,14 +9,19 @@ import numpy as np
 from contin import checks
 from contin.analysis.deflation import correct_away
 from contin.analysis.guess import Guess, Options, first_guess
+from contin.arrays import Array
+from contin.detection.second_variation import degeneracy
 from contin.discretization.basis import DEGREES
+from contin.discretization.collocation import Collocation
 from contin.discretization.mesh import MOST_INTERVALS, MeshControl
-from contin.errors import ProblemError
+from contin.discretization.system import System
+from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import with_multipliers
+from contin.problems.variational import VariationalProblem
 from contin.results.point import Point, point_of, system_of
-from contin.stepping.newton import Newton, correct
+from contin.stepping.newton import Corrected, Newton, correct
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 4
@@ -75,13 +80,32 @@ def solve(
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
     for _ in range(_ROUNDS):
-        done = correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, unscaled=True)
+        done = _corrected(system, x, others, newton)
         adapted = system.adapted(done.x, control)
         if adapted is None:
             break
         system, carry = adapted
         x = carry(done.x)
     return point_of(system, done.x, done.iterations, done.error)
+
+
+def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
+    """Return the solution near x.
+
+    Raises
+    ------
+    ProblemError
+        Newton's method fails at a guess that makes a variational problem singular; the message says why.
+    ConvergenceError
+    """
+    try:
+        return correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, unscaled=True)
+    except ConvergenceError:
+        if isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
+            reason = degeneracy(system, x)
+            if reason:
+                raise ProblemError(f"{reason}: no solution was found from this guess") from None
+        raise
 
 
 def _check_options(problem: object, intervals: object, degree: object, control: object, newton: object) -> None:

@@ -58,6 +58,9 @@ _MISSED = 0.75
 _NOISE = 1e-12
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
 _ROUNDS = 3
+#: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
+#: small as min_step come much nearer, and regular points do not come so near.
+_NEARLY = 1e-3
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
@@ -114,9 +117,10 @@ class Continuation:
         self.primary = settings.primary or system.free[0]
         self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
         self._fold = fold(self.primary) if settings.folds else None
-        own = own_test_functions(self.state.system)
+        self._own = own_test_functions(self.state.system)
+        self._at_start: dict[str, float] = {}
         general = self._general_test_functions()
-        self._tests = [*general, *own]
+        self._tests = [*general, *self._own]
         self._comparable = [*general, *([self._fold] if self._fold else [])]  # have the same sign on every mesh
         self._index = index_of(self.state.system)
         self.notes: list[str] = []
@@ -191,7 +195,7 @@ class Continuation:
         if not self._resumed:
             trial = self._state_trial()
             yield self._point(SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial), self.state)
-            if (stop := self._out_of_limits(trial)) is not None:
+            if (stop := self._out_of_limits(trial) or self._out_of_domain(trial)) is not None:
                 self.stop = stop
                 return
         while self.stop is None:
@@ -213,6 +217,11 @@ class Continuation:
                 ends = " ... ".join(value_names((low, high)).values())
                 return Stop("limit", f"{name} = {trial[name]:.10g} at the start lies outside {ends}")
         return None
+
+    def _out_of_domain(self, trial: Trial) -> Stop | None:
+        """Return the reason to stop at the first point: a test function of the kind of problem that ends runs is negative."""
+        self._at_start = {test.name: test.function(trial) for test in self._own if test.terminal}
+        return next((Stop("event", f"{name} at the first point") for name, value in self._at_start.items() if value < 0), None)
 
     def _advance(self) -> Iterator[Point]:
         """Make one step: yield the labelled points inside it, then the point at its end."""
@@ -240,6 +249,9 @@ class Continuation:
     def _failure(self, error: ConvergenceError) -> Stop:
         """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
         state, least = self.state, self.settings.min_step
+        for test in self._own:
+            if test.terminal and abs(test.function(self._state_trial())) < _NEARLY * abs(self._at_start.get(test.name, 0.0)):
+                return Stop("event", f"met {test.name}")
         if not np.all(np.isfinite(state.system.residual(predict(state, least)))):
             return Stop(
                 "no convergence", f"the equations have no finite value a step of min_step = {exact_text(least)} further on",

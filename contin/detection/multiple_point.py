@@ -281,20 +281,25 @@ def _zeros(linear: Array, quadratic: Array, radius: float, starts: Array) -> lis
     beta = 1/2 G_1(s).s + 1/3 G_2(s, s).s, with the terms of G of first and second order.
     """
     scale = max(np.abs(linear).max(), radius * np.abs(quadratic).max(), 1e-300)
-    a, value, length = starts.copy(), np.zeros_like(starts), np.full(len(starts), np.inf)
+    ends, errors = starts.copy(), np.full(len(starts), np.inf)
+    moving = np.arange(len(starts))
     for _ in range(_MOST_ITERATIONS):
+        a = ends[moving]
         first = np.einsum("kij,sj->ski", linear, a)
         second = np.einsum("kijl,sj,sl->ski", quadratic, a, a) * radius
-        beta = np.einsum("ski,si->sk", first / 2 + second / 3, a) / scale
-        value = np.hstack([beta, (np.sum(a * a, axis=1, keepdims=True) - 1) / 2])
+        on_branch = np.einsum("ski,si->sk", first / 2 + second / 3, a) / scale
+        value = np.column_stack([on_branch, (np.sum(a * a, axis=1) - 1) / 2])
         slope = np.concatenate([(first + second) / scale, a[:, None]], axis=1)
         step = np.einsum("sij,sj->si", np.linalg.pinv(slope, rcond=1e-10), value)
         length = np.linalg.norm(step, axis=1)
-        a = a - step * np.minimum(1.0, _LONGEST / np.maximum(length, _LONGEST))[:, None]
-        if np.all(length < _SETTLED):
+        ends[moving] = a - step * np.minimum(1.0, _LONGEST / np.maximum(length, _LONGEST))[:, None]
+        settled = length < _SETTLED
+        errors[moving[settled]] = np.abs(value[settled]).max(axis=1)
+        moving = moving[~settled]
+        if not moving.size:
             break
     found: list[Array] = []
-    for direction in a[(length < _SETTLED) & (np.abs(value).max(axis=1) < 1e-9)]:
-        if all(np.linalg.norm(direction - other) > _SAME for other in found):
-            found.append(direction)
+    for end in ends[errors < 1e-9]:
+        if all(np.linalg.norm(end - other) > _SAME for other in found):
+            found.append(end)
     return found

@@ -43,6 +43,9 @@ from contin.stepping.trial import TestFunction, Trial
 _POSITIVE = 0.1
 #: An eigenvalue of H_ll below this part of the largest one is zero: there are fewer controls than states.
 _NO_CONTROL = 1e-10
+#: An eigenvalue of the second variation below this part of the largest one is zero, where a solution is not found: round-off
+#: leaves 1e-15, times the condition number of what is eliminated.
+_SINGULAR = 1e-11
 #: Conditions at the ends whose smallest singular value is below this part of the largest repeat or contradict each other.
 _DEPENDENT = 1e-10
 
@@ -141,10 +144,42 @@ def legendre() -> TestFunction:
         system: Any = trial.system
         points = system.at_gauss_points(trial.x)
         points = points if system.scales is None else points * system.scales.states
-        value: float = system.problem.margin(system.gauss_times, points, system.all_parameters(trial.x))
+        if system.problem.legendre is None:
+            value = _convexity(_jacobian(system, trial.x)[:, : points.shape[1] // 2, points.shape[1] // 2 :])
+        else:
+            value = system.problem.margin(system.gauss_times, points, system.all_parameters(trial.x))
         return value if np.isfinite(value) else 1.0
 
-    return TestFunction("EP", "the energy is no longer convex in the controls", margin, terminal=True)
+    return TestFunction("EP", "loss of convexity in the controls (Legendre's condition)", margin, terminal=True)
+
+
+def _convexity(hll: Array) -> float:
+    """Return a number that is positive where H_ll (K, n, n) is positive semidefinite everywhere."""
+    if not np.all(np.isfinite(hll)):
+        return np.nan
+    values = np.linalg.eigvalsh((hll + hll.swapaxes(1, 2)) / 2)
+    largest = np.abs(values).max(axis=1)
+    return float((values[:, 0] / np.where(largest > 0, largest, 1.0)).min()) + _NO_CONTROL if np.all(largest > 0) else -1.0
+
+
+def degeneracy(system: Collocation, x: Array) -> str:
+    """Return what makes the equations of a variational problem singular at x, as a sentence; "" where nothing is found."""
+    try:
+        if not np.all(np.isfinite(system.functionals(x))):
+            return "energy: it has no finite value there"
+        found = second_variation(system, x)
+    except ProblemError as error:
+        return str(error)
+    except np.linalg.LinAlgError:
+        return ""
+    if found is None:
+        return "energy: it is not convex in the controls there (Legendre's condition)"
+    sizes = np.abs(found.eigenvalues)
+    if sizes.size and not sizes.min() > _SINGULAR * sizes.max():
+        return (
+            "energy: its second variation vanishes along a mode there, which nothing determines (hold more, or start elsewhere)"
+        )
+    return ""
 
 
 #: A mode keeps a symmetry that maps it to itself up to this part of its size, and breaks one that does not.
@@ -396,7 +431,9 @@ def _reduced(system: Collocation, x: Array, pieces: _Pieces) -> tuple[Array, Arr
     if len(rows):
         _, singular, vectors = np.linalg.svd(rows)
         if singular[-1] < _DEPENDENT * singular[0]:
-            raise ProblemError("ends: the conditions held (with the integral ones) repeat or contradict each other")
+            raise ProblemError(
+                "ends: the conditions held, with the integral ones, repeat or contradict each other, or have no slope"
+            )
         free = vectors[len(rows) :].T
     values, modes = np.linalg.eigh(free.T @ ((q + q.T) / 2) @ free)
     return values, free @ modes, np.array(starts)

@@ -126,7 +126,11 @@ class Batch:
     def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
         """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
         out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, colours.width))
-        self._evaluate(t, u, v, p, colours.inputs, colours.owner, out, jac)
+        try:
+            self._evaluate(t, u, v, p, colours.inputs, colours.owner, out, jac)
+        except ZeroDivisionError:  # numba: the quotient of real numbers is infinite there, that of complex ones an error
+            out.fill(np.nan)
+            jac.fill(np.nan)
         return out, jac
 
     def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:

@@ -19,6 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions import gradient
@@ -27,6 +30,11 @@ from contin.functions.fingerprint import contents
 
 #: Newton steps for the controls, and halvings of a step that does not lower -H. Damped steps on a convex function arrive.
 _NEWTON, _HALVINGS = 60, 40
+#: What a user's function may contain after sympy has read it: what can be differentiated twice, and compiled.
+_FUNCTIONS = (
+    "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
+    "Abs", "sign",
+)  # fmt: skip
 #: A step below this, relative to 1 + the control, is the last: the next would be its square.
 _SETTLED = 1e-9
 #: Where the energy is not convex, a pivot is at least this part of 1 + the diagonal: Newton's step is then long, and damped.
@@ -58,7 +66,7 @@ class Canonical:
     """The derived functions, plain Python, and how many multipliers of end conditions there are.
 
     ``rhs(t, u, p)``, ``boundary(u0, u1, p)``, ``integrals(t, u, p)`` or None, and ``functionals[name](t, u, p)`` take u = (x,
-    lambda) and p = (parameters, mu, sigma). ``legendre(t, u, p)`` is the smallest pivot of -d2H/dw2 (None where H is given).
+    lambda) and p = (parameters, mu, sigma). ``legendre(t, u, p)`` are the pivots of -d2H/dw2 (None where H is given).
     ``fixed`` are the states that end conditions fix, at the first and at the last end.
     """
 
@@ -96,13 +104,25 @@ def canonical(variation: Variation) -> Canonical:
     except OSError:
         source = _Derivation(variation).text()
         write_source(path.name, source)
-    scope: dict[str, Any] = {"math": math, "__name__": __name__}
+    scope: dict[str, Any] = {"math": math, "numpy": np, "__name__": __name__}
     exec(compile(source, f"<canonical equations {path.stem}>", "exec"), scope)
+    if "pointwise" in scope:
+        _check_starts(scope["pointwise"], variation)
     return Canonical(
         scope["rhs"], scope["boundary"], scope.get("integrals"),
         {name: scope[f"functional{i}"] for i, name in enumerate(_columns(variation))},
         scope.get("legendre"), scope["SIGMAS"], scope["FIXED"],
     )  # fmt: skip
+
+
+def _check_starts(pointwise: Any, variation: Variation) -> None:
+    """Raise ProblemError where the energy has no value at the controls at which the search for them starts."""
+    others = pointwise.__code__.co_argcount - len(variation.starts)
+    try:
+        pointwise(*[math.nan] * others, *variation.starts)
+    except (ValueError, ZeroDivisionError, OverflowError) as error:
+        places = ", ".join(f"{name} = {value:g}" for name, value in zip(variation.controls, variation.starts))
+        raise ProblemError(f"starts: the energy has no value at the controls {places} ({error})") from error
 
 
 def _columns(variation: Variation) -> list[str]:
@@ -138,16 +158,36 @@ class _Derivation:
         """Return the values of a user's function at symbols."""
         try:
             result = gradient._Symbolic().function(function)(*arguments)
-            values = list(result) if isinstance(result, (tuple, list)) else [result]
-            return [self.sympy.sympify(value) for value in values]
-        except ProblemError:
-            raise
+        except ProblemError as error:
+            raise ProblemError(f"{what}: {error}") from error
         except Exception as error:  # sympy and a user's function may raise anything
             reason = " ".join(str(error).split())
+            if "truth value" in reason:
+                reason = "it decides by a comparison (if, max, min), and must be one formula"
             raise ProblemError(
-                f"{what} cannot be differentiated: {type(error).__name__}: {reason} "
-                "(write it with arithmetic and functions of math)"
+                f"{what} cannot be differentiated: {reason} (write it with arithmetic and functions of math)"
             ) from error
+        values = list(result) if isinstance(result, (tuple, list, np.ndarray)) else [result]
+        return [self._number(what, value) for value in values]
+
+    def _number(self, what: str, value: Any) -> Any:
+        """Return a value of a user's function as an expression.
+
+        Raises
+        ------
+        ProblemError
+            It is no real number, or contains a function that has no derivative here.
+        """
+        sympy = self.sympy
+        term = None if isinstance(value, (str, bool, np.bool_)) or value is None else sympy.sympify(value)
+        if not isinstance(term, sympy.Expr):
+            raise ProblemError(f"{what} returns {checks.shown(value)}, must return numbers")
+        if term.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo, sympy.I):
+            raise ProblemError(f"{what} has no finite real value: {checks.shown(value)}")
+        for function in term.atoms(sympy.Function):
+            if function.func.__name__ not in _FUNCTIONS:
+                raise ProblemError(f"{what}: {function.func.__name__} cannot be used here, but {', '.join(_FUNCTIONS)} can")
+        return term
 
     def _named(self, names: Sequence[str], values: Sequence[Any]) -> Any:
         kind: Any = namedtuple("Values", list(names))  # type: ignore[misc]  # noqa: PYI024
@@ -187,7 +227,12 @@ class _Derivation:
         (self.density,) = self._at("energy", v.energy)
         rates = self.w if v.kinematics is None else self._at("kinematics", v.kinematics, len(v.states))
         self.rates = list(rates)
+        if not set().union(*(rate.free_symbols for rate in self.rates)) & set(self.w):
+            raise ProblemError("kinematics: no rate depends on a control, so nothing can vary")
         self.load = [self._at(f"integrals: {name}", g)[0] for name, g in v.integrals.items()]
+        for name, value in zip(v.integrals, self.load):
+            if not value.free_symbols & {*self.x, *self.w}:
+                raise ProblemError(f"integrals: {name} depends on no state and no control, so nothing makes its integral zero")
         convex = (
             self.density - sum(a * b for a, b in zip(self.lam, self.rates)) + sum(a * b for a, b in zip(self.mu, self.load))
         )
@@ -197,14 +242,17 @@ class _Derivation:
         for name, row in zip(v.controls, second.tolist()):
             if not any(row):
                 raise ProblemError(f"energy: its second derivative by the control {name} is zero, it must be convex in it")
+        if not second.free_symbols & set(self.w) and second.det() == 0:
+            raise ProblemError(
+                f"energy: it does not determine the controls {', '.join(v.controls)}: its second derivative is singular"
+            )
+        concave = [name for i, name in enumerate(v.controls) if second[i, i].is_nonpositive]
+        if concave or (not second.free_symbols and not second.is_positive_definite):
+            raise ProblemError(f"energy: it is not convex in the controls {', '.join(concave or v.controls)}")
         self.pivots = self._pivots(second)
         self.known = {}
         if not second.free_symbols & set(self.w):
             at_zero = sympy.Matrix(slopes).subs(dict.fromkeys(self.w, 0))
-            if second.det() == 0:
-                raise ProblemError(
-                    f"energy: it does not determine the controls {', '.join(v.controls)}: its second derivative is singular"
-                )
             self.known = dict(zip(self.w, -second.LUsolve(at_zero)))
         else:
             self._newton(convex, slopes, second)
@@ -259,10 +307,17 @@ class _Derivation:
     ) -> str:
         """Return the text of a function of these values, common subexpressions shared."""
         sympy = self.sympy
-        shared, reduced = sympy.cse(list(values), symbols=sympy.numbered_symbols("Z"), optimizations="basic")
+        sign = sympy.Function("sgn")  # sympy would write copysign, which has no complex values
+        terms = [sympy.sympify(value).replace(sympy.DiracDelta, lambda *_: sympy.S.Zero) for value in values]
+        terms = [term.replace(sympy.sign, sign) for term in terms]
+        shared, reduced = sympy.cse(terms, symbols=sympy.numbered_symbols("Z"), optimizations="basic")
+
+        def code(term: Any) -> str:
+            return str(sympy.pycode(term, user_functions={"sgn": "numpy.sign"}))
+
         lines = [f"def {name}({', '.join(map(str, arguments))}):", *("    " + line for line in head)]
-        lines += [f"    {symbol} = {sympy.pycode(term)}" for symbol, term in shared]
-        result = sympy.pycode(reduced[0]) if single else "(" + ", ".join(sympy.pycode(term) for term in reduced) + ",)"
+        lines += [f"    {symbol} = {code(term)}" for symbol, term in shared]
+        result = code(reduced[0]) if single else "(" + ", ".join(map(code, reduced)) + ",)"
         return "\n".join([*lines, f"    return {result}", ""])
 
     def _of_point(self, name: str, values: Sequence[Any], single: bool = False) -> str:
@@ -287,19 +342,16 @@ class _Derivation:
     def text(self) -> str:
         """Return the module."""
         v = self.variation
-        parts = ['"""Generated by contin; safe to delete."""', "import math", "", "", *self.helpers]
+        parts = ['"""Generated by contin; safe to delete."""', "import math", "", "import numpy", "", "", *self.helpers]
         parts.append(self._of_point("rhs", [*self.rates, *self.forces]))
         if self.load:
             parts.append(self._of_point("integrals", self.load, len(self.load) == 1))
         columns = {"energy": self.density} | {name: self._at(f"functionals: {name}", f)[0] for name, f in v.functionals.items()}
         parts += [self._of_point(f"functional{i}", [columns[name]], single=True) for i, name in enumerate(_columns(v))]
         if v.hamiltonian is None:
-            parts.append(self._of_point("legendre", [self._least(self.pivots)], single=True))
+            parts.append(self._of_point("legendre", self.pivots))
         parts.append(self._boundary())
         return "\n".join(parts)
-
-    def _least(self, values: list[Any]) -> Any:
-        return values[0] if len(values) == 1 else self.sympy.Min(*values, evaluate=False)
 
     # --- the ends ------------------------------------------------------------------------------------------------
 
@@ -309,10 +361,13 @@ class _Derivation:
         first, last = self._named(v.states, self.x), self._named(v.states, self.y)
         p = self._named(v.parameters, self.p)
         ends = [] if v.ends is None else self._called("ends", v.ends, first, last, p)
-        phi = 0 if v.end_energy is None else self._called("end_energy", v.end_energy, first, last, p)[0]
+        phi = [] if v.end_energy is None else self._called("end_energy", v.end_energy, first, last, p)
+        if len(phi) > 1:
+            raise ProblemError(f"end_energy returns {len(phi)} values, must return 1")
+        self._check_ends(ends)
         fixed: tuple[list[int], list[int]] = ([], [])
         sigmas: list[Any] = []
-        potential = sympy.sympify(phi)
+        potential = sum(phi, sympy.S.Zero)
         for number, value in enumerate(ends):
             place = self._fixes(value)
             if place is None:
@@ -335,6 +390,21 @@ class _Derivation:
         head += [*self._parameters(), *(f"{sigma} = p.sigma_{i + 1}" for i, sigma in enumerate(sigmas))]
         facts = [f"SIGMAS = {len(sigmas)}", f"FIXED = {tuple(map(tuple, fixed))!r}", ""]
         return "\n".join([self._function("boundary", ["a", "b", "p"], head, values), *facts])
+
+    def _check_ends(self, ends: list[Any]) -> None:
+        """Raise ProblemError for end conditions without a state, and for those linear ones that depend on others."""
+        places = [*self.x, *self.y]
+        if len(ends) > len(places):
+            raise ProblemError(f"ends returns {len(ends)} conditions, {len(places)} fix all states at both ends")
+        independent: list[list[float]] = []
+        for number, value in enumerate(ends):
+            slopes = [self.sympy.diff(value, place) for place in places]
+            if not any(slopes):
+                raise ProblemError(f"ends: condition {number + 1} depends on no state")
+            if all(slope.is_number for slope in slopes):
+                independent.append([float(slope) for slope in slopes])
+                if np.linalg.matrix_rank(np.array(independent)) < len(independent):
+                    raise ProblemError(f"ends: condition {number + 1} repeats or contradicts those before it")
 
     def _fixes(self, value: Any) -> tuple[int, int] | None:
         """Return the end and the state that a condition fixes: it has a constant slope in that one, and none in the others."""

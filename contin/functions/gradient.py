@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from contin.errors import ProblemError
 from contin.functions.cache import cache_directory, write_source
 from contin.functions.fingerprint import contents
 from contin.functions.rewriting import Rewriter
@@ -39,7 +40,13 @@ class _Symbolic(Rewriter):
         import sympy  # takes .3 s, and is needed the first time only
 
         name = _sympy_name(value)
-        return getattr(sympy, name) if name else None
+        formulas = {
+            "hypot": lambda *x: sympy.sqrt(sum(a**2 for a in x)), "square": lambda x: x**2, "expm1": lambda x: sympy.exp(x) - 1,
+            "log1p": lambda x: sympy.log(1 + x), "log2": lambda x: sympy.log(x, 2), "log10": lambda x: sympy.log(x, 10),
+        }  # fmt: skip
+        if name and name not in formulas and not hasattr(sympy, name):
+            raise ProblemError(f"{name} cannot be differentiated; write it with arithmetic, exp, log, sqrt, sin, cos, ...")
+        return formulas.get(name) or (getattr(sympy, name) if name else None)
 
     def _attribute(self, module: types.ModuleType, value: Any, attributes: set[str]) -> object:
         import sympy

@@ -109,10 +109,13 @@ class VariationalProblem(BoundaryValueProblem):
                 "controls: their names belong to kinematics; without it the controls are the rates of the states"
             )
         control_names = names if controls is None else check_statement(controls, {}, {})
-        for name in checks.mapping("starts", starts, "numbers"):
-            if name not in control_names:
-                raise ProblemError(f"starts: {checks.shown(name)} is not one of the controls {', '.join(control_names)}")
-        check_statement(names, dict.fromkeys((*parameters, *checks.mapping("integrals", integrals, "functions")), 0.0), {})
+        _check_names(parameters, integrals, functionals)
+        for name, value in checks.mapping("starts", starts, "numbers").items():
+            if name not in control_names or hamiltonian is not None:
+                raise ProblemError(f"starts: {checks.shown(name)} is not one of the controls of an energy")
+            checks.number(f"starts: {name}", value)
+        for name, image in checks.mapping("symmetries", symmetries or {}, "functions").items():
+            checks.function(f"symmetries: {name}", image)
         taken = [("energy", energy, 4), ("kinematics", kinematics, 4), ("ends", ends, 3), ("end_energy", end_energy, 3)]
         taken += [("hamiltonian", hamiltonian, 4), *((f"integrals: {name}", g, 4) for name, g in integrals.items())]
         for what, function, count in [*taken, *((f"functionals: {name}", f, 4) for name, f in functionals.items())]:
@@ -125,7 +128,10 @@ class VariationalProblem(BoundaryValueProblem):
         derived = canonical(variation)
         object.__setattr__(self, "variation", variation)
         object.__setattr__(self, "canonical", derived)
-        object.__setattr__(self, "symmetries", dict(checks.mapping("symmetries", symmetries or {}, "functions")))
+        object.__setattr__(self, "symmetries", dict(symmetries or {}))
+        for name in self.multipliers:
+            if name in parameters:
+                raise ProblemError(f"parameters: {name} is the name of a multiplier, which is a parameter by itself")
         super().__init__(
             derived.rhs, derived.boundary, (*names, *(f"lam_{name}" for name in names)),
             {**parameters, **dict.fromkeys(self.multipliers, 0.0)}, derived.integrals, domain, derived.functionals,
@@ -144,10 +150,10 @@ class VariationalProblem(BoundaryValueProblem):
 
     @functools.cached_property
     def legendre(self) -> Batch | None:
-        """The smallest pivot of -d2H/dw2, compiled; None where the Hamiltonian is given."""
+        """The pivots of -d2H/dw2, compiled; None where the Hamiltonian is given."""
         if self.canonical.legendre is None:
             return None
-        return Batch([self.canonical.legendre], [0], self.state_names, tuple(self.parameters))
+        return Batch([self.canonical.legendre], [len(self.variation.controls)], self.state_names, tuple(self.parameters))
 
     def margin(self, t: Array, u: Array, p: Array) -> float:
         """Return the least pivot of -d2H/dw2 at places t (K,) with u (K, 2n): positive where Legendre's condition holds."""
@@ -155,3 +161,16 @@ class VariationalProblem(BoundaryValueProblem):
             return math.inf
         values: Any = self.legendre.values(t, u, u[:0], p)
         return float(values.min())
+
+
+def _check_names(
+    parameters: Mapping[str, float], integrals: Mapping[str, Function], functionals: Mapping[str, Function]
+) -> None:
+    """Raise ProblemError for names of integrals that cannot be used, and for a parameter that has the name of a column."""
+    for name in checks.mapping("integrals", integrals, "functions"):
+        if not name.isidentifier():
+            raise ProblemError(f"integrals: {checks.shown(name)} is not usable as a name (a Python identifier)")
+        if f"mu_{name}" in functionals:
+            raise ProblemError(f"functionals: mu_{name} is the multiplier of the integral {name}")
+    if "energy" in parameters and "energy" not in functionals:
+        raise ProblemError("parameters: 'energy' is the name of the energy's own column")
