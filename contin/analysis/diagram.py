@@ -16,6 +16,7 @@ from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
+from contin.problems.variational import VariationalProblem
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of
 from contin.stepping.settings import Settings, settings_with
@@ -196,7 +197,7 @@ def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
 def _seen(system: Any, x: Array) -> Array:
     """Return unknowns without multipliers: these follow from the others, and change their sign under symmetries."""
     problem = system.problem
-    if not problem.multipliers:
+    if not isinstance(problem, VariationalProblem):
         return x
     x = x.copy()
     x[: system.state_size].reshape(-1, len(problem.state_names))[:, problem.dimension :] = 0.0

@@ -9,6 +9,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.discretization.collocation import Collocation
 from contin.errors import ProblemError
+from contin.problems.statement import multipliers_of
 from contin.problems.variational import VariationalProblem
 
 #: Gauss-Newton steps, halvings of one, and the part of the residual that the last one gains: one step does where the energy is
@@ -42,11 +43,11 @@ def with_guessed_multipliers(system: Collocation, states: Array) -> Array:
 
 def _multipliers(system: Collocation, x: Array) -> Array:
     values = dict(zip(system.problem.parameters, system.all_parameters(x)))
-    return np.array([values[name] for name in system.problem.multipliers])
+    return np.array([values[name] for name in multipliers_of(system.problem)])
 
 
 def _packed(system: Collocation, states: Array, lam: Array, multipliers: Array) -> Array:
-    values = dict(zip(system.problem.parameters, system.parameters)) | dict(zip(system.problem.multipliers, multipliers))
+    values = dict(zip(system.problem.parameters, system.parameters)) | dict(zip(multipliers_of(system.problem), multipliers))
     return system.pack(np.hstack([states, lam]), values)
 
 
@@ -56,7 +57,7 @@ def _fitted(system: Collocation, states: Array) -> Array:
     The rates are linear in the multipliers where the energy is quadratic in the controls; all equations are not, and far from
     zero their least squares have other minima.
     """
-    lam, multipliers = np.zeros_like(states), np.zeros(len(system.problem.multipliers))
+    lam, multipliers = np.zeros_like(states), np.zeros(len(multipliers_of(system.problem)))
     for share in (0.0, 1.0):
         lam, multipliers = _settled(system, states, (lam, multipliers), share)
     return _packed(system, states, lam, multipliers)

@@ -88,11 +88,6 @@ class AlgebraicProblem:
         """Number of free parameters on a curve: equations - states + 1."""
         return self.equation_size - len(self.state_names) + 1
 
-    @property
-    def multipliers(self) -> tuple[str, ...]:
-        """None: all free parameters are named."""
-        return ()
-
     def batch(self, name: str) -> Batch:
         """Return the compiled ``"residual"`` or ``"functionals"``; made when first asked."""
         if name not in self._batches:

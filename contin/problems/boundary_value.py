@@ -92,11 +92,6 @@ class BoundaryValueProblem:
         return cast(tuple[str, ...], self.states)
 
     @property
-    def multipliers(self) -> tuple[str, ...]:
-        """None: all free parameters are named."""
-        return ()
-
-    @property
     def boundary_size(self) -> int:
         """n_bc, the number of boundary conditions."""
         return self._counts["boundary"]

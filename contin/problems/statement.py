@@ -38,18 +38,20 @@ class Statement(Protocol):
     def free_size(self) -> int:
         """Number of free parameters on a curve of solutions."""
 
-    @property
-    def multipliers(self) -> tuple[str, ...]:
-        """Parameters that are free on every curve, and need not be named."""
-
     def batch(self, name: str) -> Batch:
         """Return some of the functions, compiled."""
 
 
 def with_multipliers(problem: Statement, free: Sequence[str]) -> tuple[str, ...]:
-    """Return the free parameters with those that a problem adds by itself."""
+    """Return the free parameters with those that a problem adds by itself: its ``multipliers``, if it has any."""
     names = checks.names("free", free)
-    return (*names, *(name for name in problem.multipliers if name not in names))
+    return (*names, *(name for name in multipliers_of(problem) if name not in names))
+
+
+def multipliers_of(problem: Statement) -> tuple[str, ...]:
+    """Return the parameters that are free on every curve of a problem, and need not be named."""
+    names: tuple[str, ...] = getattr(problem, "multipliers", ())
+    return names
 
 
 def check_statement(
