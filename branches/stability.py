@@ -29,7 +29,6 @@ _ZERO_BESIDE = 1e-8
 _FULL = (0, "even")
 #: A strain energy with a smaller margin of convexity is at its end: there is no index.
 _CONVEX = 1e-6
-
 #: Places inside a step where the sign is looked at: two secondary bifurcations in one step leave it as it was at the ends.
 #: Pairs closer than a quarter of a step pass unseen.
 _LOOKS = 3
@@ -86,21 +85,22 @@ class Watch:
         names = [entry.name for entry in self.at(system, x).classes]
         self.monitors = [self._monitor(name) for name in names if name != _FULL]
 
-    def at(self, system, x, tangent=None) -> Stability:
-        """The stability of a point, on the mesh that its index needs if the branch's tangent is given."""
+    def at(self, system, x, point=None) -> Stability:
+        """The stability of a state; on the mesh that its index needs, if a ``point`` is given whose tangent is the branch's."""
         key = id(system), x.tobytes()
         if key not in self._known:
-            result = self._resolved(system, x, tangent)
+            result = self._resolved(system, x, point)
             while len(self._known) >= _KEPT:
                 self._known.pop(next(iter(self._known)))
             self._known[key] = system, result  # the system, lest another one should get its id
         return self._known[key][1]
 
-    def _resolved(self, system, x, tangent) -> Stability:
-        """The stability on the system's mesh; on a finer one where a point of the branch has a known zero that is not small."""
+    def _resolved(self, system, x, point) -> Stability:
+        """The stability on the system's mesh; on a finer one where a state of the branch has a known zero that is not small."""
         result = self._evaluated(system, x)
-        if tangent is None or result.residual <= _RESOLVED or np.abs(system.residual(x)).max() > _ON_BRANCH:
+        if point is None or result.residual <= _RESOLVED or np.abs(system.residual(x)).max() > _ON_BRANCH:
             return result
+        tangent = point.tangent
         for _ in range(_HALVINGS):
             system, carry = system.refined()
             x, tangent = carry(x), carry(tangent)
@@ -121,20 +121,20 @@ class Watch:
         with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
             return index(equilibrium)
 
-    def _within_law(self, system, x, tangent=None) -> Stability | None:
-        """The stability of a point; None at the end of a law whose energy is convex no further, where there is no index."""
+    def _within_law(self, system, x, point) -> Stability | None:
+        """The stability of a state; None at the end of a law whose energy is convex no further, where there is no index."""
         if self._margin is None:
-            return self.at(system, x, tangent)
+            return self.at(system, x, point)
         if not self._margin(system, x) > _CONVEX:
             return None
         try:
-            return self.at(system, x, tangent)
+            return self.at(system, x, point)
         except ValueError:  # not convex somewhere between the places where the margin was looked at
             return None
 
     def index(self, point) -> int:
         """The index of a point, or `UNDECIDED`."""
-        result = self._within_law(point.system, point.x, point.tangent)
+        result = self._within_law(point.system, point.x, point)
         return result.index if result is not None and result.decided else UNDECIDED
 
     def change(self, point) -> Change:
@@ -154,7 +154,7 @@ class Watch:
             there = correct(point.system, point.x + distance * tangent, tangent, tangent @ point.x + distance)
         except ConvergenceError:  # at a bifurcation that could not be located, say
             return UNDECIDED
-        result = self._within_law(point.system, there.x, tangent)
+        result = self._within_law(point.system, there.x, point)
         return result.index if result is not None and result.decided else UNDECIDED
 
     def _monitor(self, name) -> TestFunction:
@@ -162,7 +162,7 @@ class Watch:
 
         def determinant(trial):
             try:
-                result = self._within_law(trial.system, trial.x, trial.tangent)
+                result = self._within_law(trial.system, trial.x, trial)
             except ValueError:  # a guess too far beside the branch: no closed loop, or no convex energy
                 return np.nan
             if result is None:

@@ -31,8 +31,8 @@ from ribbon_model.laws import Law
 from ribbon_model.shape import frames
 
 _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
-#: Degree on the mesh of a circle; and the phase, in radians, that the highest wave of interest turns by on an interval. There
-#: eight Gauss points give a wave to (8! / 16!)^2 2^17 / 17 = 3e-14; ten times the phase would leave 1e3 of nothing right.
+#: Degree on the mesh of a circle, and the phase in radians by which the highest wave of interest turns on an interval: there
+#: the error of 8 Gauss points is (8! / 16!)^2 2^17 / 17 = 3e-14. With ten times the phase the wave would not be resolved.
 _CIRCLE_DEGREE, _PHASE = 8, 2.0
 #: Length, relative to the loop, and winding may be off by this much. A guess beside a branch has some defect; half a turn more
 #: would be another winding number.
