@@ -11,10 +11,9 @@ from contin import ConvergenceError, TestFunction, correct
 from ribbon_model.convexity import margin
 from ribbon_model.laws import Law
 from ribbon_model.modes import REVERSALS, Mode
-from ribbon_model.second_variation import from_solution
 from ribbon_model.secondary import force
 from ribbon_model.solution import Solution
-from ribbon_model.stability import Stability, index
+from ribbon_model.stability import Stability
 
 #: Label of a secondary bifurcation: one that breaks a symmetry of the domain, which its own equations cannot see.
 LABEL = "SB"
@@ -78,7 +77,7 @@ class Watch:
     """
 
     def __init__(self, law: Law, system, x, from_circle: bool = True):
-        self._law, self._blas, self._from_circle = law, ThreadpoolController(), from_circle
+        self._blas, self._from_circle = ThreadpoolController(), from_circle
         self._known: dict = {}
         self._margin = margin(law)
         self._n = system.problem.on.wavenumber(Solution.at(system, x).parameters)
@@ -116,10 +115,8 @@ class Watch:
 
     def _evaluated(self, system, x) -> Stability:
         """The stability on the system's mesh."""
-        parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
-        equilibrium = from_solution(self._law, system.nodes, system.states(x), system.degree, parameters)
         with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
-            return index(equilibrium)
+            return Solution.at(system, x).index()
 
     def _within_law(self, system, x, point) -> Stability | None:
         """The stability of a state; None at the end of a law whose energy is convex no further, where there is no index."""

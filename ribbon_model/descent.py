@@ -27,7 +27,6 @@ from contin import correct
 from ribbon_model import exact, second_variation
 from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH
-from ribbon_model.laws import Law
 from ribbon_model.linear import thresholds
 from ribbon_model.segments import Strip
 from ribbon_model.shape import quaternions
@@ -277,19 +276,21 @@ def identify(strip: Strip) -> Rest:
     ValueError
         At that equilibrium the energy is not convex in the strains: it has no index.
     """
-    law, nu, kappa_n, strains = strip.law, strip.nu, strip.kappa_n, strip.strains
+    law, nu, kappa_n, strains, Gamma = strip.law, strip.nu, strip.kappa_n, strip.strains, strip.Gamma
     if np.abs(strains - [strains[:, 0].mean(), 0, 0]).max() < _PLANAR:
         m = round(strains[:, 0].mean())
         # one that is turned inside out is, seen from the other side, one with the opposite natural curvature
-        stability = index(second_variation.circle(law, nu, abs(m), math.copysign(1, m) * kappa_n))
-        return Rest("circle", m, 0, m * m / 2 - m * kappa_n, float(m), 0.0, 0.0, stability)
+        sense = math.copysign(1, m)
+        stability = index(second_variation.circle(law, nu, abs(m), sense * kappa_n, Gamma))
+        values = law.circle(abs(m), sense * kappa_n, nu, Gamma)
+        return Rest("circle", m, 0, values["energy"], sense * values["kappa_star"], 0.0, 0.0, stability)
     solutions = [polished(strip, intervals) for intervals in (24, 48)]
     values = np.array([system.functionals(x) for system, x in solutions])[:, ::-1]  # energy, kappa*
     error = float(np.abs(values[1] - values[0]).max())
     system, x = solutions[1]
     stability = Solution.at(system, x).index()
     n = int(np.argmax(np.abs(np.fft.rfft(strains[:, 2]))))
-    for m, point in _on_primary_branches(law, nu, kappa_n, n):
+    for m, point in _on_primary_branches(strip, n):
         difference = float(np.abs(values[1] - [point.energy, point.kappa_star]).max())
         if difference < _SAME:
             return Rest("primary branch", m, n, *map(float, values[1]), error, difference, stability)
@@ -313,7 +314,8 @@ def polished(strip: Strip, intervals: int = 24, degree: int = 7):
     start = int(np.argmax(np.abs(twist - np.roll(twist, 1))))  # M3 at S = 0 fixes the phase
     strip = replace(strip, strains=np.roll(strip.strains, -start, axis=0))
     loads = -strip.segment * strip.linearized()[3]
-    values = dict(zip(("M1", "M2", "M3", "R1", "R2", "R3"), loads)) | {"nu": strip.nu, "kappa_n": strip.kappa_n, "unfold": 0.0}
+    values = dict(zip(("M1", "M2", "M3", "R1", "R2", "R3"), loads)) | {"kappa_n": strip.kappa_n, "unfold": 0.0}
+    values |= strip.law.values(strip.nu, strip.Gamma)
     system = LOOP.discretize(strip.law, intervals, degree, values)
     axes, x = strip.along(LENGTH * system.nodes)
     guess = system.pack(np.hstack([quaternions(axes.transpose(0, 2, 1)), x]), values)
@@ -322,14 +324,15 @@ def polished(strip: Strip, intervals: int = 24, degree: int = 7):
     return system, correct(system, guess, row, strip.kappa_n).x
 
 
-def _on_primary_branches(law: Law, nu: float, kappa_n: float, n: int):
-    """(m, point) wherever a primary branch of wavenumber n passes kappa_n, by quadrature."""
+def _on_primary_branches(strip: Strip, n: int):
+    """(m, point) wherever a primary branch of wavenumber n passes the strip's kappa_n, by quadrature."""
+    law, nu, kappa_n, Gamma = strip.law, strip.nu, strip.kappa_n, strip.Gamma
     for m in (m for m in _COVERINGS if n and m != n and m % (2 * n)):
         try:
-            first = thresholds(law, m, n, nu)[0]
+            first = thresholds(law, m, n, nu, Gamma)[0]
             limits = min(first, kappa_n) - 1, max(first, kappa_n) + 1
-            points = exact.curve(m, n, nu, limits, law=law.name)
-        except ValueError:  # no such branch
+            points = exact.curve(m, n, nu, limits, law=law.name, Gamma=Gamma)
+        except (ValueError, RuntimeError):  # no such branch, or none that can be left from its circle
             continue
         for one, other in itertools.pairwise(points):
             if (one.kappa_n - kappa_n) * (other.kappa_n - kappa_n) <= 0:

@@ -30,6 +30,7 @@ from typing import ClassVar
 import numpy as np
 
 from ribbon_model import exact_finite_width
+from ribbon_model.exact_finite_width import FiniteWidthPoint
 from ribbon_model.exact_rods import FLOAT, RODS, Numerics, RodPoint
 
 _HOMOCLINIC = -300.0  # log(q)/2 at which the follower stops, before q underflows
@@ -97,7 +98,7 @@ def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0
 
     Parameters
     ----------
-    guess : ExactPoint, RodPoint, or for the ribbon (c, A, kappa_n)
+    guess : ExactPoint, RodPoint, FiniteWidthPoint, or for the ribbon (c, A, kappa_n)
     kappa_n, amplitude : float
         Exactly one of them: what the point must have. The amplitude is A: max(eta**2) for the ribbon.
     law, root :
@@ -110,9 +111,11 @@ def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0
     RuntimeError
         If Newton does not converge. Near a fold of kappa_n prescribe the amplitude, and conversely.
     """
-    family = _family(law, m, n, nu, root)
     if (kappa_n is None) == (amplitude is None):
         raise ValueError("give exactly one of kappa_n and amplitude")
+    if isinstance(guess, FiniteWidthPoint):
+        return exact_finite_width.solve(guess, kappa_n=kappa_n, amplitude=amplitude)
+    family = _family(law, m, n, nu, root)
     if isinstance(guess, ExactPoint | RodPoint):
         z = family.coordinates(guess)
     else:

@@ -231,6 +231,26 @@ def curve(m, n, nu, Gamma, kappa_limits=(-100.0, 100.0), step=0.1) -> list[Finit
     return [*points, branch.point(v, "MX")]
 
 
+def solve(guess: FiniteWidthPoint, *, kappa_n: float | None = None, amplitude: float | None = None) -> FiniteWidthPoint:
+    """The point of a branch with given kappa_n, or given amplitude, nearest a point of it; see `exact.solve`.
+
+    Raises
+    ------
+    RuntimeError
+        If Newton does not converge.
+    """
+    branch = _Branch(guess.m, guess.n, guess.nu, guess.Gamma)
+    v = np.array([guess.kappa_n, guess.omega, math.sqrt(guess.amplitude)])
+    if kappa_n is not None:
+        v[0], normal = kappa_n, np.array([1.0, 0.0, 0.0])
+    else:
+        v[2], normal = math.sqrt(amplitude), np.array([0.0, 0.0, 1.0])
+    found = branch.correct(v, normal)
+    if found is None:
+        raise RuntimeError(f"no convergence on branch ({guess.m}, {guess.n}): start nearer, or prescribe the other quantity")
+    return branch.point(found)
+
+
 def _fold(branch, v, tangent, ahead):
     """Where kappa_n is stationary between two points; kappa_n is then known to the square of the place's error."""
     from scipy.optimize import brentq

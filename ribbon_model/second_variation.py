@@ -26,6 +26,7 @@ import numpy as np
 
 from contin import Batch, basis, interpolation
 from ribbon_model import linear
+from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
 from ribbon_model.shape import frames
@@ -165,8 +166,8 @@ def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = No
     return dataclasses.replace(found, mesh=np.linspace(0, piece, intervals + 1))
 
 
-def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
-    """The equilibrium from the solution on the cell, the half loop or the loop; arguments as `solution.Solution`.
+def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
+    """The equilibrium from the solution on a domain; arguments as `solution.Solution`, which is where to ask for it.
 
     Raises
     ------
@@ -186,18 +187,18 @@ def from_solution(law: Law, t, states, degree: int, parameters: Mapping[str, flo
     p = parameters
     moment = np.array([p["M1"], p["M2"], p.get("M3", 0.0)])
     force = np.array([p.get(name, 0.0) for name in ("R1", "R2", "R3")])
-    if math.isclose(p["length"], LENGTH):
-        axes, directors, symmetry = np.eye(3), lambda stations: sample(np.mod(stations, LENGTH) / LENGTH), Symmetry()
-    elif "turn" in p:
-        axes, directors, symmetry = _unfolded_cell(sample, p["length"])
-    else:
-        axes, directors, symmetry = _unfolded_half(sample, "axes" in p)
+    axes, directors, symmetry = _UNFOLDED[domain](sample, p["length"])
     loads = axes @ moment, axes @ force
     return Equilibrium(law, p["nu"], p["kappa_n"], directors, *loads, symmetry, p["length"] * mesh, degree, p.get("Gamma"))
 
 
-def _unfolded_half(sample, between_axes: bool):
-    """Lab axes (rows), directors and symmetry of a half loop between mirrors, or between two-fold axes."""
+def _whole(sample, length):
+    """Lab axes (rows), directors and symmetry of a loop of which no symmetry is known."""
+    return np.eye(3), lambda stations: sample(np.mod(stations, LENGTH) / LENGTH), Symmetry()
+
+
+def _unfolded_half(between_axes: bool, sample, length):
+    """The same of a half loop between mirrors, or between two-fold axes."""
     first = sample(np.zeros(1))[0]
     axes = np.array([first[1], first[2], first[0]] if between_axes else [first[2], -first[1], first[0]])
     image = np.diag([1.0, -1.0, -1.0]) if between_axes else np.diag([-1.0, 1.0, 1.0])
@@ -241,3 +242,10 @@ def _unfolded_cell(sample, length):
         return d @ np.array(turns)[number] * signs[number % 2]
 
     return axes, directors, Symmetry(order, round(winding) % order, flip=True, mirror=True)
+
+
+#: How a solution on a domain unfolds: ``(axes, directors, symmetry)`` from its directors and its length.
+_UNFOLDED: dict[Domain, Callable] = {
+    CELL: _unfolded_cell, HALF_LOOP: functools.partial(_unfolded_half, False),
+    HALF_LOOP_BETWEEN_AXES: functools.partial(_unfolded_half, True), LOOP: _whole,
+}  # fmt: skip

@@ -56,12 +56,15 @@ class Strip:
     nu, kappa_n : float
     strains : ndarray, shape (N, 3)
         Components of omega on the directors, segment by segment.
+    Gamma : float, optional
+        Of a law that has one.
     """
 
     law: Law
     nu: float
     kappa_n: float
     strains: np.ndarray
+    Gamma: float | None = None
 
     @property
     def segment(self) -> float:
@@ -76,7 +79,10 @@ class Strip:
     @cached_property
     def density(self):
         """U, moment and stiffness on the segments: `Law.strain_energy`."""
-        return self.law.strain_energy(self.strains, self.kappa_n, self.nu)
+        return self._strain_energy(self.kappa_n)
+
+    def _strain_energy(self, kappa_n):
+        return self.law.strain_energy(self.strains, kappa_n, *self.law.values(self.nu, self.Gamma).values())
 
     @cached_property
     def energy(self) -> float:
@@ -87,7 +93,7 @@ class Strip:
     def kappa_star(self) -> float:
         """-dE/dkappa_n, the conjugate curvature (28), with U as in `Law.strain_energy`."""
         step = 1e-30
-        varied = self.law.strain_energy(self.strains, self.kappa_n + 1j * step, self.nu)[0]
+        varied = self._strain_energy(self.kappa_n + 1j * step)[0]
         return float(-np.mean(varied.imag) / step)
 
     @property
@@ -254,5 +260,5 @@ def discretized(equilibrium: Equilibrium, segments: int) -> Strip:
     edges = np.cumsum(directors[:, 2], axis=0) * (LENGTH / segments)
     moment = equilibrium.moment - np.cross(edges - directors[:, 2] * (LENGTH / segments / 2), equilibrium.force)
     strains = equilibrium.response(np.einsum("kij,kj->ki", directors, moment))[0]
-    strip = Strip(equilibrium.law, equilibrium.nu, equilibrium.kappa_n, strains)
+    strip = Strip(equilibrium.law, equilibrium.nu, equilibrium.kappa_n, strains, equilibrium.Gamma)
     return strip.moved(np.zeros(segments * len(strip.free)))

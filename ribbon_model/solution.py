@@ -105,7 +105,7 @@ class Solution:
 
     def equilibrium(self) -> Equilibrium:
         """The equilibrium along the whole loop, for its second variation; raises as `from_solution`."""
-        return from_solution(self.law, self.t, self.states, self.degree, self.parameters)
+        return from_solution(self.law, self.domain, self.t, self.states, self.degree, self.parameters)
 
     def index(self) -> Stability:
         """Number of negative directions of the energy; see `ribbon_model.stability.index`."""

@@ -17,7 +17,7 @@ from ribbon_model.conjugate import conjugate_index
 from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON
-from ribbon_model.second_variation import Symmetry, circle, coupling, from_solution
+from ribbon_model.second_variation import Symmetry, circle, coupling
 from ribbon_model.seeds import half_loop_branch, primary_branch
 from ribbon_model.solution import Solution
 from ribbon_model.stability import index
@@ -25,8 +25,8 @@ from ribbon_model.stability import index
 NU = 0.3
 
 
-def equilibrium(point, law=RIBBON):
-    return from_solution(law, point.system.nodes, point.system.states(point.x), point.system.degree, point.parameters)
+def equilibrium(point):
+    return Solution.of(point).equilibrium()
 
 
 @functools.cache
@@ -106,7 +106,7 @@ def test_one_direction_changes_at_a_fold_and_keeps_the_symmetry(m, n):
 def test_both_methods_agree(m, n, law):
     points = between_ends(branch(m, n, law))
     for point in points[:: max(1, len(points) // 4)]:
-        one, other = index(equilibrium(point, law)), conjugate_index(equilibrium(point, law))
+        one, other = index(equilibrium(point)), conjugate_index(equilibrium(point))
         assert one.decided and other.decided
         assert one.index == other.index
 
@@ -145,8 +145,7 @@ def crossing(law, m, n, name, low, high, intervals, degree):
 
     def determinant(kappa_n):
         x = correct(system, last.x, row, kappa_n).x
-        values = dict(zip(system.problem.parameters, system.all_parameters(x)))
-        return index(from_solution(law, system.nodes, system.states(x), system.degree, values))[name].determinant
+        return Solution.at(system, x).index()[name].determinant
 
     return brentq(determinant, low, high, xtol=1e-13)
 
@@ -170,7 +169,7 @@ def whole(at):
 def test_symmetry_classes_add_up_to_the_whole_loop(m, n, law):
     """The quarter wave in classes, and the whole loop as one piece, of which no symmetry is known."""
     for point in between_ends(branch(m, n, law))[2::9]:
-        at = equilibrium(point, law)
+        at = equilibrium(point)
         ours, theirs = index(at), index(whole(at))
         assert ours.decided and theirs.decided and ours.index == theirs.index
 
@@ -190,8 +189,7 @@ def test_the_shift_of_phase_is_a_null_vector():
         system, carry = point.system.refined()
         tangent = carry(point.tangent)
         x = correct(system, carry(point.x), tangent, tangent @ carry(point.x)).x
-        values = dict(zip(system.problem.parameters, system.all_parameters(x)))
-        fine = index(from_solution(RIBBON, system.nodes, system.states(x), system.degree, values)).residual
+        fine = Solution.at(system, x).index().residual
         assert coarse < 1e-7 and fine < max(coarse / 100, 1e-11)
 
 
@@ -206,8 +204,7 @@ def test_a_change_of_index_is_located():
     def state(kappa_n):
         share = (kappa_n - above["kappa_n"]) / (below["kappa_n"] - above["kappa_n"])
         x = correct(system, above.x + share * (below.x - above.x), row, kappa_n).x
-        values = dict(zip(system.problem.parameters, system.all_parameters(x)))
-        return from_solution(RIBBON, system.nodes, system.states(x), system.degree, values)
+        return Solution.at(system, x).equilibrium()
 
     (name,) = [c.name for c in index(equilibrium(above)).classes if c.negative != index(equilibrium(below))[c.name].negative]
     assert name == (1, "even")
@@ -241,8 +238,7 @@ def test_domains_agree():
     point = between_ends(branch(1, 2))[15]
     part = index(equilibrium(point))
     system, x = Solution.of(point).on(LOOP).discretized()
-    values = dict(zip(system.problem.parameters, system.all_parameters(x)))
-    loop = index(from_solution(RIBBON, system.nodes, system.states(x), system.degree, values))
+    loop = Solution.at(system, x).index()
     assert loop.decided and loop.index == part.index
 
 
@@ -310,8 +306,9 @@ def test_what_has_no_index():
     with pytest.raises(ValueError, match="no 1-covered circle"):
         circle(RIBBON, NU, 1, 5.9)
     point = between_ends(branch(1, 2))[10]
-    t, states, degree, values = point.system.nodes, point.system.states(point.x), point.system.degree, dict(point.parameters)
+    solution = Solution.of(point)
+    shorter = dataclasses.replace(solution, parameters={**solution.parameters, "length": 0.9 * solution.parameters["length"]})
     with pytest.raises(ValueError, match="does not close"):
-        from_solution(RIBBON, t * 0.9, states, degree, values | {"length": 0.9 * values["length"]})
+        shorter.equilibrium()
     bifurcation = index(circle(RIBBON, NU, 1, 2.5))
     assert not bifurcation.decided and "class 0" in bifurcation.reason
