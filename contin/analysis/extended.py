@@ -17,7 +17,7 @@ from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.system import System
 from contin.functions.batch import Batch
-from contin.problems.statement import Statement
+from contin.problems.statement import Statement, with_multipliers
 
 #: Cosine between a border and the null vector that it stands for, below which it is renewed: the bordered matrix is then still
 #: far from singular (with a cosine of zero it is).
@@ -131,7 +131,7 @@ class _ExtendedStatement:
     @property
     def multipliers(self) -> tuple[str, ...]:
         """Those of the problem."""
-        return self.problem.multipliers
+        return with_multipliers(self.problem, ())
 
     def batch(self, name: str) -> Batch:
         """Return functions of the problem, compiled."""

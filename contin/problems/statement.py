@@ -49,7 +49,8 @@ class Statement(Protocol):
 def with_multipliers(problem: Statement, free: Sequence[str]) -> tuple[str, ...]:
     """Return the free parameters with those that a problem adds by itself."""
     names = checks.names("free", free)
-    return (*names, *(name for name in problem.multipliers if name not in names))
+    added = getattr(problem, "multipliers", ())  # a class that a user wrote for an earlier version has none
+    return (*names, *(name for name in added if name not in names))
 
 
 def check_statement(
