@@ -275,12 +275,12 @@ class _Derivation:
         self.helpers.append(self._function("pointwise", [*given, *self.w], [], values))
         real = ", ".join(f"{name}.real" for name in map(str, given))
         outputs = ", ".join(["E", *(f"G{i}" for i in range(k)), *(f"A{i}_{j}" for i, j in pairs)])
-        solve = _elimination(k)
+        search, solve = _elimination(k, descent=True), _elimination(k, descent=False)
         trial = ", ".join(f"V{i}" for i in range(k))
         lines = [f"def controls({names}):"]
         lines += [f"    W{i} = {start!r}" for i, start in enumerate(self.variation.starts)]
         call = f"pointwise({real}, {', '.join(map(str, self.w))})"
-        lines += [f"    {outputs} = {call}", f"    for iteration in range({_NEWTON}):", *("        " + line for line in solve)]
+        lines += [f"    {outputs} = {call}", f"    for iteration in range({_NEWTON}):", *("        " + line for line in search)]
         lines += [f"        slope = {' + '.join(f'G{i} * D{i}' for i in range(k))}", "        part, lower = 1.0, E"]
         lines += [f"        for halving in range({_HALVINGS}):"]
         lines += [f"            V{i} = W{i} + part * D{i}" for i in range(k)]
@@ -414,12 +414,14 @@ class _Derivation:
         return own[0] if slope.is_number and slope != 0 else None
 
 
-def _elimination(k: int) -> list[str]:
-    """Return the lines that solve A D = -G, for a symmetric positive definite A of size k, without pivoting."""
+def _elimination(k: int, descent: bool) -> list[str]:
+    """Return the lines that solve A D = -G, for a symmetric A = L P L^T of size k, without pivoting.
+
+    With ``descent``, |P| stands for P: D then leads downwards also where A is not positive definite.
+    """
     lines = []
     for i in range(k):
-        for j in range(i + 1):
-            lines.append(f"B{i}_{j} = A{i}_{j}")
+        lines += [f"B{i}_{j} = A{i}_{j}" for j in range(i + 1)]
         lines.append(f"D{i} = -G{i}")
     for i in range(k):
         for j in range(i + 1, k):
@@ -427,7 +429,6 @@ def _elimination(k: int) -> list[str]:
             lines += [f"B{m}_{j} = B{m}_{j} - Q * B{m}_{i}" for m in range(j, k)]
             lines.append(f"D{j} = D{j} - Q * D{i}")
     for i in reversed(range(k)):
-        for j in range(i + 1, k):
-            lines.append(f"D{i} = D{i} - B{j}_{i} * D{j}")
-        lines.append(f"D{i} = D{i} / B{i}_{i}")
+        lines.append(f"D{i} = D{i} / {f'(B{i}_{i} * B{i}_{i}) ** 0.5' if descent else f'B{i}_{i}'}")
+        lines += [f"D{i} = D{i} - B{j}_{i} / B{i}_{i} * D{j}" for j in range(i + 1, k)]
     return lines
