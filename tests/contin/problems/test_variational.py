@@ -355,3 +355,16 @@ def test_a_first_point_where_the_energy_is_not_convex():
     problem = stated(energy=lambda t, x, w, p: (w.y**2 - 1) ** 2 / 4)
     branch = contin.trace(contin.solve(problem, [0.0]), free=["a"], limits={"a": (0, 2)})
     assert len(branch) == 1 and "loss of convexity" in str(branch.stop) and branch.points[0].index is None
+
+
+def test_a_kink_beside_the_states():
+    """|y - 3| has the slope -1 below 3: y'' = -1, y = t (1 - t) / 2."""
+    point = contin.solve(stated(energy=lambda t, x, w, p: w.y**2 / 2 + abs(x.y - 3)), [0.0])
+    middle = point.system.evaluate(point.x, np.array([0.5]))[0, 0]
+    assert math.isclose(middle, 1 / 8, rel_tol=1e-12)
+
+
+def test_division_by_zero_at_the_guess_is_said():
+    problem = stated(energy=lambda t, x, w, p: (p.a - 1) * w.y**2 / 2)
+    with pytest.raises(contin.ProblemError, match="guess: the equations have no finite value there"):
+        contin.solve(problem, [0.0])
