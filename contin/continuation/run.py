@@ -60,7 +60,7 @@ _NOISE = 1e-12
 _ROUNDS = 3
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
 #: small as min_step come much nearer, and regular points do not come so near.
-_NEARLY = 1e-3
+_NEARLY = 1e-2
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 

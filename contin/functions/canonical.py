@@ -423,8 +423,7 @@ def _elimination(k: int, guarded: bool) -> list[str]:
     """
     lines = []
     for i in range(k):
-        for j in range(i + 1):
-            lines.append(f"B{i}_{j} = A{i}_{j}")
+        lines += [f"B{i}_{j} = A{i}_{j}" for j in range(i + 1)]
         lines.append(f"D{i} = -G{i}")
     for i in range(k):
         if guarded:
@@ -434,7 +433,6 @@ def _elimination(k: int, guarded: bool) -> list[str]:
             lines += [f"B{m}_{j} = B{m}_{j} - Q * B{m}_{i}" for m in range(j, k)]
             lines.append(f"D{j} = D{j} - Q * D{i}")
     for i in reversed(range(k)):
-        for j in range(i + 1, k):
-            lines.append(f"D{i} = D{i} - B{j}_{i} * D{j}")
+        lines += [f"D{i} = D{i} - B{j}_{i} * D{j}" for j in range(i + 1, k)]
         lines.append(f"D{i} = D{i} / B{i}_{i}")
     return lines

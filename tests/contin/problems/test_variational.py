@@ -9,6 +9,7 @@ from scipy.special import ellipe, ellipk
 
 import contin
 from contin import VariationalProblem
+from contin.detection.second_variation import second_variation
 
 #: First positive zero of tan x = x.
 TANGENT = 4.493409457909064
@@ -216,6 +217,36 @@ def test_closed_twisted_rod():
     assert abs(twisted.points[0]["mu_phase"]) < 1e-9
 
 
+def test_helix_under_a_wrench():
+    """Constant strains k: from m' = 0 = k x m + d3 x n, the force along the axis is (C - B) k3 |k| (Love, sect. 271)."""
+    k, C = np.array([0.3, 1.1, 0.7]), 0.6
+    size = math.sqrt(k @ k)
+
+    def helix(t):
+        return [math.cos(size * t / 2), *(math.sin(size * t / 2) * k / size)]
+
+    e = [float(value) for value in helix(1.0)]
+    s, c = math.sin(size) / size, (1 - math.cos(size)) / size  # integrals of cos and sin of |k| t
+    axis, d3 = k / size, np.array([0.0, 0.0, 1.0])
+    reach = [float(value) for value in axis * axis[2] * (1 - s) + d3 * s + np.cross(axis, d3) * c]
+    held = VariationalProblem(
+        lambda t, x, w, p: rod(p, w), QUATERNION, {"C": C, "e0": e[0], "e1": e[1], "e2": e[2], "e3": e[3]}, kinematics=rotation,
+        controls=["k1", "k2", "k3"], integrals={
+            "x": lambda t, x, w, p: 2 * (x.q1 * x.q3 + x.q0 * x.q2) - reach[0],
+            "y": lambda t, x, w, p: 2 * (x.q2 * x.q3 - x.q0 * x.q1) - reach[1], "z": lambda t, x, w, p: along(x) - reach[2],
+        },
+        ends=lambda a, b, p: (
+            a.q0 - 1, a.q1, a.q2, a.q3, p.e0 * b.q1 - p.e1 * b.q0 - p.e2 * b.q3 + p.e3 * b.q2,
+            p.e0 * b.q2 - p.e2 * b.q0 - p.e3 * b.q1 + p.e1 * b.q3, p.e0 * b.q3 - p.e3 * b.q0 - p.e1 * b.q2 + p.e2 * b.q1,
+        ),
+    )  # fmt: skip
+    point = contin.solve(held, helix)
+    force = [point["mu_x"], point["mu_y"], point["mu_z"]]
+    np.testing.assert_allclose(np.abs(force), np.abs((C - 1) * k[2] * k), rtol=1e-9)
+    assert math.isclose(point["energy"], (k[0] ** 2 + k[1] ** 2 + C * k[2] ** 2) / 2, rel_tol=1e-10)
+    assert second_variation(point.system, point.x).index() == 0
+
+
 # --- no rods ------------------------------------------------------------------------------------------------------------
 
 
@@ -324,3 +355,16 @@ def test_a_first_point_where_the_energy_is_not_convex():
     problem = stated(energy=lambda t, x, w, p: (w.y**2 - 1) ** 2 / 4)
     branch = contin.trace(contin.solve(problem, [0.0]), free=["a"], limits={"a": (0, 2)})
     assert len(branch) == 1 and "loss of convexity" in str(branch.stop) and branch.points[0].index is None
+
+
+def test_a_kink_beside_the_states():
+    """|y - 3| has the slope -1 below 3: y'' = -1, y = t (1 - t) / 2."""
+    point = contin.solve(stated(energy=lambda t, x, w, p: w.y**2 / 2 + abs(x.y - 3)), [0.0])
+    middle = point.system.evaluate(point.x, np.array([0.5]))[0, 0]
+    assert math.isclose(middle, 1 / 8, rel_tol=1e-12)
+
+
+def test_division_by_zero_at_the_guess_is_said():
+    problem = stated(energy=lambda t, x, w, p: (p.a - 1) * w.y**2 / 2)
+    with pytest.raises(contin.ProblemError, match="guess: the equations have no finite value there"):
+        contin.solve(problem, [0.0])
