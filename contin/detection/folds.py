@@ -16,6 +16,7 @@ import numpy as np
 
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.discretization.protocol import inner
+from contin.errors import ConvergenceError
 from contin.stepping.trial import TestFunction, Trial, sign_changed
 
 #: A component of the unit tangent below this may be round-off: it is believed where the parameter itself changes.
@@ -118,7 +119,10 @@ class FoldSearch:
         """
         aside = _ASIDE * self.segment.step
         sides = [s for s in (fork.at - aside, fork.at + aside) if left[0] < s < right[0]]
-        near = [(s, self.segment.at(s)) for s in sides]
+        try:
+            near = [(s, self.segment.at(s)) for s in sides]
+        except ConvergenceError:  # right beside the fork the equations are too nearly singular: the ends decide
+            return [fork] if sign_changed(left[1].value(self.fold), right[1].value(self.fold)) else []
         before, behind = (near[0] if fork.at - aside > left[0] else left), (near[-1] if fork.at + aside < right[0] else right)
         found = [fork] if sign_changed(before[1].value(self.fold), behind[1].value(self.fold)) else []
         if before is not left:
