@@ -108,6 +108,8 @@ class Batch:
         self.signature = Signature(tuple(states), tuple(parameters), times and not ends, ends)
         self.count = sum(max(count, 1) for count in counts)
         self._functions, self._counts = tuple(functions), tuple(counts)
+        if not self._functions or len(self._functions) != len(self._counts):
+            raise ProblemError("functions: there must be at least one, with a count for each")
         self._colourings: dict[tuple[int, ...], Colouring] = {}
         rewriter = complex_step.ComplexStep()
         rewriter.note(_compiled_by(), numba.__version__, np.__version__, sys.version)

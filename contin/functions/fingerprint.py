@@ -72,7 +72,8 @@ def _parts(value: Any) -> tuple[str, bytes]:
     if isinstance(value, (set, frozenset)):
         return "set", b"".join(sorted(map(_encoded, value)))
     if isinstance(value, (type, types.BuiltinFunctionType, np.ufunc)):
-        return "name", f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', value.__name__)}".encode()
+        name = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', value.__name__)}"
+        return "name", name.encode() + _encoded(getattr(value, "_fields", ()))  # named tuples of one name may differ in these
     try:
         return "object", pickle.dumps(value)
     except Exception:  # an object may refuse in any way; its repr has its address, or whatever its author thought right

@@ -50,7 +50,7 @@ def chain(n: int) -> contin.BoundaryValueProblem:
 
 
 def flops(intervals: int, n: int, degree: int, extra: int = 1) -> float:
-    """Multiplications and additions of the condensation in `contin.condensation`, leading terms, with its border row."""
+    """Multiplications and additions of the condensation in `contin.linalg.condensation`, leading terms, with its border row."""
     rows, width, inner = n * degree, n * (degree + 1) + extra, n * (degree - 1)
     local = sum(2 * (rows - c + extra - 1) * (width - c - 1) for c in range(inner))
     link = sum(2 * (2 * n - c + extra - 1) * (3 * n + extra - c - 1) for c in range(n))

@@ -124,3 +124,9 @@ def test_what_numba_itself_does_not_expect_is_a_sentence():
 
     with pytest.raises(ProblemError, match="'rhs' cannot be compiled.*0.0, not 0"):
         Batch([rhs], [2], ["a", "b"], ["k"])
+
+
+@pytest.mark.parametrize("counts", [[], [1]])
+def test_no_functions_is_a_sentence(counts):
+    with pytest.raises(ProblemError, match="functions: there must be at least one"):
+        Batch([], counts, ["a"], ["k"])

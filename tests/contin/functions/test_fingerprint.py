@@ -4,6 +4,7 @@ import importlib.util
 import itertools
 import math
 import sys
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -112,6 +113,7 @@ def test_large_arrays_inside_a_tuple_are_told_apart():
 def test_values_that_look_alike_are_told_apart():
     alike = [
         0, 0.0, -0.0, False, 0j, "0", b"0", None, (), [], {}, (0,), [0], ("0",), (0, 0), ((0,), 0), (0, (0,)),
+        namedtuple("Pair", "a b"), namedtuple("Pair", "b a"),
         np.float64(0), np.float32(0), np.zeros(1), np.zeros((1, 1)), np.zeros(1, np.int64), {0: 0}, {0}, range(0), slice(0),
     ]  # fmt: skip
 
