@@ -1,0 +1,61 @@
+"""Half a closed strip stated by its energy alone: equations, multipliers and index are derived by `contin.VariationalProblem`.
+
+The state is the quaternion of the frame and the centreline, the Hamiltonian that of the law, H(M), plus n . d3 for the growth
+of the centreline: the multipliers of the quaternion carry the moment, 2 M_i = lambda_q . (q e_i), and those of the centreline
+are the force. `ribbon_model.domains` uses that moment and force are constant in space and keeps half as many unknowns; this is
+the same mechanics without that knowledge, for comparison, with the index of perturbations that keep the half loop's symmetry.
+"""
+
+from __future__ import annotations
+
+import functools
+
+from contin import VariationalProblem
+from ribbon_model.domains import Domain
+from ribbon_model.equilibrium import CENTRELINE, FRAME, LENGTH, directors
+from ribbon_model.laws import Law
+
+
+@functools.cache
+def variational_problem(law: Law, domain: Domain) -> VariationalProblem:
+    """The half loop as a variational problem, on S in (0, L/2); its parameters are kappa_n and the law's own.
+
+    Parameters
+    ----------
+    law : Law
+        One whose H is a closed expression.
+    domain : Domain
+        `domains.HALF_LOOP` or `domains.HALF_LOOP_BETWEEN_AXES`.
+
+    Raises
+    ------
+    ValueError
+        Another domain.
+    ProblemError
+        A law whose H cannot be differentiated symbolically.
+    """
+    if not domain.reversal:
+        raise ValueError(f"domain {domain.name!r}: the energy is stated on half loops")
+    complementary, between_mirrors = law.hamiltonian, domain.reversal == "mirror"
+
+    def hamiltonian(t, x, lam, p):
+        q0, q1, q2, q3, x1, x2, x3 = x
+        l0, l1, l2, l3, n1, n2, n3 = lam
+        M1 = (-l0 * q1 + l1 * q0 + l2 * q3 - l3 * q2) / 2
+        M2 = (-l0 * q2 - l1 * q3 + l2 * q0 + l3 * q1) / 2
+        M3 = (-l0 * q3 + l1 * q2 - l2 * q1 + l3 * q0) / 2
+        d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(q0, q1, q2, q3)
+        return complementary(M1, M2, M3, p.kappa_n, p.nu) + n1 * d31 + n2 * d32 + n3 * d33
+
+    def mirrors(a, b, p):
+        d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(b.q0, b.q1, b.q2, b.q3)
+        return a.q0 - 1, a.q1, a.q2, a.q3, a.x1, a.x2, a.x3, d31, d32, b.x3
+
+    def axes(a, b, p):
+        d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(b.q0, b.q1, b.q2, b.q3)
+        return a.q0 - 1, a.q1, a.q2, a.q3, a.x1, a.x2, a.x3, d21, d23, b.x1, b.x3
+
+    return VariationalProblem(
+        None, (*FRAME, *CENTRELINE), {"kappa_n": 0.0, **law.defaults}, hamiltonian=hamiltonian,
+        ends=mirrors if between_mirrors else axes, domain=(0.0, LENGTH / 2),
+    )  # fmt: skip
