@@ -127,7 +127,21 @@ class FoldSearch:
         found = [fork] if sign_changed(before[1].value(self.fold), behind[1].value(self.fold)) else []
         if before is not left:
             found = self.between(left, before) + found
-        return found if behind is right else found + self.between(behind, right)
+        if behind is not right:
+            found = found + self.between(behind, right)
+        return self._turning(found, fork, left, right)
+
+    def _turning(self, found: list[SpecialPoint], fork: SpecialPoint, left: Place, right: Place) -> list[SpecialPoint]:
+        """Return the folds at which the parameter turns: beside the fork tangents are blurred."""
+        at = 0
+        while at < len(found):
+            values = [trial.x[self._index] for trial in (left[1], *(fold.trial for fold in found), right[1])]
+            if found[at] is not fork and (values[at + 1] - values[at]) * (values[at + 2] - values[at + 1]) > 0:
+                del found[at]
+                at = 0
+            else:
+                at += 1
+        return found
 
     def rate(self, trial: Trial) -> float:
         """Return the rate of the primary parameter along the state's tangent."""
