@@ -1,12 +1,12 @@
 """A strip as a file for other programs, each read by a library that did not write it where there is one; a branch as a film."""
 
-import io
 import json
 import math
 import os
 import shutil
 import signal
 import struct
+import sys
 import time
 
 import h5py
@@ -210,7 +210,7 @@ def test_a_mistake_is_answered_in_one_sentence_and_nothing_is_written(call, resu
 
 
 def test_a_missing_library_is_named(call, results, tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "trimesh", None)
+    monkeypatch.setitem(sys.modules, "trimesh", None)
     done = call(export.main, results, "--point", "LP", "--out", "x.csv", "--out", "x.stl")
     assert done.returncode == 2 and "pip install trimesh" in done.err and not list(tmp_path.iterdir())
 
@@ -242,4 +242,4 @@ def test_a_table_for_xarray(results):
     data = read_branch(results).to_xarray()
     assert data["kappa_n"].dims == ("point",) and "natural curvature" in data["kappa_n"].attrs["long_name"]
     assert list(data["label"].values).count("LP") == 1 and data.attrs["status"] == "complete"
-    io.StringIO(data.attrs["config"])
+    assert "m: 1" in data.attrs["config"]
