@@ -98,13 +98,8 @@ def draw_strip(axes, shape, width: float) -> None:
 
     step = max(1, len(shape.arclength) // 400)
     keep = np.unique(np.append(np.arange(0, len(shape.arclength), step), len(shape.arclength) - 1))
-    surface = shape.surface(width)[keep] - shape.centreline.mean(axis=0)
     # the axis of the moment points up, and the strip is looked at from the same side at every point
-    up = np.cross(shape.centreline - shape.centreline.mean(axis=0), shape.directors[:, 2]).sum(axis=0)
-    up = up / np.linalg.norm(up) if np.linalg.norm(up) > 1e-9 else np.array([0.0, 0.0, 1.0])
-    side = shape.directors[0, 2] - shape.directors[0, 2] @ up * up
-    side /= np.linalg.norm(side)
-    surface = surface @ np.array([np.cross(side, up), side, up]).T
+    surface = (shape.surface(width)[keep] - shape.centreline.mean(axis=0)) @ shape.upright().T
     a, b = surface[:, 0], surface[:, -1]
     quads = np.stack([a[:-1], a[1:], b[1:], b[:-1]], axis=1)
     normals = np.cross(a[1:] - a[:-1], b[:-1] - a[:-1])

@@ -9,7 +9,7 @@ import numpy as np
 
 from branches.config import Config, ConfigError, dump, parse
 from branches.files import StoreError
-from branches.store import open_branch
+from branches.store import meaning_of, open_branch
 from ribbon_model.domains import DOMAINS
 from ribbon_model.laws import LAWS
 from ribbon_model.shape import Shape
@@ -60,10 +60,28 @@ class StoredBranch:
         return self.solution(point).shape()
 
     def to_pandas(self):
-        """The table of points as a ``pandas.DataFrame`` (ImportError where pandas is not installed)."""
-        import pandas
-
+        """Return the table of points as a ``pandas.DataFrame``; ImportError says what to install if pandas is missing."""
+        try:
+            import pandas
+        except ImportError as error:
+            raise ImportError("to_pandas needs pandas, which is not installed: pip install pandas") from error
         return pandas.DataFrame(self.points).assign(label=[label.decode() for label in self.points["label"]])
+
+    def to_xarray(self):
+        """Return the table of points as an ``xarray.Dataset`` along ``point``, with what each column means.
+
+        Each variable has its meaning as ``long_name``; the attributes of the dataset are the scene as YAML, ``status`` and
+        ``stop``. ImportError says what to install if xarray is missing.
+        """
+        try:
+            import xarray
+        except ImportError as error:
+            raise ImportError("to_xarray needs xarray, which is not installed: pip install xarray") from error
+        columns = {name: self.points[name] for name in self.points.dtype.names if name not in ("point", "label")}
+        columns["label"] = np.array([label.decode() for label in self.points["label"]])
+        variables = {name: ("point", values, {"long_name": meaning_of(name)}) for name, values in columns.items()}
+        about = {"config": dump(Config.model_validate(self.config)), "status": self.status, "stop": self.stop}
+        return xarray.Dataset(variables, {"point": self.points["point"]}, about)
 
     def plot(self, shapes: int = 6, width: float = 0.3):
         """The branch as a matplotlib figure; see `branches.draw_branch.figure`."""

@@ -56,6 +56,12 @@ MEANINGS = {
 }  # fmt: skip
 
 
+def meaning_of(column: str) -> str:
+    """Return what a column of the table of points is; its name where that is all that is known."""
+    told = {name: meaning for name, _, meaning in _BOOKKEEPING} | MEANINGS
+    return told.get(column, column)
+
+
 def versions() -> dict[str, str]:
     """Versions of everything a result depends on."""
     result = {"python": platform.python_version()}

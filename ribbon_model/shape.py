@@ -40,6 +40,25 @@ class Shape:
         ruling = self.directors[:, 0] + self.eta[:, None] * self.directors[:, 2]
         return self.centreline[:, None] + np.linspace(-0.5, 0.5, across)[:, None] * width * ruling[:, None]
 
+    def upright(self) -> np.ndarray:
+        """The rotation, shape (3, 3), from the lab axes to axes on which the strip stands upright and looks to one side.
+
+        Its rows are the new axes on the lab axes. The third is that of the area that the centreline encloses: on branches from
+        a circle it is the direction of the moment. The second is d3 at the beginning, as far as it is perpendicular to that.
+        """
+        middle = self.centreline - self.centreline.mean(axis=0)
+        up = np.cross(middle, self.directors[:, 2]).sum(axis=0)
+        up = up / np.linalg.norm(up) if np.linalg.norm(up) > 1e-9 else np.array([0.0, 0.0, 1.0])
+        side = self.directors[0, 2] - self.directors[0, 2] @ up * up
+        side /= np.linalg.norm(side)
+        return np.array([np.cross(side, up), side, up])
+
+    def placed(self, length: float) -> Shape:
+        """The closed strip scaled to a length, upright, with the middle of its centreline at the origin."""
+        axes, scale = self.upright(), length / (self.arclength[-1] - self.arclength[0])
+        x = (self.centreline - self.centreline.mean(axis=0)) @ axes.T * scale
+        return Shape(self.arclength * scale, x, self.directors @ axes.T, self.eta)
+
     def turned(self) -> Shape:
         """The part and its image under the two-fold axis along d2 at its end."""
         axis, centre = self.directors[-1, 1], self.centreline[-1]

@@ -89,6 +89,10 @@ class Solution:
         moment = np.broadcast_to(moment, (len(self.states), 3)).T
         return np.array(on_directors(*q, *moment)).T, np.array(on_directors(*q, *force)).T
 
+    def strains(self) -> np.ndarray:
+        """omega_1, omega_2 and omega_3 at the nodes, shape (K, 3): curvatures and twist, over 2 pi/L."""
+        return np.array([self.law.response(*m, *self.material)[1:4] for m in self.loads()[0]])
+
     def invariants(self) -> dict[str, np.ndarray]:
         """What equilibrium keeps constant, at the nodes: ``norm`` |q|^2 and ``hamiltonian`` H(M) + R3, shape (K,) each."""
         moment, force = self.loads()
@@ -99,7 +103,7 @@ class Solution:
         """The closed strip in space, unfolded by the symmetries of the domain."""
         length, states = self.parameters["length"], self.states
         x = states[:, 4:7] if states.shape[1] > 4 else quadrature_centreline(self.t, states, self.degree, length)
-        omega = np.array([self.law.response(*m, *self.material)[1:4] for m in self.loads()[0]])
+        omega = self.strains()
         part = Shape(length * np.asarray(self.t), x, frames(states), omega[:, 2] / omega[:, 0])
         return self.domain.whole(part, self.parameters)
 

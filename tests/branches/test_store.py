@@ -107,6 +107,21 @@ def test_the_page_names_everything_in_the_file(results, root):
         assert columns <= named, columns - named
 
 
+def test_the_examples_for_matlab_and_julia_name_what_is_in_the_file(results, root):
+    page = (root / "docs" / "file-format.md").read_text(encoding="utf-8")
+    matlab, julia = (re.search(rf"```{language}\n(.*?)```", page, re.DOTALL)[1] for language in ("matlab", "julia"))
+    with h5py.File(results / "m1_n2.h5") as file:
+        paths = {*re.findall(r"h5read\('m1_n2.h5', '([^']+)'", matlab), *re.findall(r'file\["([^"]+)"\]', julia)}
+        assert {path.strip("/") for path in paths} == {"points", "events", "solutions/index", "solutions/states", "solutions/t"}
+        assert all(path in file for path in paths)
+        for table, columns in (("events", "events|fold"), ("points", "points"), ("solutions/index", "index|row")):
+            used = set(re.findall(rf"\b(?:{columns})\.(\w+)", matlab + julia))
+            assert used and used <= set(file[table].dtype.names), (table, used)
+        assert {*re.findall(r"'/', '(\w+)'", matlab), *re.findall(r'attributes\(file\)\["(\w+)"', julia)} == {"stop"}
+        states, row = file["solutions/states"], file["solutions/index"][0]
+        assert states.shape[1] == 4 and row["start"] == 0  # rows are nodes, which others read as columns
+
+
 # --- written whole, or not at all -----------------------------------------------------------------------------------
 
 

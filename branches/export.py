@@ -1,0 +1,250 @@
+"""``python -m branches.export FILE --point LABEL --out strip.stl``: a strip for other programs; a branch as a film."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from branches.display import Parser, complain, survive_any_encoding, write_output
+
+if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and mistakes in the command line answer at once
+    from numpy import ndarray
+
+    from branches.read import StoredBranch
+    from ribbon_model.shape import Shape
+
+EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
+#: Endings of what --out and --movie write.
+SURFACES, MOVIES = (".stl", ".obj", ".glb", ".gltf", ".vtk", ".vtu"), (".gif", ".mp4")
+#: Width where the result knows none and none is given, in units of L: that of the pictures, 0.3 L/2 pi.
+_WIDTH = 0.3 / (2 * math.pi)
+#: Part of the largest possible width that a width of our own choice stays below: where generators nearly cross, cells
+#: degenerate. At .99 the narrowest cells of the branch (1, 2) are a hundredth of the others.
+_ROOM = 0.8
+#: Frames of a film: fewer than 2 show nothing move, and more than 2000 take minutes and hundreds of megabytes.
+_FRAMES = (2, 2000)
+
+
+def arguments(argv=None):
+    """The command line, parsed."""
+    parser = Parser(
+        prog="python -m branches.export",
+        allow_abbrev=False,
+        description="Write the strip at a labelled point of a result for other programs (3D printing, Blender, ParaView, "
+        "spreadsheets), or the whole branch as a film.",
+        epilog="Exit code: 0 done, 2 bad input, 130 interrupted. Surfaces need trimesh or meshio: "
+        'pip install "ribbon-continuation[export]".',
+    )
+    parser.add_argument("result", metavar="FILE", help="file of a branch, such as m1_n2.h5")
+    parser.add_argument("--point", metavar="LABEL", help="number of a labelled point (its LAB), or its label, such as LP")
+    parser.add_argument(
+        "--out", metavar="NAME", action="append", default=[],
+        help=f"file to write, more than once if wanted; the ending says what: {', '.join((*SURFACES, '.csv'))}",
+    )  # fmt: skip
+    parser.add_argument("--movie", metavar="NAME", help="film of the folding, .gif or (with ffmpeg) .mp4")
+    parser.add_argument("--length", type=float, default=1.0, metavar="X", help="length of the strip in the files (default: 1)")
+    parser.add_argument("--width", type=float, metavar="X", help="width, in the same unit: of L, unless there is a --length")
+    parser.add_argument("--thickness", type=float, metavar="X", help="thickness, in the same unit; makes a closed solid")
+    parser.add_argument("--frames", type=int, default=60, metavar="N", help="frames of the film, at most (default: 60)")
+    return parser.parse_args(argv)
+
+
+def main(argv=None) -> int:
+    """Run the command; the exit code."""
+    survive_any_encoding()
+    try:
+        return _export(arguments(argv))
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return EXIT_INTERRUPTED
+
+
+def _export(options) -> int:
+    from branches.config import ConfigError
+    from branches.files import StoreError, prepare, write_bytes
+    from branches.read import read_branch
+
+    _unwind_on_interrupt()
+    try:
+        check(options)
+        branch = read_branch(options.result)
+        files = _strip_files(branch, options) if options.out else {}
+        for path in (*files, *([Path(options.movie)] if options.movie else [])):
+            prepare(path)
+        if options.movie:
+            from branches.film import film
+
+            width = options.width / options.length * 2 * math.pi if options.width else None
+            files[Path(options.movie)] = film(branch, Path(options.movie).suffix.lower(), options.frames, width)
+        for path, data in files.items():
+            write_bytes(path, data)
+    except (ConfigError, StoreError) as error:
+        complain(f"error: {error}")
+        return EXIT_BAD_INPUT
+    for path, data in files.items():
+        write_output(f"written to {path} ({max(len(data) // 1000, 1)} kB)\n")
+    return 0
+
+
+def check(options) -> None:
+    """Check what can be checked without the result.
+
+    Raises
+    ------
+    ConfigError
+        An option that cannot be used; the sentence names it, its value and what is allowed.
+    """
+    from branches.config import ConfigError
+
+    if not options.out and not options.movie:
+        raise ConfigError("--out: is needed, as in --point LP --out strip.stl; or --movie, as in --movie fold.gif")
+    if options.out and not options.point:
+        raise ConfigError("--point: is needed with --out, as in --point LP")
+    for name in ("length", "width", "thickness"):
+        value = getattr(options, name)
+        if value is not None and not 1e-6 <= value <= 1e6:
+            raise ConfigError(f"--{name} {value:g}: must be from 1e-6 to 1e6")
+    if options.width is not None and options.width > options.length:
+        raise ConfigError(f"--width {options.width:g}: must not exceed the length, {options.length:g}")
+    if not _FRAMES[0] <= options.frames <= _FRAMES[1]:
+        raise ConfigError(f"--frames {options.frames}: must be from {_FRAMES[0]} to {_FRAMES[1]}")
+    names = [("--out", name, (*SURFACES, ".csv")) for name in options.out]
+    names += [("--movie", options.movie, MOVIES)] if options.movie is not None else []
+    seen = {Path(options.result).resolve(): "is the result itself"}
+    for option, name, endings in names:
+        path = Path(name)
+        if path.suffix.lower() not in endings:
+            raise ConfigError(f"{option} {name!r}: must end in {', '.join(endings[:-1])} or {endings[-1]}")
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{option} {name!r}: must be a file")
+        if path.resolve() in seen:
+            raise ConfigError(f"{option} {name!r}: {seen[path.resolve()]}; name another file")
+        seen[path.resolve()] = "is named twice"
+
+
+# --- which point ------------------------------------------------------------------------------------------------------
+
+
+def labelled_point(branch: StoredBranch, text: str) -> int:
+    """The number, in the table of points, of a labelled point that is asked for by its LAB (from 1) or its label.
+
+    Raises
+    ------
+    ConfigError
+        There is none, or there are several; the sentence lists what there is.
+    """
+    from branches.config import ConfigError
+
+    labels = [label.decode() for label in branch.events["label"]]
+    if text.isdecimal():
+        found = [int(text) - 1] if 1 <= int(text) <= len(labels) else []
+    else:
+        found = [row for row, label in enumerate(labels) if label == text.upper()]
+    if len(found) == 1:
+        return int(branch.events["point"][found[0]])
+    listed = ", ".join(
+        f"{row + 1} ({label} at kappa_n = {branch.events['kappa_n'][row]:.4f})"
+        for row, label in enumerate(labels)
+        if not found or row in found
+    )
+    problem = f"{len(found)} points have this label; name one by its number" if found else "there is no such labelled point"
+    raise ConfigError(f"--point {text!r}: {problem}: {listed or 'the result has none'}")
+
+
+# --- the strip --------------------------------------------------------------------------------------------------------
+
+
+def placed(branch: StoredBranch, point: int, length: float) -> tuple[Shape, ndarray]:
+    """The closed strip of a point, scaled and upright, and its strains (K, 3) in radians per unit of that length."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from ribbon_model.domains import LOOP
+
+    solution = branch.solution(point).on(LOOP)
+    shape = solution.shape().placed(length)
+    if not solution.law.has_rulings:  # its cross sections stay straight along d1
+        shape = replace(shape, eta=np.zeros_like(shape.eta))
+    return shape, solution.strains() * (2 * math.pi / length)
+
+
+def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
+    """The content of all files of --out."""
+    from branches.mesh_files import encode, library
+
+    endings = {name: Path(name).suffix.lower() for name in options.out}
+    for ending in endings.values():
+        if ending in SURFACES:
+            library(ending)
+    shape, strains = placed(branch, labelled_point(branch, options.point), options.length)
+    if ".csv" in endings.values():
+        table = _table(shape, strains)
+    if any(ending in SURFACES for ending in endings.values()):
+        mesh = _mesh(branch, shape, options)
+    fields = {"s": shape.arclength, "d1": shape.directors[:, 0], "d2": shape.directors[:, 1], "d3": shape.directors[:, 2]}
+    fields |= {f"omega_{i + 1}": strains[:, i] for i in range(3)}
+    return {Path(name): table if end == ".csv" else encode(mesh, end, fields) for name, end in endings.items()}
+
+
+def _table(shape: Shape, strains) -> bytes:
+    """Arclength, centreline, directors and strains as comma-separated values with a line of names."""
+    import numpy as np
+
+    names = ["s", "x", "y", "z", *(f"d{i}_{axis}" for i in (1, 2, 3) for axis in "xyz"), "omega_1", "omega_2", "omega_3"]
+    rows = np.column_stack([shape.arclength, shape.centreline, shape.directors.reshape(-1, 9), strains])
+    lines = [",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _mesh(branch: StoredBranch, shape: Shape, options):
+    from branches import solid
+    from branches.config import ConfigError
+
+    width, most = _width(branch, options), solid.widest(shape)
+    if width is None:
+        width = min(_WIDTH * options.length, _ROOM * most)
+        write_output(f"width {width:.6g}: the result knows none; change it with --width\n")
+    if width >= most:
+        raise ConfigError(f"--width {width:g}: must be below {most:.6g}, where generators of the surface begin to cross")
+    if options.thickness is None:
+        return solid.surface(shape, width)
+    most = min(solid.thickest(shape, width), width)
+    if options.thickness >= most:
+        raise ConfigError(
+            f"--thickness {options.thickness:g}: must be below {most:.6g}, the width or twice the smallest radius of curvature"
+        )
+    return solid.solid(shape, width, options.thickness)
+
+
+def _width(branch: StoredBranch, options) -> float | None:
+    """The width that is given, or that follows from the thickness and Gamma = w^2/(h L/2 pi) of the scene; None if neither."""
+    Gamma = branch.config["Gamma"]
+    if options.width is not None or options.thickness is None or not Gamma:
+        return options.width
+    return math.sqrt(Gamma * options.thickness * options.length / (2 * math.pi))
+
+
+# --- Ctrl-C -----------------------------------------------------------------------------------------------------------
+
+
+def _leave(number, frame):
+    """Ctrl-C while modules are imported: nothing is begun, and an exception amid an import would end in noise."""
+    os.write(2, b"interrupted\n")
+    os._exit(EXIT_INTERRUPTED)
+
+
+def _unwind_on_interrupt() -> None:
+    """From here on Ctrl-C is a KeyboardInterrupt, so that files that are begun are removed."""
+    if signal.getsignal(signal.SIGINT) is _leave:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+if __name__ == "__main__":
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave)
+    sys.exit(main())

@@ -1,0 +1,62 @@
+"""``ribbon COMMAND``: the same as ``python -m branches.COMMAND``."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+import time
+
+from branches import cli
+
+PROGRAM = ("-m", "branches.cli")
+
+
+def test_every_command_is_a_module_and_every_program_is_a_command(root):
+    assert all(importlib.util.find_spec(f"branches.{name}") for name in cli.COMMANDS)
+    programs = {path.stem for path in (root / "branches").glob("*.py") if '__name__ == "__main__"' in path.read_text()}
+    programs |= {path.parent.name for path in (root / "branches").glob("*/__main__.py")}
+    assert programs - {"cli"} == set(cli.COMMANDS)
+
+
+def test_help_lists_all_and_imports_nothing_heavy(command):
+    # the best of three: other tests run at the same time
+    seconds = []
+    for _ in range(3):
+        began = time.perf_counter()
+        done = command("--help", program=PROGRAM)
+        seconds.append(time.perf_counter() - began)
+    assert done.returncode == 0 and all(f"  {name} " in done.out for name in cli.COMMANDS)
+    assert all(len(line) < 100 for line in done.out.splitlines())
+    assert min(seconds) < 0.2
+    code = (
+        "import sys; from branches import cli; cli.main(['--help']); print('numpy' in sys.modules, 'argparse' in sys.modules)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(os.path.dirname(os.path.dirname(cli.__file__)))}
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment).stdout
+    assert said.endswith("False False\n")
+
+
+def test_a_command_does_the_same_as_its_module(command):
+    for name, words in {
+        "run": ["none.yaml"],
+        "paper": ["--out", "p", "nix"],
+        "strip": ["--width", "x"],
+        "export": ["x.h5"],
+    }.items():
+        ours = command(name, *words, program=PROGRAM)
+        theirs = command(*words, program=("-m", f"branches.{name}"))
+        assert (ours.returncode, ours.out, ours.err) == (theirs.returncode, theirs.out, theirs.err)
+        assert ours.returncode == 2
+
+
+def test_an_unknown_command_is_answered_in_one_sentence(call):
+    done = call(cli.main, "rum")
+    assert done.returncode == 2 and done.err.startswith("error: there is no command 'rum'; known are run, ")
+    assert call(cli.main).err.startswith("error: a command is needed; known are run, ")
+
+
+def test_it_is_installed_as_ribbon(root):
+    import tomllib
+
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["scripts"] == {"ribbon": "branches.cli:main"}
