@@ -4,7 +4,6 @@ import importlib.util
 import os
 import subprocess
 import sys
-import time
 
 from branches import cli
 
@@ -19,15 +18,9 @@ def test_every_command_is_a_module_and_every_program_is_a_command(root):
 
 
 def test_help_lists_all_and_imports_nothing_heavy(command):
-    # the best of three: other tests run at the same time
-    seconds = []
-    for _ in range(3):
-        began = time.perf_counter()
-        done = command("--help", program=PROGRAM)
-        seconds.append(time.perf_counter() - began)
+    done = command("--help", program=PROGRAM)
     assert done.returncode == 0 and all(f"  {name} " in done.out for name in cli.COMMANDS)
     assert all(len(line) < 100 for line in done.out.splitlines())
-    assert min(seconds) < 0.2
     code = (
         "import sys; from branches import cli; cli.main(['--help']); print('numpy' in sys.modules, 'argparse' in sys.modules)"
     )
