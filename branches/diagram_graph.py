@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from branches import interrupt
 from branches.files import StoreError, write_bytes
 from branches.labels import SPECIAL, kind_of
 from branches.names import DIAGRAM, GRAPHML
@@ -317,8 +318,9 @@ def save(graph, folder: Path) -> tuple[Path, Path]:
     for a, b, data in graph.edges(data=True):
         plain.add_edge(a, b, **{k: json.dumps(v) if isinstance(v, list) else v for k, v in data.items()})
     paths = folder / DIAGRAM, folder / GRAPHML
-    write_bytes(paths[0], text.encode())
-    write_bytes(paths[1], "\n".join(networkx.generate_graphml(plain)).encode())
+    with interrupt.held():  # both or none
+        write_bytes(paths[0], text.encode())
+        write_bytes(paths[1], "\n".join(networkx.generate_graphml(plain)).encode())
     return paths
 
 
