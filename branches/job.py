@@ -7,7 +7,7 @@ import signal
 import time
 from pathlib import Path
 
-from branches.config import Config, ConfigError, dump, parse
+from branches.config import Config, ConfigError, difference, dump, parse
 from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
 from branches.start import UntilPrimary, seed, settings_of
@@ -17,7 +17,7 @@ from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 
 #: Fields that a resumed run may change: where to stop and what to label, nothing that alters the points.
-_CHANGEABLE = ("title", "limits", "zeros", "stride")
+_CHANGEABLE = ("title", "limits", "zeros", "stride", "steps.max_points")
 
 
 def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=False) -> str:
@@ -164,7 +164,7 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
         if resume:
             raise
         raise StoreError(f"{str(path)!r} exists and is no readable result of this program; --overwrite replaces it") from error
-    different = _different(stored, config, resume)
+    different = difference(stored, config, _CHANGEABLE if resume else ())
     if different:
         advice = "resume with the same config" if resume else "--overwrite replaces it, --out writes elsewhere"
         raise StoreError(f"{str(path)!r} holds another scene ({different}); {advice}")
@@ -174,17 +174,6 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
         return None
     goes_on = reason in ("limit", "max points") and stored != config
     return stop if status == "complete" and not goes_on else None
-
-
-def _different(stored: Config, config: Config, resume: bool) -> str:
-    """The first field in which two scenes differ, among those that matter."""
-    a, b = stored.model_dump(), config.model_dump()
-    if resume:
-        a["steps"].pop("max_points"), b["steps"].pop("max_points")
-    for name in a:
-        if a[name] != b[name] and not (resume and name in _CHANGEABLE):
-            return f"{name} = {a[name]!r} there, {b[name]!r} here"
-    return ""
 
 
 class _Interruption:
