@@ -158,7 +158,7 @@ def _summary(config, graph, failed, left_out, seconds, folder) -> list[str]:
     lines = [
         f"{config.title or 'diagram'}: {len(diagram_graph.families(graph))} branches in {seconds:.2f} s",
         f"  {nodes.count('circle')} bifurcations of circles, {nodes.count('fold')} folds, "
-        f"{nodes.count('leaves')} branches that leave through a limit",
+        f"{nodes.count('leaves')} branches that end at a limit of the scene",
     ]
     if left_out:
         lines.append(f"  {len(left_out)} more are the same branches from their other ends")
