@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -386,6 +387,25 @@ def dump(config: Config | DiagramConfig) -> str:
     """The YAML text of a scene, fields at their defaults left out; `parse` reads it back."""
     values = config.values if isinstance(config, DiagramConfig) else config.model_dump(mode="json", exclude_defaults=True)
     return yaml.dump(values, Dumper=_Dumper, sort_keys=False)
+
+
+def difference(stored: Config, config: Config, ignored: Sequence[str] = ()) -> str:
+    """The first field in which the scene of a file differs from another scene, in words; '' if they agree.
+
+    Parameters
+    ----------
+    ignored : sequence of str
+        Fields that may differ: ``title``, or ``steps.max_points`` for one inside another.
+    """
+    a, b = stored.model_dump(), config.model_dump()
+    for field in ignored:
+        name, _, inner = field.partition(".")
+        for values in (a, b):
+            (values[name] if inner else values).pop(inner or name)
+    for name in a:
+        if a[name] != b[name]:
+            return f"{name} = {a[name]!r} there, {b[name]!r} here"
+    return ""
 
 
 def _yaml(text: str, name: str) -> Any:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from pathlib import Path
 
 from branches import diagram_graph
-from branches.config import Config, DiagramConfig, dump
+from branches.config import Config, ConfigError, DiagramConfig, difference, dump, parse
 from branches.executor import WAIT, executor, run_jobs, trouble
-from branches.files import only_run, prepare, write_bytes
+from branches.files import StoreError, only_run, prepare, write_bytes
 from branches.names import DIAGRAM, primary_file
 from branches.read import complete_run, read_branch
 
 
 def compute(text: str) -> tuple[bytes, str]:
     """One branch from the text of its scene: the image of its file, and how it ended. Runs anywhere."""
-    from branches.config import parse
     from branches.display import Display
     from branches.job import compute_branch
 
@@ -79,19 +79,53 @@ def run_diagram(
     Raises
     ------
     StoreError
-        The folder cannot be written to, or another run is writing to it.
+        The folder cannot be written to, another run is writing to it, or it holds another scene and ``overwrite`` is not set.
     ExecutorError
         The scheduler cannot be used.
     """
     began, folder, graph = time.perf_counter(), Path(folder), diagram_graph.new_graph(config.title)
     prepare(folder / DIAGRAM)
     with only_run(folder / DIAGRAM):
+        if not overwrite:
+            _refuse_another_scene(config, folder)
         run = executor(scheduler, workers, time_limit)
         failed, left_out = _compute_missing(config, folder, graph, display, run, overwrite)
         graph.graph.update({"config": dump(config), "failed": json.dumps(failed), "absent": json.dumps(config.absent)})
         diagram_graph.save(graph, folder)
     display.diagram_summary(_summary(config, graph, failed, left_out, time.perf_counter() - began, folder))
     return "lost" if failed else "complete"
+
+
+def _refuse_another_scene(config: DiagramConfig, folder: Path) -> None:
+    """StoreError where a branch in the folder would be replaced, or would be in no diagram any more.
+
+    A scene that has the same branches and more is not another scene.
+    """
+    advice = "--overwrite replaces its diagram, --out writes elsewhere"
+    ours = {primary_file(one): one for one in config.branches}
+    stored = _stored_scenes(folder, ours, advice)
+    for name, scene in stored.items():
+        differs = difference(scene, ours[name]) if name in ours else ""
+        if differs:
+            raise StoreError(f"{str(folder)!r} holds another scene ({name}: {differs}); {advice}")
+        if name not in ours:
+            raise StoreError(f"{str(folder)!r} holds another scene ({name} is no branch of this one); {advice}")
+
+
+def _stored_scenes(folder: Path, names, advice: str) -> dict[str, Config]:
+    """The scenes of the branches that a folder holds by its diagram, and by those of its files that have one of the names."""
+    found = {}
+    if (folder / DIAGRAM).exists():
+        try:
+            text = diagram_graph.read(folder).graph["config"]
+            scene = parse(text, DIAGRAM)
+        except (StoreError, ConfigError, KeyError) as error:
+            raise StoreError(f"{str(folder)!r} holds a diagram that is no result of branches.run; {advice}") from error
+        found = {primary_file(one): one for one in scene.branches}
+    for name in names:
+        with contextlib.suppress(StoreError, ConfigError):  # what cannot be read is computed again
+            found[name] = Config.model_validate(read_branch(folder / name).config)
+    return found
 
 
 def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[dict[str, str], list[Config]]:
@@ -124,7 +158,7 @@ def _summary(config, graph, failed, left_out, seconds, folder) -> list[str]:
     lines = [
         f"{config.title or 'diagram'}: {len(diagram_graph.families(graph))} branches in {seconds:.2f} s",
         f"  {nodes.count('circle')} bifurcations of circles, {nodes.count('fold')} folds, "
-        f"{nodes.count('leaves')} branches that leave through a limit",
+        f"{nodes.count('leaves')} branches that end at a limit of the scene",
     ]
     if left_out:
         lines.append(f"  {len(left_out)} more are the same branches from their other ends")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from branches import interrupt
 from branches.files import StoreError, write_bytes
 from branches.labels import SPECIAL, kind_of
 from branches.names import DIAGRAM, GRAPHML
@@ -69,7 +70,7 @@ def add_branch(graph, branch, name: str) -> bool:
             piece["force"] = np.sqrt(values["R1"] ** 2 + values["R2"] ** 2 + values["R3"] ** 2).tolist()
     if "index" in branch.points.dtype.names:
         for piece, values in zip(pieces, rows):
-            piece["index"] = _common_index(values["index"])
+            piece["index"] = common_index(values["index"])
     return connect(graph, family, nodes, pieces, file=name)
 
 
@@ -106,7 +107,7 @@ def same_place(a: dict, b: dict) -> bool:
     return all(abs(a[column] - b[column]) < _SAME * (1 + abs(b[column])) for column in columns)
 
 
-def _common_index(values) -> int:
+def common_index(values) -> int:
     """The index on a piece between special points: one number, or -1 where it is undecided or changes unexplained."""
     decided = set(values[1:-1][values[1:-1] >= 0].tolist())
     return decided.pop() if len(decided) == 1 else -1
@@ -299,7 +300,7 @@ def describe_node(node) -> str:
     if node["kind"] == "circle":
         return f"circle {node['covering']} at {node['kappa_n']:.6f}"
     if node["kind"] == "leaves":
-        return f"leaves at {node['kappa_n']:.10g}"
+        return f"leaves at {node['kappa_n']:.10g}, a limit of the scene"
     return f"{node['kind']} at {node['kappa_n']:.6f}"
 
 
@@ -317,8 +318,9 @@ def save(graph, folder: Path) -> tuple[Path, Path]:
     for a, b, data in graph.edges(data=True):
         plain.add_edge(a, b, **{k: json.dumps(v) if isinstance(v, list) else v for k, v in data.items()})
     paths = folder / DIAGRAM, folder / GRAPHML
-    write_bytes(paths[0], text.encode())
-    write_bytes(paths[1], "\n".join(networkx.generate_graphml(plain)).encode())
+    with interrupt.held():  # both or none
+        write_bytes(paths[0], text.encode())
+        write_bytes(paths[1], "\n".join(networkx.generate_graphml(plain)).encode())
     return paths
 
 

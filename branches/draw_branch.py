@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
-from branches.draw_diagram import smooth
-from branches.labels import label_of
+from branches.diagram_graph import common_index
+from branches.draw_diagram import colour_of, smooth
+from branches.labels import SPECIAL, kind_of, label_of
 from contin import exact_text
 from ribbon_model.laws import label as name_law
 
-CURVE, SHAPE, BACK = "#0072B2", "#E8A33D", "#7A5195"
+SHAPE, BACK = "#E8A33D", "#7A5195"
+#: Dashes and legend of pieces, by whether they are stable; None: not known.
+_LINES = {True: ("-", "stable"), False: ((0, (4, 2)), "unstable"), None: ("-", None)}
+#: Kinds of `branches.labels` that the legend says in other words.
+_WORDS = {"leaves": "limit of the scene", "circle": "bifurcation of a circle"}
 
 
 def figure(branch, shapes: int = 6, width: float = 0.3):
@@ -57,14 +64,18 @@ def choose(branch, count: int) -> list[int]:
 def curve(axes, branch, chosen) -> None:
     """kappa* against kappa_n, with marks at labelled points and letters at the strips drawn."""
     points, config = branch.points, branch.config
-    axes.plot(*smooth(points["arclength"], points["kappa_n"], points["kappa_star"]), color=CURVE, lw=1.6, zorder=1)
-    seen = set()
+    seen = {None, "branch point"}
+    for stable, kappa_n, kappa_star in lines(branch):
+        dashes, name = _LINES[stable]
+        axes.plot(kappa_n, kappa_star, color=colour_of(config["n"]), ls=dashes, lw=1.6, zorder=1, label=_once(name, seen))
     for event in branch.events:
-        mark = label_of(event["label"].decode())
-        label = None if mark.kind in seen or mark.kind == "branch point" else mark.kind
-        seen.add(mark.kind)
+        mark, name = label_of(event["label"].decode()), event["name"].decode()
+        kind = kind_of(event["label"].decode(), name, branch.reason, bool(config["origin"]))
+        label = _once(_WORDS.get(kind, kind), seen)
         place = event["kappa_n"], event["kappa_star"]
-        axes.scatter(*place, marker=mark.marker, color=mark.colour, s=mark.size, zorder=3, label=label)
+        fill = "white" if kind == "leaves" else mark.colour  # open: the branch goes on there
+        colours = {"color": mark.colour} if mark.marker == "x" else {"facecolor": fill, "edgecolor": mark.colour}
+        axes.scatter(*place, marker=mark.marker, s=mark.size, zorder=3, label=label, **colours)
         if event["label"] == b"LP":
             axes.annotate(f"{event['kappa_n']:.4f}", place, (9, -3), textcoords="offset points", fontsize=9)
     axes.set_xlabel(r"natural curvature $\kappa_n L/2\pi$")
@@ -74,17 +85,44 @@ def curve(axes, branch, chosen) -> None:
     axes.grid(alpha=0.25)
     axes.margins(0.1)
     axes.legend(frameon=False)
-    letters(axes, points, chosen)
+    letters(axes, points, chosen, colour_of(config["n"]))
 
 
-def letters(axes, points, chosen) -> None:
+def _once(name, seen: set):
+    """A name for the legend, or None if it has that already."""
+    label = None if name in seen else name
+    seen.add(name)
+    return label
+
+
+def lines(branch) -> list[tuple]:
+    """The pieces of a branch between special points, smooth: (stable, kappa_n, kappa_star); stable is None if not known.
+
+    A branch without the index is one piece.
+    """
+    points = branch.points
+    s, kappa_n, kappa_star = smooth(points["arclength"], points["arclength"], points["kappa_n"], points["kappa_star"])
+    if "index" not in points.dtype.names:
+        return [(None, kappa_n, kappa_star)]
+    special = [int(event["point"]) for event in branch.events if event["label"].decode() in SPECIAL]
+    ends = sorted({0, *special, len(points) - 1})
+    found = []
+    for first, last in pairwise(ends):
+        index = common_index(points["index"][first : last + 1])
+        low, high = points["arclength"][[first, last]]
+        here = (s >= low) & (s <= high)
+        found.append((None if index < 0 else index == 0, kappa_n[here], kappa_star[here]))
+    return found
+
+
+def letters(axes, points, chosen, colour) -> None:
     """Letters of the strips drawn, to the right of the curve as it goes; at a fold, which has a number there, to its left."""
     axes.autoscale_view()
     place = axes.transData.transform(np.column_stack([points["kappa_n"], points["kappa_star"]]))
     for column, number in enumerate(chosen):
         label, here = points["label"][number], (points["kappa_n"][number], points["kappa_star"][number])
         if label == b"":
-            axes.scatter(*here, s=14, color=CURVE, zorder=2)
+            axes.scatter(*here, s=14, color=colour, zorder=2)
         way = place[min(number + 1, len(place) - 1)] - place[max(number - 1, 0)]
         right = np.array([way[1], -way[0]]) / (np.hypot(*way) or 1.0) * (-13 if label == b"LP" else 13)
         axes.annotate(

@@ -22,6 +22,11 @@ _SECONDARY_STYLE = (SECONDARY, (0, (3, 1)))
 _POWERS = (1.0, 1.7, 0.6, 3.0, 0.35)
 
 
+def colour_of(n: int) -> str:
+    """The colour of a wavenumber."""
+    return STYLES.get(n, _OTHER)[0]
+
+
 @dataclass(frozen=True)
 class Line:
     """A branch to draw.

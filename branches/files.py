@@ -13,6 +13,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from branches import interrupt
 from contin import temporary_name, write_whole
 
 #: Bytes that the smallest result takes, for a look at the disk before anything is computed.
@@ -32,7 +33,8 @@ def write_bytes(path: Path, data: bytes) -> None:
         It cannot be written.
     """
     try:
-        write_whole(path, data)
+        with interrupt.held():
+            write_whole(path, data)
     except OSError as error:
         raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
 
@@ -141,10 +143,11 @@ def prepare(path: Path) -> None:
         if path.exists() and not os.access(path, os.W_OK):
             raise StoreError(f"cannot write {str(path)!r}: the file is read-only")
         probe = temporary_name(path)
-        try:
-            write_whole(probe, bytes(_SMALLEST))
-        finally:
-            probe.unlink(missing_ok=True)
+        with interrupt.held():
+            try:
+                write_whole(probe, bytes(_SMALLEST))
+            finally:
+                probe.unlink(missing_ok=True)
         for left in path.parent.glob(f".{glob.escape(path.name[:50])}.????????.part"):
             if time.time() - left.stat().st_mtime > 60:  # not of a run that is writing right now
                 left.unlink()

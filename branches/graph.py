@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from branches import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin(interrupt.NO_FILES)
+
 import argparse
 import sys
 from collections.abc import Iterable
@@ -75,4 +80,4 @@ def _answers(graph, options) -> Iterable[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.run(main))

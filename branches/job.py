@@ -7,7 +7,7 @@ import signal
 import time
 from pathlib import Path
 
-from branches.config import Config, ConfigError, dump, parse
+from branches.config import Config, ConfigError, difference, dump, parse
 from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
 from branches.start import UntilPrimary, seed, settings_of
@@ -17,7 +17,7 @@ from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 
 #: Fields that a resumed run may change: where to stop and what to label, nothing that alters the points.
-_CHANGEABLE = ("title", "limits", "zeros", "stride")
+_CHANGEABLE = ("title", "limits", "zeros", "stride", "steps.max_points")
 
 
 def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=False) -> str:
@@ -36,10 +36,25 @@ def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=F
     path = Path(path)
     if not path.exists():
         if resume:
-            raise StoreError(f"--resume: there is no file {str(path)!r}")
+            display.note(f"--resume: there is no file {str(path)!r}; the run starts from the beginning")
+            resume = False
         prepare(path)  # makes its folder, where the lock is to lie
     with only_run(path):
         return _run_branch(config, path, display, resume, overwrite)
+
+
+def whole_branch(config: Config, path: Path, display) -> None:
+    """Follow the branch of ``config`` into the file ``path``, for a caller that has no use for a piece of it.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        The run was asked to stop; the file holds what there is.
+    StoreError, ConfigError
+        As of `run_branch`.
+    """
+    if run_branch(config, path, display, overwrite=True) == "interrupted":
+        raise KeyboardInterrupt
 
 
 def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bool) -> str:
@@ -52,17 +67,20 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
     (run, watch), image = _resumed(config, path) if resume else (begun(config), None)
     with contextlib.closing(_writer(path, config, run, watch, image)) as writer:
         display.begin(config, writer.count, len(writer.events()))
-        outcome = _follow(config, run, writer, display)
+        outcome = _follow(config, run, writer, display, _Interruption())
         seconds = time.perf_counter() - began
         display.summary(config, writer.events(), writer.count, seconds, path, outcome, run.stop)
     return outcome
 
 
 def compute_branch(config: Config, display) -> tuple[bytes, str]:
-    """The branch of ``config`` as the image of its file, and how it ended; nothing touches a disk here."""
+    """The branch of ``config`` as the image of its file, and how it ended; nothing touches a disk here.
+
+    Ctrl-C does what it did before the call: a piece of a branch in memory is of no use.
+    """
     run, watch = begun(config)
     with contextlib.closing(_writer(None, config, run, watch)) as writer:
-        outcome = _follow(config, run, writer, display)
+        outcome = _follow(config, run, writer, display, _Interruption(()))
         return writer.image(), outcome
 
 
@@ -114,9 +132,9 @@ def _resumed(config: Config, path: Path):
     return (_kind(config)(state.system, state.x, settings, state=state, start=start), watch), image
 
 
-def _follow(config: Config, run: Continuation, writer: BranchWriter, display) -> str:
+def _follow(config: Config, run: Continuation, writer: BranchWriter, display, interruption: _Interruption) -> str:
     """Take all points of a run to the file; how it ended."""
-    with _Interruption() as interruption:
+    with interruption:
         for point in run:
             point, number = checked(point, run, config), writer.count
             writer.append(point)
@@ -146,7 +164,7 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
         if resume:
             raise
         raise StoreError(f"{str(path)!r} exists and is no readable result of this program; --overwrite replaces it") from error
-    different = _different(stored, config, resume)
+    different = difference(stored, config, _CHANGEABLE if resume else ())
     if different:
         advice = "resume with the same config" if resume else "--overwrite replaces it, --out writes elsewhere"
         raise StoreError(f"{str(path)!r} holds another scene ({different}); {advice}")
@@ -158,28 +176,17 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
     return stop if status == "complete" and not goes_on else None
 
 
-def _different(stored: Config, config: Config, resume: bool) -> str:
-    """The first field in which two scenes differ, among those that matter."""
-    a, b = stored.model_dump(), config.model_dump()
-    if resume:
-        a["steps"].pop("max_points"), b["steps"].pop("max_points")
-    for name in a:
-        if a[name] != b[name] and not (resume and name in _CHANGEABLE):
-            return f"{name} = {a[name]!r} there, {b[name]!r} here"
-    return ""
-
-
 class _Interruption:
     """Ctrl-C, SIGTERM or a closed terminal ask the run to stop after the current point; a second time, at once."""
 
     _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
-    def __init__(self):
-        self.asked = False
+    def __init__(self, signals=_SIGNALS):
+        self.asked, self._signals = False, signals
         self._before = {}
 
     def __enter__(self):
-        for number in self._SIGNALS:
+        for number in self._signals:
             if signal.getsignal(number) is signal.SIG_IGN:  # nohup, or a job in the background: to be left alone
                 continue
             try:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
+
+from branches import interrupt
 
 # Nothing heavy is imported here: `--help` and mistakes in the command line answer at once.
 
-EXIT_BAD_INPUT, EXIT_STOPPED_SHORT, EXIT_INTERRUPTED = 2, 1, 130
+EXIT_BAD_INPUT, EXIT_STOPPED_SHORT = 2, 1
 
 
 def arguments(argv=None):
@@ -34,21 +35,18 @@ def arguments(argv=None):
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run a scene of many branches on a Dask cluster instead")
     parser.add_argument("--quiet", action="store_true", help="print the summary only")
     existing = parser.add_mutually_exclusive_group()
-    existing.add_argument("--resume", action="store_true", help="go on with an unfinished result file")
+    existing.add_argument("--resume", action="store_true", help="go on with an unfinished result file; without one, start")
     existing.add_argument("--overwrite", action="store_true", help="replace a result file of another scene")
     return parser.parse_args(argv)
 
 
 def main(argv=None) -> int:
     """Run the command; the exit code."""
-    from branches.display import complain, survive_any_encoding, write_output
+    from branches.display import survive_any_encoding, write_output
 
     survive_any_encoding()
     try:
         return _run(arguments(argv))
-    except KeyboardInterrupt:
-        complain("interrupted")
-        return EXIT_INTERRUPTED
     finally:
         write_output()
 
@@ -74,11 +72,12 @@ def _run(options) -> int:
     except (ConfigError, StoreError, ContinError) as error:
         display.clear()
         return _refuse(error)
-    return {"complete": 0, "interrupted": EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
+    return {"complete": 0, "interrupted": interrupt.EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
 
 
 def _run_diagram(config, options) -> int:
     """A scene of many branches, into a folder."""
+    interrupt.change(interrupt.BRANCHES_KEPT)
     from pathlib import Path
 
     from branches.config import ConfigError
@@ -98,8 +97,6 @@ def _run_diagram(config, options) -> int:
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
     display = Display(quiet=options.quiet)
-    if signal.getsignal(signal.SIGINT) is _leave:
-        signal.signal(signal.SIGINT, _leave_diagram)
     try:
         outcome = run_diagram(
             config, folder, display, scheduler=options.scheduler, workers=options.workers, time_limit=options.time_limit,
@@ -148,27 +145,6 @@ def output_path(options):
     return path
 
 
-def _unlock() -> None:
-    files = sys.modules.get("branches.files")
-    if files is not None and hasattr(files, "unlock_all"):  # it may be half imported
-        files.unlock_all()
-
-
-def _leave(number, frame):
-    """Ctrl-C before the first point: nothing is lost, and an exception amid a compilation would end in noise."""
-    _unlock()
-    os.write(2, b"interrupted\n")
-    os._exit(EXIT_INTERRUPTED)
-
-
-def _leave_diagram(number, frame):
-    """Ctrl-C: every finished branch is in its file; processes that compute others end when this one does."""
-    _unlock()
-    os.write(2, b"\ninterrupted; finished branches are kept, and the same command computes what is missing\n")
-    os._exit(EXIT_INTERRUPTED)
-
-
 if __name__ == "__main__":
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _leave)
-    sys.exit(main())
+    interrupt.begin()
+    sys.exit(interrupt.run(main))

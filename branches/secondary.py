@@ -6,6 +6,11 @@ those scenes from the labelled points SB of a result, runs them, and puts the br
 
 from __future__ import annotations
 
+from branches import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin(interrupt.BRANCHES_KEPT)
+
 import argparse
 import json
 import sys
@@ -208,7 +213,8 @@ def main(argv=None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m branches.secondary", allow_abbrev=False,
         description="Follow the branches that leave a primary branch at its secondary bifurcations, and put them in a diagram.",
-        epilog="Exit code: 0 done, 1 some branch could not be followed to its end (the diagram says why), 2 bad input.",
+        epilog="Exit code: 0 done, 1 some branch could not be followed to its end (the diagram says why), 2 bad input, "
+        "130 interrupted.",
     )  # fmt: skip
     parser.add_argument("result", help="file of a primary branch with its index (stability: true), or a diagram's folder")
     parser.add_argument("--out", metavar="DIR", help="folder (default: the diagram's own; NAME_secondary beside a file)")
@@ -235,4 +241,4 @@ def main(argv=None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.run(main))

@@ -6,6 +6,11 @@ out-of-plane vibration. `branches.shell_deck` writes the decks and reads the ans
 
 from __future__ import annotations
 
+from branches import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin("finished cases are kept, and the same command computes the others")
+
 import argparse
 import contextlib
 import io
@@ -295,7 +300,7 @@ def compute(cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], 
     version()
     prepare(path)
     stop, waiting, count = threading.Event(), iter(missing), len(missing)
-    with only_run(path), ThreadPoolExecutor(cores()) as pool:
+    with interrupt.unwinding(), only_run(path), ThreadPoolExecutor(cores()) as pool:
         try:
             jobs = run_jobs(lambda running: next(waiting, None), lambda case: solve(case, stop.is_set), pool.submit, cores())
             for number, (_, outcome) in enumerate(jobs, 1):
@@ -408,12 +413,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (ShellError, StoreError) as error:
         complain(f"error: {error}")
         return 2
-    except KeyboardInterrupt:
-        complain("interrupted; what was done is kept")
-        return 130
     write_output("\n".join(["", *map(describe, outcomes), ""]))
     return 1 if any(outcome.problem for outcome in outcomes) else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.run(main))

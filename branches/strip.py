@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from branches import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin(interrupt.NO_FILES)
+
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -291,4 +296,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.run(main))

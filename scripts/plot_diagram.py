@@ -30,13 +30,13 @@ def main(argv=None) -> int:
     try:
         out = picture_path(options)
         graph = read(options.diagram)
-        law, nu = choose(graph, options.law, options.nu)
+        law, nu, more = choose(graph, options.law, options.nu)
         check_picture(out)
         write_picture(figure(graph, law, nu, tuple(options.window), not options.plain), out)
     except (ConfigError, StoreError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print(f"written to {out}")
+    print(f"{more}written to {out}")
     return 0
 
 
@@ -52,7 +52,7 @@ def picture_path(options) -> Path:
 
 
 def choose(graph, law, nu):
-    """The law and nu to draw: those asked for, or the first that the diagram has."""
+    """The law and nu to draw: those asked for, or the first that the diagram has; and a line that says so."""
     from branches.diagram_graph import families
     from branches.files import StoreError
     from contin import exact_text
@@ -62,7 +62,10 @@ def choose(graph, law, nu):
     if not found:
         known = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in have)
         raise StoreError(f"--law {law} --nu {nu}: the diagram has {known}")
-    return found[0]
+    law, nu = found[0]
+    others = ", ".join(f"{name} nu = {exact_text(value)}" for name, value in found[1:])
+    more = f"drawn: {law}, nu = {exact_text(nu)}; the diagram also has {others} (--law, --nu)\n" if others else ""
+    return law, nu, more
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from branches import interrupt
+
 EXIT_BAD_INPUT = 2
 
 
@@ -65,4 +67,5 @@ def _page_path(out: str):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    interrupt.begin("no page was written")
+    sys.exit(interrupt.run(main))

@@ -29,13 +29,18 @@ def library() -> tuple[str, str]:
     return get_plotlyjs(), "\n".join(file.read_text(encoding="utf-8") for file in licences)
 
 
+def _title(data: dict) -> str:
+    """The title of results without one: it names their laws."""
+    return f"Equilibria of a closed strip: {', '.join(dict.fromkeys(family['law'] for family in data['families']))}"
+
+
 def assemble(data: dict) -> str:
     """The page that shows ``data``, as of `gather.gather`."""
     folder = resources.files(__package__)
     template, style, *scripts = ((folder / name).read_text(encoding="utf-8") for name in ("page.html", "page.css", *SCRIPTS))
     code, licence = library()
     parts = {
-        "title": html.escape(data["title"] or "Equilibria of a closed ribbon"), "style": style, "library": code,
+        "title": html.escape(data["title"] or _title(data)), "style": style, "library": code,
         "licence": html.escape(licence).replace("--", "- -"), "program": "\n".join(scripts),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }  # fmt: skip

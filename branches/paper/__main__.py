@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from branches import interrupt
+
+if __name__ == "__main__":  # before the imports below, which take a second
+    interrupt.begin("finished items are on the page")
+
 import importlib
 import sys
 import time
@@ -47,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = Parser(
         prog="python -m branches.paper",
         description="The tables and figures of Audoly & Seffen (2015): pictures, and a page (index.md, index.html) where each "
-        "published number stands beside ours. The page holds the items of this call.",
+        "published number stands beside ours. Items that earlier calls put on the page stay there.",
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder to write to, made if it is not there")
     parser.add_argument("items", nargs="*", metavar="ITEM", help=f"any of {', '.join(ITEMS)} (default: all)")
@@ -58,33 +63,32 @@ def main(argv: Sequence[str] | None = None) -> int:
         complain(f"error: there is no item {', '.join(map(repr, unknown))}; known are {', '.join(ITEMS)}")
         return 2
     folder = Path(options.out)
+    from branches.files import StoreError, prepare
+
     try:
-        _try_writing(folder)
+        prepare(folder / "index.md")  # before the work, not after it
         _compute(folder, list(dict.fromkeys(options.items)) or list(ITEMS))
+    except StoreError as error:
+        complain(f"error: {error}")
+        return 2
     except OSError as error:
         complain(f"error: cannot write to {folder}: {error.strerror or error}")
         return 2
     return 0
 
 
-def _try_writing(folder: Path) -> None:
-    """Find out before the work, not after it, that the folder cannot be written to."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "index.md").open("a"):
-        pass
-
-
 def _compute(folder: Path, names: list[str]) -> None:
-    from branches.paper.page import write
+    from branches.paper.page import read, write
 
-    sections = []
+    sections = read(folder)
     for name in names:
         began = time.monotonic()
-        sections.append(ITEMS[name](folder))
-        write(folder, sections)  # after each item: an interrupted call leaves a page of what was done
-        write_output(f"{name}: {sections[-1].title} ({time.monotonic() - began:.1f} s)\n")
+        sections[name] = ITEMS[name](folder)
+        # after each item: an interrupted call leaves a page of what was done
+        write(folder, {one: sections[one] for one in ITEMS if one in sections})
+        write_output(f"{name}: {sections[name].title} ({time.monotonic() - began:.1f} s)\n")
     write_output(f"written to {folder / 'index.html'}\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.run(main))

@@ -11,7 +11,7 @@ from branches.diagram import run_diagram
 from branches.display import Display
 from branches.draw_branch import figure as draw_branch
 from branches.draw_diagram import figure as draw_diagram
-from branches.job import run_branch
+from branches.job import whole_branch
 from branches.paper.draw import keep
 from branches.paper.page import Row, Section
 from branches.preview import preview
@@ -34,7 +34,7 @@ FOLDS_PUBLISHED, FOLD_PUBLISHED = {"ribbon": "1"}, {("ribbon", 1, 2): "4.08"}
 def fig11(folder: Path) -> Section:
     """The branch (1, 2) by collocation, with shapes along it."""
     path = folder / "fig11.h5"
-    run_branch(parse(FIG11, "fig11"), path, Display(silent=True), overwrite=True)
+    whole_branch(parse(FIG11, "fig11"), path, Display(silent=True))
     branch = read_branch(path)
     start, fold, end = branch.events["kappa_n"]
     star = branch.events["kappa_star"]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
-from branches.files import write_picture
+from branches.files import write_bytes, write_picture
 
 STABLE, UNSTABLE, MODES, RIGID = "#0072B2", "#D55E00", "#8a6d3b", "#000000"
 UNSTABLE_FILL = "#F3B48B"
@@ -29,8 +30,10 @@ def keep(figure, folder: Path, name: str) -> str:
 
 
 def save(figure, folder: Path, name: str) -> str:
-    """Write name.png and name.svg; the name. Raises OSError."""
-    figure.savefig(folder / f"{name}.png", dpi=150)
-    figure.savefig(folder / f"{name}.svg", dpi=200, metadata={"Date": None})
+    """Write name.png and name.svg; the name. Raises `branches.files.StoreError`."""
+    for suffix, more in ((".png", {"dpi": 150}), (".svg", {"dpi": 200, "metadata": {"Date": None}})):
+        picture = io.BytesIO()
+        figure.savefig(picture, format=suffix[1:], **more)
+        write_bytes(folder / f"{name}{suffix}", picture.getvalue())
     pyplot().close(figure)
     return name

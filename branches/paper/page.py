@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import html
-from dataclasses import dataclass, field
+import json
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+
+from branches import interrupt
+from branches.files import StoreError, write_bytes
 
 
 @dataclass(frozen=True)
@@ -71,10 +75,37 @@ LEAD = (
 )
 
 
-def write(folder: Path, sections: list[Section]) -> None:
-    """Write index.md and index.html. Raises OSError if the folder cannot be written to."""
-    (folder / "index.md").write_text(markdown(sections), encoding="utf-8")
-    (folder / "index.html").write_text(page(sections), encoding="utf-8")
+#: The sections of the page by item, for calls that add others.
+STORED = "index.json"
+
+
+def read(folder: Path) -> dict[str, Section]:
+    """The sections that earlier calls put on the page of a folder, by item.
+
+    Raises
+    ------
+    StoreError
+        They cannot be read.
+    """
+    path = folder / STORED
+    if not path.exists():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {name: Section(**{**one, "rows": [Row(**row) for row in one["rows"]]}) for name, one in found.items()}
+    except OSError as error:
+        raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise StoreError(f"cannot read {str(path)!r}: it was not written by this program; remove it") from error
+
+
+def write(folder: Path, sections: dict[str, Section]) -> None:
+    """Write index.md, index.html and what `read` reads. Raises StoreError if they cannot be written."""
+    stored = {name: asdict(section) for name, section in sections.items()}
+    with interrupt.held():  # all or none
+        write_bytes(folder / STORED, json.dumps(stored, indent=1, default=float).encode())
+        write_bytes(folder / "index.md", markdown([*sections.values()]).encode())
+        write_bytes(folder / "index.html", page([*sections.values()]).encode())
 
 
 def markdown(sections: list[Section]) -> str:

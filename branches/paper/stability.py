@@ -12,7 +12,7 @@ from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.diagram import run_diagram
 from branches.display import Display
-from branches.job import run_branch
+from branches.job import whole_branch
 from branches.paper.diagram import FIG12, LAWS, NU, WINDOW
 from branches.paper.draw import STABLE, UNSTABLE, keep
 from branches.paper.page import Row, Section
@@ -111,7 +111,7 @@ def _with_secondary_bifurcations(folder: Path, law, nu, m, n) -> list[dict]:
     """The pieces of a branch, cut where its index changes."""
     path = folder / f"index_{law.replace(' ', '_')}_m{m}_n{n}.h5"
     scene = f"{{law: {law}, nu: {nu}, m: {m}, n: {n}, stability: true, limits: {{kappa_n: [-100, 100]}}, stride: 50}}"
-    run_branch(parse(scene, "fig12b"), path, Display(silent=True), overwrite=True)
+    whole_branch(parse(scene, "fig12b"), path, Display(silent=True))
     graph = diagram.new_graph()
     diagram.add_branch(graph, read_branch(path), path.name)
     return [data for _, _, data in graph.edges(data=True)]

@@ -63,6 +63,8 @@ class Branch:
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
         """Draw one column against another, with marks at labelled points.
 
+        Where the index is known (`VariationalProblem`), stable parts are solid and unstable ones dashed.
+
         Parameters
         ----------
         x, y : str, optional

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ _MARKS = {
     "LP": ("*", "#D55E00"), "BP": ("o", "#000000"), "HB": ("s", "#009E73"), "UZ": ("D", "#CC79A7"), "CP": ("^", "#D55E00"),
 }  # fmt: skip
 _OTHER_MARK = (".", "#000000")
+#: Dashes and legend of pieces, by whether they are stable; None: not known.
+_LINES = {True: ("-", "stable"), False: ((0, (3, 2)), "unstable"), None: ("-", None)}
 #: Areas of the marks in points squared: a star needs a larger one to look as large.
 _AREA = {"*": 90, "": 30}
 
@@ -32,7 +35,12 @@ def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, ax
         except ImportError as error:
             raise ImportError("plot needs matplotlib, which is not installed: pip install matplotlib") from error
         axes = pyplot.subplots(layout="constrained")[1]
-    axes.plot(across, up, lw=1.5, color="#0072B2", zorder=1)
+    named = set()
+    for stable, piece in _pieces(points):
+        dashes, name = _LINES[stable]
+        label = None if name in named else name
+        named.add(name)
+        axes.plot(across[piece], up[piece], lw=1.5, color="#0072B2", ls=dashes, label=label, zorder=1)
     labels = [point.label for point in points]
     for label in dict.fromkeys(filter(None, labels)):
         here = [i for i, other in enumerate(labels) if other == label]
@@ -40,9 +48,38 @@ def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, ax
         area = _AREA.get(marker, _AREA[""])
         axes.scatter(across[here], up[here], s=area, marker=marker, color=colour, label=label, zorder=2)
     axes.set(xlabel=x, ylabel=y)
-    if any(labels):
+    if any(labels) or named - {None}:
         axes.legend(frameon=False)
     return axes
+
+
+def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
+    """Cut a branch where its stability changes; without any index, there is one piece.
+
+    Yields
+    ------
+    stable : bool or None
+        Whether the energy has a minimum on the piece; None where no point has an index, or the ends of a step disagree.
+    piece : slice
+        Points of the piece; its ends belong to the pieces beside it too.
+    """
+    if len(points) < 2 or all(point.index is None for point in points):
+        yield None, slice(None)
+        return
+    first = 0
+    for stable, steps in groupby(map(_stable, *zip(*pairwise(points)))):
+        last = first + len(list(steps))
+        yield stable, slice(first, last + 1)
+        first = last
+
+
+def _stable(a: Point, b: Point) -> bool | None:
+    """Return whether the states between two points are stable; at special points, the index beside them counts."""
+    beside = [point.index for point in (a, b) if not point.nullity]
+    beside += [a.index_change[1]] if a.nullity and a.index_change else []
+    beside += [b.index_change[0]] if b.nullity and b.index_change else []
+    found = {index == 0 for index in beside if index is not None}
+    return found.pop() if len(found) == 1 else None
 
 
 def picture(points: Sequence[Point]) -> str:

@@ -101,14 +101,15 @@ def _child(folder: Path, argv: list[str], said: list[Path], progress, prepare) -
             os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666), number)
         sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)  # noqa: SIM115
         os.chdir(folder)
-        from branches import run
+        from branches import interrupt, run
 
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        signal.signal(signal.SIGINT, run._leave)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        interrupt.begin()
         _report(progress)
         if prepare is not None:
             prepare()
-        code = run.main(argv)
+        code = interrupt.run(lambda: run.main(argv))
         sys.stdout.flush()
     except BaseException:
         import traceback

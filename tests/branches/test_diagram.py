@@ -119,6 +119,31 @@ def test_a_second_run_computes_what_is_missing_only(folder, capsys):
     assert "computed before" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("change, said", [
+    ("nu=0.25", "ribbon_nu0.3_m1_n2.h5 is no branch of this one"),
+    ("limits={kappa_n: [-50, 100]}", "ribbon_nu0.3_m1_n2.h5: limits = "),
+])  # fmt: skip
+def test_a_folder_of_another_scene_is_refused(folder, change, said):
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(StoreError, match="holds another scene") as caught:
+        run_diagram(parse(SCENE, "scene", [change]), folder, Display(silent=True))
+    assert said in str(caught.value) and "--overwrite replaces its diagram" in str(caught.value)
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_scene_with_more_branches_goes_on_and_overwrite_replaces(tmp_path):
+    limits = "limits: {kappa_n: [0, 100]}, stride: 50"
+    for nu in ("[0.3]", "[0.3, 0.31]"):
+        run_diagram(parse(f"{{m: 1, n: 2, nu: {nu}, {limits}}}", "scene"), tmp_path, Display(silent=True))
+    assert [family[1] for family in diagram.families(diagram.read(tmp_path))] == [0.3, 0.31]
+    other = parse(f"{{m: 1, n: 2, nu: [0.32], {limits}}}", "scene")
+    assert run_diagram(other, tmp_path, Display(silent=True), overwrite=True) == "complete"
+    assert [family[1] for family in diagram.families(diagram.read(tmp_path))] == [0.32]
+    (tmp_path / "diagram.json").write_text("{}")
+    with pytest.raises(StoreError, match="no result of branches.run"):
+        run_diagram(other, tmp_path, Display(silent=True))
+
+
 PAIR = "{m: [3], n: [4, 5], stride: 20}"
 
 

@@ -89,9 +89,19 @@ def test_an_item_alone_loads_and_writes_what_it_needs(command):
     code = "import sys; from branches.paper.__main__ import main; assert main(['--out', 'x', 'table3']) == 0; "
     done = command(program=("-c", code + "assert not {'numba', 'matplotlib', 'h5py'} & set(sys.modules), sorted(sys.modules)"))
     assert done.returncode == 0, done.err
-    assert sorted(path.name for path in (command.folder / "x").iterdir()) == ["index.html", "index.md"]
+    assert sorted(path.name for path in (command.folder / "x").iterdir()) == ["index.html", "index.json", "index.md"]
     page = (command.folder / "x" / "index.md").read_text(encoding="utf-8")
     assert "| m = 1, n = 2 | 2.50 | 2.5 |" in page and "Fig." not in page
+
+
+def test_another_item_keeps_those_that_are_there(tmp_path, capsys):
+    assert main(["--out", str(tmp_path), "table3"]) == main(["--out", str(tmp_path), "table1"]) == 0
+    page = (tmp_path / "index.md").read_text(encoding="utf-8")
+    assert page.count("## ") == 2 and page.index("Table 1") < page.index("Table 3")
+    assert "| m = 1, n = 2 | 2.50 | 2.5 |" in page and (tmp_path / "index.html").read_text().count("<h2>") == 2
+    (tmp_path / "index.json").write_text("[]")
+    assert main(["--out", str(tmp_path), "table1"]) == 2
+    assert "was not written by this program; remove it" in capsys.readouterr().err
 
 
 def test_what_is_refused(tmp_path, capsys):

@@ -158,7 +158,6 @@ MISTAKES = {
     "folder cannot be made": (["scene.yaml", "--out", "/proc/none/x.h5"], "cannot write '/proc/none/x.h5'"),
     "foreign file": (["scene.yaml", "--out", "foreign.h5"], "exists and is no readable result of this program"),
     "foreign file to resume": (["scene.yaml", "--out", "foreign.h5", "--resume"], "not a readable HDF5 file"),
-    "nothing to resume": (["scene.yaml", "--out", "none/x.h5", "--resume"], "--resume: there is no file 'none/x.h5'"),
     "another scene": (["scene.yaml", "--out", "other.h5"], "another scene (n = 3 there, 2 here); --overwrite"),
     "another scene to resume": (["scene.yaml", "--out", "other.h5", "--resume"], "another scene (n = 3 there, 2 here); resume"),
 }
@@ -352,6 +351,13 @@ def test_resuming_a_complete_run_does_nothing(tmp_path, silent):
     assert run_branch(scene_of(), path, display, resume=True) == "complete"
     assert display.notes == [f"{path} is complete already (returned to the trivial branch (M2 = 0)); nothing to do"]
     assert path.read_bytes() == before
+
+
+def test_resuming_without_a_file_starts_and_says_so(tmp_path, silent):
+    path, display = tmp_path / "none" / "x.h5", silent()
+    assert run_branch(scene_of(), path, display, resume=True) == "complete"
+    assert display.notes == [f"--resume: there is no file {str(path)!r}; the run starts from the beginning"]
+    assert path.exists()
 
 
 def test_a_run_that_is_lost(scene, capsys, monkeypatch):

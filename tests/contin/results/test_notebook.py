@@ -33,6 +33,26 @@ def test_norm_is_the_root_mean_square_of_the_states(branch):
     assert branch.to_pandas().norm[3] == pytest.approx(math.sqrt((states[:, 0] ** 2 + states[:, 1] ** 2).mean()))
 
 
+def test_stable_parts_are_solid_and_unstable_ones_dashed():
+    """A soap film between two rings: a minimum of the area up to the fold, not one beyond it."""
+    from matplotlib.figure import Figure
+
+    film = contin.VariationalProblem(
+        energy=lambda t, x, w, p: x.r * (p.gap**2 + w.r**2) ** 0.5,
+        states=["r"],
+        parameters={"gap": 0.4},
+        ends=lambda a, b, p: (a.r - 1, b.r - 1),
+    )
+    branch = contin.trace(contin.solve(film, [1.0]), free=["gap"], limits={"gap": (0.4, 1.5)}, errors=False)
+    axes = branch.plot(axes=Figure().subplots())
+    solid, dashed = axes.lines
+    assert (solid.get_label(), dashed.get_label()) == ("stable", "unstable")
+    assert solid.get_linestyle() == "-" and dashed.get_linestyle() == "--"
+    (fold,) = branch.labelled("LP")
+    assert solid.get_xdata()[-1] == dashed.get_xdata()[0] == fold["gap"]
+    assert len(solid.get_xdata()) + len(dashed.get_xdata()) == len(branch) + 1
+
+
 def test_plot(branch):
     from matplotlib.figure import Figure
 

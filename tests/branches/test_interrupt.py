@@ -1,0 +1,117 @@
+"""Ctrl-C at every command: one line, exit code 130, no traceback, no half-written file; and what the mechanism promises."""
+
+import os
+import shlex
+import signal
+import time
+
+import pytest
+
+from branches import interrupt
+
+PRIMARY = "{m: 3, n: 1, stability: true, limits: {kappa_n: [-120, 100]}, stride: 50}"
+STRIP = shlex.split(
+    "--width .016 --thickness .00012 --length .6 --natural-radius .03 --poisson-ratio .3 --youngs-modulus 200e9"
+)
+MANY = "{m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], limits: {kappa_n: [-100, 100]}, stride: 20}"
+#: The command's arguments, what its line says, and the module after whose import it computes.
+COMMANDS = {
+    "run": (["many.yaml", "--out", "many"], "finished branches are kept", "branches.job"),
+    "secondary": (["primary.h5", "--out", "all"], "finished branches are kept", "branches.stability"),
+    "paper": (["--out", "page", "fig11"], "finished items are on the page", "branches.paper.page"),
+    "strip": (STRIP, "this command writes no files", "ribbon_model.seeds"),
+    "explore": (["primary.h5", "--out", "page.html"], "no page was written", "branches.explore.gather"),
+    "shell": (["--out", "shell.h5"], "finished cases are kept", "branches.shell"),
+    "graph": (["many.yaml"], "this command writes no files", "branches.preview"),
+}
+
+
+@pytest.fixture(scope="module")
+def primary(tmp_path_factory):
+    """The image of a branch with secondary bifurcations."""
+    from branches.config import parse
+    from branches.display import Display
+    from branches.job import compute_branch
+
+    return compute_branch(parse(PRIMARY, "scene"), Display(silent=True))[0]
+
+
+def interrupted(process, module: str, delay: float) -> list[str]:
+    """Press Ctrl-C when a module is imported (Python says so on standard error); what else was written there."""
+    rest = []
+    for line in process.stderr:
+        if not line.startswith("import time:"):
+            rest.append(line)
+        elif line.rpartition("|")[2].strip().startswith(module):
+            break
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    return [*rest, *(line for line in err.splitlines() if not line.startswith("import time:"))]
+
+
+@pytest.mark.parametrize("moment", ["importing", "computing"])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_ctrl_c(command, primary, name, moment):
+    folder = command.folder
+    (folder / "primary.h5").write_bytes(primary)
+    (folder / "many.yaml").write_text(MANY)
+    fake = folder / "bin" / "ccx"  # CalculiX would compute for minutes
+    fake.parent.mkdir()
+    fake.write_text('#!/bin/sh\n[ "$1" = -v ] && echo Version 2.20 && exit\nexec sleep 60\n')
+    fake.chmod(0o755)
+    arguments, kept, module = COMMANDS[name]
+    path = {"PATH": f"{fake.parent}{os.pathsep}{os.environ['PATH']}"}
+    process = command.start(*arguments, program=("-X", "importtime", "-m", f"branches.{name}"), env=path)
+    early = moment == "importing"
+    said = interrupted(process, "branches.interrupt" if early else module, 0.02 if early else 0.3)
+    assert process.returncode == 130, said
+    assert len(said) == 1 and said[0].startswith("interrupted")
+    assert kept in said[0] or (name == "run" and early)
+    assert not list(folder.rglob("*.part")) and not (folder / "page.html").exists()
+
+
+@pytest.fixture
+def pressed(monkeypatch):
+    """A function that presses Ctrl-C; ``left`` lists what would have ended the process."""
+    left = []
+    monkeypatch.setattr(interrupt.os, "_exit", left.append)
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    interrupt.begin("nothing")
+
+    def press():
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+
+    press.left = left
+    yield press
+    signal.signal(signal.SIGINT, before)
+
+
+def test_a_file_is_written_to_its_end(pressed, capfd):
+    with interrupt.held():
+        pressed()
+        assert pressed.left == []
+    assert pressed.left == [130] and capfd.readouterr().err == "interrupted; nothing\n"
+    pressed()
+    assert pressed.left == [130, 130]
+
+
+def test_code_that_unwinds_gets_an_exception_once(pressed, capfd):
+    def main():
+        with interrupt.unwinding():
+            try:
+                pressed()
+            finally:
+                pressed()
+
+    assert interrupt.run(main) == 130 and pressed.left == []
+    assert capfd.readouterr().err == "interrupted; nothing\n"
+
+
+def test_a_shell_that_ignores_ctrl_c_has_its_way():
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    interrupt.begin("nothing")
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    signal.signal(signal.SIGINT, before)
