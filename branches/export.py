@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from branches import interrupt
+
+if __name__ == "__main__":  # before the imports below
+    interrupt.begin()
+
 import math
-import os
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +20,7 @@ if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and mistakes in th
     from branches.read import StoredBranch
     from ribbon_model.shape import Shape
 
-EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
+EXIT_BAD_INPUT = 2
 #: Endings of what --out and --movie write.
 SURFACES, MOVIES = (".stl", ".obj", ".glb", ".gltf", ".vtk", ".vtu"), (".gif", ".mp4")
 #: Width where the result knows none and none is given, in units of L: that of the pictures, 0.3 L/2 pi.
@@ -56,11 +59,8 @@ def arguments(argv=None):
 def main(argv=None) -> int:
     """Run the command; the exit code."""
     survive_any_encoding()
-    try:
+    with interrupt.unwinding():  # files that are begun are removed
         return _export(arguments(argv))
-    except KeyboardInterrupt:
-        complain("interrupted")
-        return EXIT_INTERRUPTED
 
 
 def _export(options) -> int:
@@ -68,7 +68,6 @@ def _export(options) -> int:
     from branches.files import StoreError, prepare, write_bytes
     from branches.read import read_branch
 
-    _unwind_on_interrupt()
     try:
         check(options)
         branch = read_branch(options.result)
@@ -229,22 +228,5 @@ def _width(branch: StoredBranch, options) -> float | None:
     return math.sqrt(Gamma * options.thickness * options.length / (2 * math.pi))
 
 
-# --- Ctrl-C -----------------------------------------------------------------------------------------------------------
-
-
-def _leave(number, frame):
-    """Ctrl-C while modules are imported: nothing is begun, and an exception amid an import would end in noise."""
-    os.write(2, b"interrupted\n")
-    os._exit(EXIT_INTERRUPTED)
-
-
-def _unwind_on_interrupt() -> None:
-    """From here on Ctrl-C is a KeyboardInterrupt, so that files that are begun are removed."""
-    if signal.getsignal(signal.SIGINT) is _leave:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
 if __name__ == "__main__":
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _leave)
-    sys.exit(main())
+    sys.exit(interrupt.run(main))
