@@ -52,6 +52,8 @@ def run(main: Callable[[], int]) -> int:
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # no second line
         _say()
+        if os.getpid() == _State.process:  # where it passed through exec(), Python would end by the signal, not by the code
+            os._exit(EXIT_INTERRUPTED)
         return EXIT_INTERRUPTED
 
 
