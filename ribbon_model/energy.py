@@ -12,7 +12,7 @@ import functools
 
 from contin import VariationalProblem
 from ribbon_model.domains import Domain
-from ribbon_model.equilibrium import CENTRELINE, FRAME, LENGTH, directors
+from ribbon_model.equilibrium import CENTRELINE, FRAME, LENGTH, directors, spin
 from ribbon_model.laws import Law
 
 
@@ -36,26 +36,16 @@ def variational_problem(law: Law, domain: Domain) -> VariationalProblem:
     """
     if not domain.reversal:
         raise ValueError(f"domain {domain.name!r}: the energy is stated on half loops")
-    complementary, between_mirrors = law.hamiltonian, domain.reversal == "mirror"
+    complementary = law.hamiltonian
 
     def hamiltonian(t, x, lam, p):
-        q0, q1, q2, q3, x1, x2, x3 = x
-        l0, l1, l2, l3, n1, n2, n3 = lam
-        M1 = (-l0 * q1 + l1 * q0 + l2 * q3 - l3 * q2) / 2
-        M2 = (-l0 * q2 - l1 * q3 + l2 * q0 + l3 * q1) / 2
-        M3 = (-l0 * q3 + l1 * q2 - l2 * q1 + l3 * q0) / 2
-        d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(q0, q1, q2, q3)
+        q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam
+        rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
+        M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
+        d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
         return complementary(M1, M2, M3, p.kappa_n, p.nu) + n1 * d31 + n2 * d32 + n3 * d33
-
-    def mirrors(a, b, p):
-        d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(b.q0, b.q1, b.q2, b.q3)
-        return a.q0 - 1, a.q1, a.q2, a.q3, a.x1, a.x2, a.x3, d31, d32, b.x3
-
-    def axes(a, b, p):
-        d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(b.q0, b.q1, b.q2, b.q3)
-        return a.q0 - 1, a.q1, a.q2, a.q3, a.x1, a.x2, a.x3, d21, d23, b.x1, b.x3
 
     return VariationalProblem(
         None, (*FRAME, *CENTRELINE), {"kappa_n": 0.0, **law.defaults}, hamiltonian=hamiltonian,
-        ends=mirrors if between_mirrors else axes, domain=(0.0, LENGTH / 2),
+        ends=domain.boundary, domain=(0.0, LENGTH / 2),
     )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from contin import basis, interpolation
+from contin import basis
 from ribbon_model.equilibrium import directors
 
 
@@ -126,10 +126,6 @@ def quadrature_centreline(t, states, degree: int, length: float) -> np.ndarray:
     nodal = np.stack([states[i : i + (len(h) - 1) * degree + 1 : degree, :4] for i in range(degree + 1)], axis=1)
     at_gauss = np.einsum("ij,ejk->eik", tables.value, nodal)
     d3 = np.array(directors(*np.moveaxis(at_gauss, -1, 0))[6:]).transpose(1, 2, 0)
-    lagrange = 1 / np.prod(tables.points[:, None] - tables.points + np.eye(degree), axis=1)
-    partial = np.array([
-        node * tables.weights @ interpolation(tables.points, lagrange, node * tables.points) for node in tables.nodes[1:]
-    ])  # fmt: skip
-    inside = length * h[:, None, None] * np.einsum("ij,ejk->eik", partial, d3)
+    inside = length * h[:, None, None] * np.einsum("ij,ejk->eik", tables.integrals(tables.nodes[1:]), d3)
     inside[1:] += np.cumsum(inside[:, -1], axis=0)[:-1, None]
     return np.concatenate([np.zeros((1, 3)), inside.reshape(-1, 3)])

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import basis, interpolation
+from contin import basis
 from ribbon_model.second_variation import Equilibrium, Symmetry, coupling
 
 #: An eigenvalue below this is zero as far as equilibria are known: Newton's method leaves 1e-11, times a condition of 100. Ten
@@ -181,7 +181,7 @@ def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
     stations = mesh[:-1, None] + lengths[:, None] * tables.points
     d = equilibrium.directors(stations.ravel()).reshape(*stations.shape, 3, 3)
     ends = np.cumsum(lengths[:, None] * np.einsum("i,eik->ek", tables.weights, d[:, :, 2]), axis=0)
-    inside = lengths[:, None, None] * np.einsum("ij,ejk->eik", _partial_integrals(equilibrium.degree), d[:, :, 2])
+    inside = lengths[:, None, None] * np.einsum("ij,ejk->eik", tables.runge_kutta, d[:, :, 2])
     inside[1:] += ends[:-1, None]
     origin, gap = _origin(equilibrium.symmetry, ends[-1])
     x = (inside + origin).reshape(-1, 3)
@@ -200,16 +200,6 @@ def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
     motion = np.einsum("kab,ka->kb", factor, rate[:, free])
     shape = stations.shape
     return _Points(lengths, generator.reshape(*shape, 6, -1), motion.reshape(*shape, -1), momentum, gap)
-
-
-@functools.cache
-def _partial_integrals(degree: int) -> np.ndarray:
-    """The matrix a (d, d) of the Runge-Kutta method: integrals from 0 to the Gauss points of the unit interval."""
-    tables = basis(degree)
-    lagrange = 1 / np.prod(tables.points[:, None] - tables.points + np.eye(degree), axis=1)
-    return np.array([
-        point * tables.weights @ interpolation(tables.points, lagrange, point * tables.points) for point in tables.points
-    ])  # fmt: skip
 
 
 def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
@@ -339,9 +329,9 @@ def _of_mesh(points: _Points, coupling, degree: int) -> _Intervals:
     It is the identity plus l c_ij G_j^T N G_i / 2 between the Gauss points j and i, l the length and
     c_ij = a_ij sqrt(w_i / w_j) - a_ji sqrt(w_j / w_i), with the Runge-Kutta method's matrix a and weights w.
     """
-    tables, runge_kutta = basis(degree), _partial_integrals(degree)
+    tables = basis(degree)
     count, _, _, controls = points.generator.shape
-    scaled = runge_kutta * np.sqrt(tables.weights[:, None] / tables.weights)
+    scaled = tables.runge_kutta * np.sqrt(tables.weights[:, None] / tables.weights)
     generator = points.generator.transpose(0, 2, 1, 3).reshape(count, 6, -1)  # columns: Gauss point, function
     local = generator.transpose(0, 2, 1) @ (coupling @ generator) * np.kron(scaled.T - scaled, np.ones((controls, controls)))
     local = np.eye(degree * controls) + points.lengths[:, None, None] / 2 * local

@@ -456,7 +456,8 @@ class Continuation:
             details = details if found.same_as else again.details
         system = trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
-        stability = stability_of(trial, details, found.label) if self._index is not None else Stability()
+        found = dataclasses.replace(found, trial=trial, details=details)
+        stability = Stability() if self._index is None else stability_of(found)
         return Point(
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
             state.arclength + found.at, trial.iterations, trial.newton_error, errors, details,

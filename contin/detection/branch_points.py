@@ -1,7 +1,7 @@
 """Branch points inside a step: how many there are, and where.
 
-A branch point changes the sign of the determinant of [F_x; row]; more of them are seen in how the smallest singular values
-change (`contin.detection.crossings`). Both must agree: where the sign stays and one value passes, another did unseen.
+A branch point changes the sign of the determinant of [F_x; row]; more of them are seen in how those singular values change
+that change most (`contin.detection.crossings`). Both must agree: where the sign stays and one value passes, another did unseen.
 """
 
 from __future__ import annotations
@@ -33,8 +33,6 @@ _GAP = 1e-2
 _HALVINGS = 12
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
 _TOGETHER = 0.1
-
-
 #: Rounds of the power method where it gives more than the one singular value that the determinant's sign tells of, or another.
 _MORE_ROUNDS = 8
 
@@ -67,11 +65,7 @@ class BranchPointSearch:
         if len(shares):
             self._share, self._spread = float(np.mean(shares)), float(np.ptp(shares))
         count, clear = crossings(values)
-        return count, clear and self._agrees(values)
-
-    def _agrees(self, values: ComplexArray) -> bool:
-        """Return whether the number of singular values that pass zero is odd where the determinant's sign changes."""
-        return (crossings(values)[0] % 2 == 1) == self.sign_changes
+        return count, clear and (count % 2 == 1) == self.sign_changes
 
     @property
     def sign_changes(self) -> bool:

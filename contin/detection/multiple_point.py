@@ -17,7 +17,6 @@ import numpy as np
 from contin.arrays import Array
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
-from contin.linalg.factors import Factors
 from contin.linalg.singular import smallest_directions
 from contin.stepping.newton import Newton
 
@@ -82,7 +81,6 @@ class _Manifold:
         self.phi = phi
         self.rows = np.zeros((len(phi), system.size + self.d))
         self.rows[:, : system.size] = phi * system.weights
-        self.factors: Factors
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
         """Return x (size,), beta (d,) and G (d, 1 + d) at coordinates s.

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.detection.segment import SpecialPoint
 from contin.discretization.basis import interpolation
 from contin.discretization.collocation import Collocation
 from contin.discretization.protocol import Discretization
@@ -119,21 +120,24 @@ class Stability:
     breaks: tuple[str, ...] = ()
 
 
-def nullity_of(point: Any) -> int:
-    """Return the dimension of the kernel of a special point: 1 at a fold, 1 or more at a branch point, else 0."""
+def nullity_of(point: SpecialPoint) -> int:
+    """Return the dimension of the kernel at a point: 1 at a fold, 1 or more at a branch point, else 0."""
     if point.label not in ("LP", "BP", "CP") and point.name != "trivial branch":
         return 0
     return int(getattr(point.details, "dimension", 1))
 
 
-def stability_of(trial: Trial, details: Any, label: str) -> Stability:
+def stability_of(point: SpecialPoint) -> Stability:
     """Return what the second variation says of a point; at a special one, what vanishes there does not count."""
+    trial, nullity = point.trial, nullity_of(point)
+    if not nullity:
+        index = trial.value(_INDEX)
+        return Stability() if np.isnan(index) else Stability(int(index))
     system: Any = trial.system
     found = second_variation(system, trial.x)
     if found is None:
         return Stability()
-    nullity = int(getattr(details, "dimension", 1)) if label in ("LP", "BP", "CP") else 0
-    breaks = found.broken(nullity, system.problem.symmetries) if label == "BP" else ()
+    breaks = found.broken(nullity, system.problem.symmetries) if point.label == "BP" else ()
     return Stability(found.index(nullity), nullity, breaks)
 
 
@@ -142,11 +146,11 @@ def legendre() -> TestFunction:
 
     def margin(trial: Trial) -> float:
         system: Any = trial.system
-        points = system.at_gauss_points(trial.x)
-        points = points if system.scales is None else points * system.scales.states
         if system.problem.legendre is None:
-            value = _convexity(_jacobian(system, trial.x)[:, : points.shape[1] // 2, points.shape[1] // 2 :])
+            n = system.problem.dimension
+            value = _convexity(_jacobian(system, trial.x)[:, :n, n:])
         else:
+            points = system.states_at_gauss_points(trial.x)
             value = system.problem.margin(system.gauss_times, points, system.all_parameters(trial.x))
         return value if np.isfinite(value) else 1.0
 
@@ -282,10 +286,9 @@ def _intervals(system: Collocation, x: Array) -> tuple[_Pieces, Array] | None:
     a = a + c @ feedback
     k, g = c.shape[-1], jacobian[:, :, 2 * n :]
     basis = system.basis
-    lagrange = _antiderivatives(basis.points)  # (d, d): integral of l_j up to point i
     weights = h[:, None] * basis.weights
     scaled = c / np.sqrt(weights)[:, :, None, None]  # v times sqrt(weight): Q begins with its square
-    step = h[:, None, None, None, None] * lagrange[None, :, None, :, None]
+    step = h[:, None, None, None, None] * basis.runge_kutta[None, :, None, :, None]
     matrix = np.eye(d * n) - (step * a.transpose(0, 2, 1, 3)[:, None]).reshape(len(h), d * n, d * n)
     drive = (step * scaled.transpose(0, 2, 1, 3)[:, None]).reshape(len(h), d * n, d * k)
     start = np.broadcast_to(np.tile(np.eye(n), (d, 1)), (len(h), d * n, n))
@@ -306,8 +309,7 @@ def _intervals(system: Collocation, x: Array) -> tuple[_Pieces, Array] | None:
 def _jacobian(system: Collocation, x: Array) -> Array:
     """Return the derivatives of rhs and integrands by (x, lambda) at the Gauss points, in the user's units."""
     batch = system.problem.batch("field")
-    points = system.at_gauss_points(x)
-    points = points if system.scales is None else points * system.scales.states
+    points = system.states_at_gauss_points(x)
     return batch.jacobian(system.gauss_times, points, points[:0], system.all_parameters(x), batch.colouring([]))[1]
 
 
@@ -323,15 +325,6 @@ def _roots(hll: Array) -> tuple[Array, Array] | None:
     values, vectors = values[:, :, -k:], vectors[:, :, :, -k:]
     root = np.sqrt(np.maximum(values, _NO_CONTROL * largest[:, :, None]))
     return vectors * root[:, :, None], vectors / root[:, :, None]
-
-
-def _antiderivatives(points: Array) -> Array:
-    """Return the integrals of the Lagrange polynomials of the Gauss points on [0, 1], up to each of them: (d, d)."""
-    d = len(points)
-    powers = np.vander(points, d, increasing=True)
-    integrals = points[:, None] ** np.arange(1, d + 1) / np.arange(1, d + 1)
-    result: Array = integrals @ np.linalg.inv(powers)
-    return result
 
 
 def _joined(pieces: _Pieces) -> tuple[_Pieces, tuple[_Recovery, ...]]:

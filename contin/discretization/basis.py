@@ -33,6 +33,16 @@ class Basis:
     barycentric: Array
     constant: float
 
+    @functools.cached_property
+    def runge_kutta(self) -> Array:
+        """The matrix of the Gauss method."""
+        return self.integrals(self.points)
+
+    def integrals(self, ends: Array) -> Array:
+        """Return the matrix (len(ends), d) that integrates values at the Gauss points from 0 to each of the ends."""
+        lagrange = 1 / np.prod(self.points[:, None] - self.points + np.eye(self.degree), axis=1)
+        return np.array([end * self.weights @ interpolation(self.points, lagrange, end * self.points) for end in ends])
+
 
 @functools.cache
 def basis(degree: int) -> Basis:

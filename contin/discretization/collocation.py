@@ -144,6 +144,11 @@ class Collocation(System):
         at_points(self.basis.value, x, points)
         return points
 
+    def states_at_gauss_points(self, x: Array) -> Array:
+        """Return the states at the Gauss points in the user's units, shape (N d, n)."""
+        points = self.at_gauss_points(x)
+        return points if self.scales is None else points * self.scales.states
+
     def evaluate(self, x: Array, times: Array) -> Array:
         """Return the states at ``times`` (m,), shape (m, n), by the piecewise polynomial."""
         states = self._interpolated(x, times)
@@ -237,9 +242,7 @@ class Collocation(System):
         if not self.problem.functionals:
             return np.empty(0)
         batch = self.problem.batch("functionals")
-        points = self.at_gauss_points(x)
-        points = points if self.scales is None else points * self.scales.states
-        values = batch.values(self._times, points, _NONE(self._n), self.all_parameters(x))
+        values = batch.values(self._times, self.states_at_gauss_points(x), _NONE(self._n), self.all_parameters(x))
         integrals: Array = self._quadrature @ values
         return integrals
 

@@ -6,7 +6,9 @@ import functools
 import os
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from contin.errors import ContinError
 from contin.files import write_whole
@@ -39,6 +41,23 @@ def _temporary_directory() -> Path:
         raise ContinError(f"no place for compiled code: {error.strerror}; {_ADVICE}") from error
     print(f"contin: no writable cache, compiling into {path}; set CONTIN_CACHE_DIR to keep it", file=sys.stderr)
     return path
+
+
+def run_kept_source(name: str, derive: Callable[[], str], scope: dict[str, Any]) -> None:
+    """Run generated code in a scope: the file of this name in the cache directory, made by ``derive`` the first time.
+
+    Raises
+    ------
+    ContinError
+        There is no place for it.
+    """
+    path = cache_directory() / name
+    try:
+        source = path.read_text(encoding="utf-8")
+    except OSError:
+        source = derive()
+        path = write_source(name, source)
+    exec(compile(source, str(path), "exec"), scope)
 
 
 def write_source(name: str, text: str) -> Path:

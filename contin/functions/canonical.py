@@ -25,7 +25,7 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions import gradient
-from contin.functions.cache import cache_directory, write_source
+from contin.functions.cache import run_kept_source
 from contin.functions.fingerprint import contents
 
 #: Newton steps for the controls, and halvings of a step that does not lower -H. Damped steps on a convex function arrive.
@@ -88,7 +88,7 @@ def canonical(variation: Variation) -> Canonical:
         A function that cannot be differentiated symbolically, an energy that does not depend on a control, or end conditions
         that repeat each other.
     """
-    rewriter = gradient._Fingerprinted()
+    rewriter = gradient.Fingerprinted()
     functions = [variation.energy, variation.kinematics, variation.ends, variation.end_energy, variation.hamiltonian]
     functions += [*variation.integrals.values(), *variation.functionals.values()]
     for function in functions:
@@ -98,14 +98,8 @@ def canonical(variation: Variation) -> Canonical:
     rewriter.note(list(variation.integrals), list(variation.functionals), variation.states, variation.controls)
     rewriter.note(variation.parameters, variation.starts, importlib.metadata.version("sympy"))
     rewriter.note(contents(Path(__file__), Path(str(gradient.__file__))))
-    path = cache_directory() / f"v{rewriter.fingerprint()[:32]}.py"
-    try:
-        source = path.read_text(encoding="utf-8")
-    except OSError:
-        source = _Derivation(variation).text()
-        write_source(path.name, source)
     scope: dict[str, Any] = {"math": math, "numpy": np, "__name__": __name__}
-    exec(compile(source, f"<canonical equations {path.stem}>", "exec"), scope)
+    run_kept_source(f"v{rewriter.fingerprint()[:32]}.py", lambda: _Derivation(variation).text(), scope)
     if "pointwise" in scope:
         _check_starts(scope["pointwise"], variation)
     return Canonical(
@@ -157,7 +151,7 @@ class _Derivation:
     def _called(self, what: str, function: Function, *arguments: Any) -> list[Any]:
         """Return the values of a user's function at symbols."""
         try:
-            result = gradient._Symbolic().function(function)(*arguments)
+            result = gradient.Symbolic().function(function)(*arguments)
         except ProblemError as error:
             raise ProblemError(f"{what}: {error}") from error
         except Exception as error:  # sympy and a user's function may raise anything
@@ -193,7 +187,7 @@ class _Derivation:
         kind: Any = namedtuple("Values", list(names))  # type: ignore[misc]  # noqa: PYI024
         return kind(*values)
 
-    def _at(self, what: str, function: Function, count: int | None = 1) -> list[Any]:
+    def _at(self, what: str, function: Function, count: int = 1) -> list[Any]:
         """Return the values of a function of (t, x, w, p); ``count`` many of them."""
         v = self.variation
         values = self._called(
@@ -204,7 +198,7 @@ class _Derivation:
             self._named(v.controls, self.w),
             self._named(v.parameters, self.p),
         )
-        if count is not None and len(values) != count:
+        if len(values) != count:
             raise ProblemError(f"{what} returns {len(values)} values, must return {count}")
         return values
 
@@ -283,7 +277,7 @@ class _Derivation:
         lines += [f"    W{i} = {start!r}" for i, start in enumerate(self.variation.starts)]
         call = f"pointwise({real}, {', '.join(map(str, self.w))})"
         lines += [f"    {outputs} = {call}", f"    for iteration in range({_NEWTON}):", *("        " + line for line in solve)]
-        lines += [f"        slope = {' + '.join(f'G{i} * D{i}' for i in range(k))}", "        part, lower = 1.0, E"]
+        lines += [f"        slope = {' + '.join(f'G{i} * D{i}' for i in range(k))}", "        part = 1.0"]
         lines += [f"        for halving in range({_HALVINGS}):"]
         lines += [f"            V{i} = W{i} + part * D{i}" for i in range(k)]
         lines += [

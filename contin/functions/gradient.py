@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from contin.errors import ProblemError
-from contin.functions.cache import cache_directory, write_source
+from contin.functions.cache import run_kept_source
 from contin.functions.fingerprint import contents
 from contin.functions.rewriting import Rewriter
 
@@ -24,7 +24,7 @@ _OTHER_NAMES = {
 }  # fmt: skip
 
 
-class _Fingerprinted(Rewriter):
+class Fingerprinted(Rewriter):
     """Functions left as they are: what counts is the fingerprint."""
 
     def stand_in(self, value: Any) -> Any:
@@ -32,7 +32,7 @@ class _Fingerprinted(Rewriter):
         return value if _sympy_name(value) else None
 
 
-class _Symbolic(Rewriter):
+class Symbolic(Rewriter):
     """Functions for a call with symbols: with sympy's functions in place of those of ``math`` and numpy."""
 
     def stand_in(self, value: Any) -> Any:
@@ -90,17 +90,11 @@ def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[...,
     (18.0, 12.0, 9.0)
     """
     arguments = list(inspect.signature(function).parameters)
-    rewriter = _Fingerprinted()
+    rewriter = Fingerprinted()
     rewriter.function(function)
     rewriter.note(arguments, list(by), importlib.metadata.version("sympy"), contents(Path(__file__)))
-    path = cache_directory() / f"g{rewriter.fingerprint()[:32]}.py"
-    try:
-        source = path.read_text(encoding="utf-8")
-    except OSError:
-        source = _derived(function, arguments, by)
-        write_source(path.name, source)
     scope: dict[str, Any] = {"math": math, "__name__": function.__module__}
-    exec(compile(source, f"<gradient of {function.__qualname__}>", "exec"), scope)
+    run_kept_source(f"g{rewriter.fingerprint()[:32]}.py", lambda: _derived(function, arguments, by), scope)
     result: Callable[..., tuple[float, ...]] = scope["derived"]
     return result
 
@@ -110,7 +104,7 @@ def _derived(function: Callable[..., Any], arguments: Sequence[str], by: Sequenc
     import sympy  # takes .3 s, and is needed the first time only
 
     symbols = {name: sympy.Symbol(name, real=True) for name in arguments}
-    value = _Symbolic().function(function)(**symbols)
+    value = Symbolic().function(function)(**symbols)
     expressions = [value, *(sympy.diff(value, symbols[name]) for name in by)]
     shared, reduced = sympy.cse(expressions, optimizations="basic")
     lines = [f"    {name} = {sympy.pycode(term)}" for name, term in shared]
