@@ -130,7 +130,7 @@ def of_file(key: str, path: Path) -> Record:
 def environment(folder: Path) -> dict[str, str]:
     """The environment of processes: this tree before any installed one, one thread, compiled code kept in ``folder``."""
     paths = filter(None, [str(ROOT), str(bank_folder().parent), os.environ.get("PYTHONPATH", "")])
-    caches = {"NUMBA_CACHE_DIR": str(folder / "numba"), "CONTIN_CACHE_DIR": str(folder / "contin")}
+    caches = {"CONTIN_CACHE_DIR": str(folder / "contin")}
     changes = {"PYTHONPATH": os.pathsep.join(paths), "PYTHONIOENCODING": "utf-8", "COLUMNS": "80"}
     return os.environ | dict.fromkeys(ONE_THREAD, "1") | caches | changes
 

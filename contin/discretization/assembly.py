@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from contin.functions.compiler import IndexMatrix, Matrix, ReadOnlyVector, Stack, Vector, helper, kernel
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Stack, Vector, helper
 from contin.linalg.layout import Blocks, Layout
 from contin.linalg.vector import scale_into
 
@@ -60,25 +59,9 @@ class Tables(NamedTuple):
 
 
 @helper(inline=True)
-def _first_columns(layout: Layout, d: int) -> IndexMatrix:
-    """Return the first column of each group's states at each node, shape (groups, d + 1)."""
-    offsets, groups, n = layout.offsets, layout.offsets.size - 1, layout.order.size
-    starts = np.empty((groups, d + 1), np.int64)
-    for g in range(groups):
-        first, last = offsets[g], offsets[g + 1]
-        for node in range(1, d):
-            starts[g, node] = (d - 1) * first + (node - 1) * (last - first)
-        starts[g, 0] = (d + 1) * n - 2 * last
-        starts[g, d] = starts[g, 0] + last - first
-    return starts
-
-
-@helper(inline=True)
-def _fill_collocation(
-    layout: Layout, tables: Tables, starts: IndexMatrix, h: Vector, jacobian: Stack, columns: Matrix, local: Stack
-) -> None:
+def _fill_collocation(layout: Layout, tables: Tables, h: Vector, jacobian: Stack, columns: Matrix, local: Stack) -> None:
     """Fill the collocation rows of all intervals."""
-    offsets, follows, value, slope = layout.offsets, layout.follows, tables.value, tables.slope
+    offsets, follows, starts, value, slope = layout.offsets, layout.follows, layout.starts, tables.value, tables.slope
     d, n, groups, c = tables.weights.size, layout.order.size, layout.offsets.size - 1, columns.shape[0]
     inner, rest, k = n * (d - 1), n * (d + 1), jacobian.shape[2] - n
     for j in range(h.size):
@@ -129,12 +112,10 @@ def _fill_corner(boundary_end: int, columns: Matrix, rows: Matrix, corner: Matri
 
 
 @helper(inline=True)
-def _fill_integrals(
-    layout: Layout, tables: Tables, starts: IndexMatrix, h: Vector, jacobian: Stack, border: Stack, corner: Matrix
-) -> None:
+def _fill_integrals(layout: Layout, tables: Tables, h: Vector, jacobian: Stack, border: Stack, corner: Matrix) -> None:
     """Fill each interval's share of the integral conditions, and add up their derivatives by the parameters."""
     offsets, groups, value, weights = layout.offsets, layout.offsets.size - 1, tables.value, tables.weights
-    n, d = layout.order.size, weights.size
+    n, d, starts = layout.order.size, weights.size, layout.starts
     for j in range(h.size):
         for q in range(jacobian.shape[1] - n):
             for b in range(border.shape[2]):
@@ -217,9 +198,9 @@ def assemble(
     blocks : Blocks
         Filled.
     """
-    starts, collocation = _first_columns(layout, tables.weights.size), h.size * layout.rows.size
-    _fill_collocation(layout, tables, starts, h, jacobian, columns, blocks.local)
+    collocation = h.size * layout.rows.size
+    _fill_collocation(layout, tables, h, jacobian, columns, blocks.local)
     _fill_corner(collocation + blocks.first.shape[0], columns, rows, blocks.corner)
-    _fill_integrals(layout, tables, starts, h, jacobian, blocks.border, blocks.corner)
+    _fill_integrals(layout, tables, h, jacobian, blocks.border, blocks.corner)
     _fill_rows(layout, rows, blocks.border)
     _fill_boundary(collocation, at_ends[0], columns, blocks.first, blocks.last)

@@ -1,121 +1,149 @@
-"""The gate to the compiler: kernels of the engine, compiled by numba and kept on disk.
+"""The compiler: numba makes the machine code of kernels. Nothing outside contin/functions imports numba.
 
-Nothing outside contin/functions imports numba. A kernel is a Python function whose annotations are its signature:
-
-    @kernel
-    def scale(factor: float, x: Vector) -> None:
-        for i in range(x.size):
-            x[i] *= factor
-
-It is compiled where it is defined, or read from the cache. A `helper` is compiled when the first kernel that calls it is. An
-`instruction` is a function for kernels to call that is written in LLVM's language.
-The cache can only help: a file that cannot be read, written or trusted costs time, never an answer.
+The Python function that an object file holds is written here, in LLVM's language: see `_Entry`.
 """
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import itertools
-import os
-import sys
+import types as python_types
 from collections.abc import Callable
-from pathlib import Path
-from typing import Annotated, Any, Concatenate, ParamSpec, TypeVar, get_args, get_origin, get_type_hints, overload
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+import llvmlite.binding as llvm
 import numba
+import numpy as np
 from llvmlite import ir
-from numba.core import cgutils, sigutils
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core import cgutils, compiler, types
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
+from numba.np.arrayobj import populate_array
 
-from contin.arrays import Array, Indices
-from contin.errors import ContinError
-from contin.functions.cache import cache_directory
-from contin.functions.fingerprint import contents
-
-# Arrays as kernels see them: contiguous, of one kind of number, with so many dimensions.
-Vector = Annotated[Array, "f8[::1]"]
-Matrix = Annotated[Array, "f8[:,::1]"]
-Stack = Annotated[Array, "f8[:,:,::1]"]
-IndexVector = Annotated[Indices, "i8[::1]"]
-IndexMatrix = Annotated[Indices, "i8[:,::1]"]
-ReadOnlyVector = Annotated[Array, "Array(f8, 1, 'C', readonly=True)"]
-ReadOnlyMatrix = Annotated[Array, "Array(f8, 2, 'C', readonly=True)"]
+from contin.functions.kernel_parts import Helper, Instruction
+from contin.functions.machine_code import Code
 
 #: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
+#: Options of functions that only compiled code calls.
+_INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
+# LLVM's types.
+_BYTE, _INT, _WORD, _DOUBLE = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.DoubleType()
+_POINTER, _WORDS = _BYTE.as_pointer(), _WORD.as_pointer()
+
+#: Size of the head of a Python object; its type is the last word of it. The fields of an array follow (PyArrayObject_fields):
+#: data, number of dimensions, shape, strides, owner, type of numbers, flags.
+_HEAD = object.__basicsize__
+_TYPE, _DATA, _DIMENSIONS, _SHAPE, _NUMBERS, _FLAGS = _HEAD - 8, _HEAD, _HEAD + 8, _HEAD + 16, _HEAD + 40, _HEAD + 48
+#: In a type of numbers (PyArray_Descr), behind its head: the class, three letters of which the last is the order of bytes, a
+#: letter, and the number of the type.
+_ORDER, _NUMBER = _HEAD + 10, _HEAD + 12
+#: The first entry of a tuple, behind its head and its size.
+_ENTRIES = tuple.__basicsize__
+#: Flags of an array: contiguous rows, aligned; and writable.
+_CONTIGUOUS, _WRITABLE = 0x0001 | 0x0100, 0x0400
 
 
-@overload
-def kernel(function: _Function) -> _Function: ...
-
-
-@overload
-def kernel(*, reorder: bool = True) -> Callable[[_Function], _Function]: ...
-
-
-def kernel(function: Any = None, *, reorder: bool = True) -> Any:
-    """Compile a function for the types in its annotations.
-
-    These are ``int``, ``float``, ``None``, the arrays above, and named tuples of them. Without ``reorder`` sums and products
-    are evaluated one by one as they stand.
+def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Code:
+    """Return the machine code of a kernel, as `contin.functions.kernel.kernel` describes it, with the name of its entry.
 
     Raises
     ------
     TypeError
-        An annotation of another kind.
+        An annotation that is no type of a kernel's argument.
+    numba.core.errors.NumbaError
+        It cannot be compiled.
     """
-    if function is None:
-        return functools.partial(kernel, reorder=reorder)
     hints = get_type_hints(function, include_extras=True)
-    result = _compiler_type(hints.pop("return"))
+    result = _type(hints.pop("return"))
+    parameters = list(hints.values())
     options = _OPTIONS if reorder else {**_OPTIONS, "fastmath": False}
-    return njit(result(*map(_compiler_type, hints.values())), cache=True, **options)(function)
+    flags: Any = compiler.Flags()
+    with global_compiler_lock:
+        cpu_target.options.parse_as_flags(flags, {**options, **_INSIDE, "nopython": True, "boundscheck": None})
+        flags.no_compile, flags.enable_pyobject = True, False  # what numba runs itself is not wanted
+        context = cpu_target.target_context
+        cpu_target.typing_context.refresh()
+        context.refresh()
+        done = compiler.compile_extra(
+            cpu_target.typing_context, context, _ready(function), tuple(map(_type, parameters)), result, flags, {}
+        )
+        done.library.finalize()
+        return _Entry(context, done, parameters, entry).code()
 
 
-@overload
-def helper(function: _Function) -> _Function: ...
+def _type(hint: Any) -> Any:
+    """Return numba's type for an annotation."""
+    if get_origin(hint) is Annotated:
+        kind = get_args(hint)[1]
+        return types.Array(getattr(types, kind.number), kind.dimensions, "C", readonly=not kind.writable)
+    if isinstance(hint, type) and hasattr(hint, "_fields"):
+        return types.BaseTuple.from_types(list(map(_type, _fields(hint))), hint)
+    try:
+        return {int: types.int64, float: types.float64, type(None): types.void}[hint]
+    except (KeyError, TypeError):
+        raise TypeError(f"{hint!r} is no type of a kernel's argument") from None
 
 
-@overload
-def helper(*, inline: bool = False) -> Callable[[_Function], _Function]: ...
+def _fields(hint: Any) -> list[Any]:
+    """Return the annotations of a named tuple's fields."""
+    return list(get_type_hints(hint, include_extras=True).values())
 
 
-def helper(function: Any = None, *, inline: bool = False) -> Any:
-    """Let kernels call a function; with ``inline`` its statements are put in place of every call."""
-    if function is None:
-        return functools.partial(helper, inline=inline)
-    return njit(cache=True, inline="always" if inline else "never", **_OPTIONS)(function)
+# --- what kernels call -----------------------------------------------------------------------------------------------
 
 
-_Parameters = ParamSpec("_Parameters")
-_Result = TypeVar("_Result")
+def _ready(function: Callable[..., Any]) -> Any:
+    """Return a function that calls what numba knows in place of helpers and instructions."""
+    names = _names(function.__code__) & set(function.__globals__)
+    globals_ = function.__globals__ | {name: _known(function.__globals__[name]) for name in names}
+    copy = python_types.FunctionType(
+        function.__code__, globals_, function.__name__, function.__defaults__, function.__closure__
+    )
+    copy.__qualname__ = function.__qualname__
+    return copy
 
-# For the bodies of instructions: a loop, ``with for_range(builder, count) as loop``, and a place on the stack.
-for_range = cgutils.for_range
-variable = cgutils.alloca_once_value
+
+def _names(code: python_types.CodeType) -> set[str]:
+    """Return the global names that a code object, and those inside it, may use."""
+    inner = (constant for constant in code.co_consts if isinstance(constant, python_types.CodeType))
+    return set(code.co_names).union(*map(_names, inner))
 
 
-def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Callable[_Parameters, _Result]:
-    """Let kernels call a function that writes its own machine code, in LLVM's language.
+def _known(value: Any) -> Any:
+    """Return what numba knows a global value as; a value that stays is returned as it is."""
+    if isinstance(value, Helper | Instruction):
+        if value not in _KNOWN:
+            _KNOWN[value] = _dispatcher(value) if isinstance(value, Helper) else _intrinsic(value.write)
+        return _KNOWN[value]
+    if isinstance(value, python_types.ModuleType) and value.__name__.startswith(_PACKAGE):
+        copy = python_types.ModuleType(value.__name__)
+        vars(copy).update(
+            {name: _known(member) for name, member in vars(value).items() if isinstance(member, Helper | Instruction)}
+        )
+        return copy
+    return value
 
-    ``write(builder, *arguments)`` appends the body of the function with an ``llvmlite.ir.IRBuilder`` and returns its value. Its
-    annotations (``int``, ``float``, named tuples of them, ``None``) are the types that kernels see; the ``arguments`` are LLVM
-    values, and named tuples of LLVM values. For example, a rounded sum of two numbers::
 
-        @instruction
-        def sum(builder: Any, x: float, y: float) -> float:
-            return builder.fadd(x, y)
+#: Helpers and instructions that numba knows.
+_KNOWN: dict[Helper | Instruction, Any] = {}
+#: Modules whose helpers may be called as ``module.helper``.
+_PACKAGE = __name__.partition(".")[0]
 
-    The body is written once in each module of machine code, as a function that all calls in it share.
-    """
+
+def _dispatcher(helper: Helper) -> Any:
+    inline = "always" if helper.inline else "never"
+    options: Any = {"inline": inline, **_INSIDE, **_OPTIONS}
+    return numba.njit(**options)(_ready(helper.function))
+
+
+def _intrinsic(write: Callable[..., Any]) -> Any:
+    """Return an instruction as numba knows it."""
     hints = get_type_hints(write)
     hints.pop("builder", None)
-    result, parameters = _compiler_type(hints.pop("return")), list(hints.values())
-    signature, nothing = result(*map(_compiler_type, parameters)), result is numba.types.void
-    body: Any = write
+    result, parameters = _type(hints.pop("return")), list(hints.values())
+    signature, nothing = result(*map(_type, parameters)), result is types.void
 
     def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         values: list[Any] = []
@@ -137,118 +165,168 @@ def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Call
             kind(*itertools.islice(given, len(kind._fields))) if hasattr(kind, "_fields") else next(given)
             for kind in parameters
         ]
-        value = body(builder, *arguments)
+        value = write(builder, *arguments)
         builder.ret_void() if nothing else builder.ret(value)
         return function
 
     def typed(context: Any, *types: Any) -> Any:
         return signature, call
 
-    intrinsic: Any = numba.extending.intrinsic
-    compiled: Callable[_Parameters, _Result] = intrinsic(functools.wraps(write)(typed))
-    return compiled
+    return numba.extending.intrinsic(functools.wraps(write)(typed))
 
 
-def _compiler_type(hint: Any) -> Any:
-    """Return numba's type for an annotation."""
-    if get_origin(hint) is Annotated:
-        return eval(get_args(hint)[1], dict(vars(numba.types)))
-    if isinstance(hint, type) and hasattr(hint, "_fields"):
-        fields = get_type_hints(hint, include_extras=True)
-        return numba.types.BaseTuple.from_types([_compiler_type(field) for field in fields.values()], hint)
-    try:
-        return {int: numba.types.int64, float: numba.types.float64, type(None): numba.types.void}[hint]
-    except (KeyError, TypeError):
-        raise TypeError(f"{hint!r} is no type of a kernel's argument") from None
+# --- the function that Python calls ----------------------------------------------------------------------------------
 
 
-@overload
-def njit(signature: _Function, **options: Any) -> _Function: ...
+class _Entry:
+    """The function that Python calls: its arguments become those of the compiled one, and its result a Python object.
 
+        PyObject *entry(PyObject *self, PyObject *const *arguments, Py_ssize_t count)
 
-@overload
-def njit(signature: Any = None, *, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]: ...
-
-
-def njit(signature: Any = None, *, cache: bool = False, **options: Any) -> Any:
-    """``numba.njit`` with the cache on disk described above where ``cache`` is asked for."""
-    if callable(signature) and not isinstance(signature, numba.core.typing.templates.Signature):
-        return numba.njit(signature, **options)
-
-    def compiled(function: Callable[..., Any]) -> Any:
-        dispatcher = numba.njit(function, **options)
-        if cache:
-            try:
-                dispatcher._cache = _DiskCache(function)
-            except RuntimeError as error:  # numba found no folder that it may write to
-                _warn_not_kept("any folder", str(error).splitlines()[0])
-        if signature is not None:
-            dispatcher.compile(signature)
-            dispatcher.disable_compile()
-        return dispatcher
-
-    return compiled
-
-
-class _DiskCache(FunctionCache):
-    """Machine code of one function on disk.
-
-    Numba's own cache raises where a power cut left half a file or a quota is used up. Processes that compile at the same
-    time may take the same name for the code of two signatures (its index has no lock), so the signature of loaded code is
-    checked. And numba looks at the modification time of the function's own file only, while a kernel also consists of the
-    functions that it calls: here the contents of all files that kernels are made of count.
+    ``self`` is the tuple (numpy.ndarray, None, Raised, TypeError). An argument of another kind raises TypeError.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
-        stamp = contents(Path(function.__code__.co_filename)), _engine()
-        self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
+    def __init__(self, context: Any, done: Any, parameters: list[Any], name: str) -> None:
+        self.context, self.done, self.parameters, self.name = context, done, parameters, name
+        self.module = ir.Module(name)
+        self.module.triple, self.module.data_layout = llvm.get_default_triple(), context.codegen()._data_layout
+        self.function = ir.Function(self.module, ir.FunctionType(_POINTER, [_POINTER, _POINTER.as_pointer(), _WORD]), name)
+        self.builder = ir.IRBuilder(self.function.append_basic_block())
+        self.wrong = self.function.append_basic_block("wrong")
+        self.failed = self.function.append_basic_block("failed")
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled function, or None where there is none that can be used."""
-        try:
-            found = super().load_overload(sig, target_context)
-        except Exception:  # unpickling a damaged file can raise anything
-            with contextlib.suppress(OSError):
-                self.flush()
-            return None
-        args, _ = sigutils.normalize_signature(sig)
-        return found if found is not None and tuple(found.signature.args) == tuple(args) else None
+    def code(self) -> Code:
+        """Return entry and kernel as one object file."""
+        self._write()
+        module = self.done.library._final_module.clone()
+        entry = llvm.parse_assembly(cgutils.normalize_ir_text(str(self.module)))
+        entry.verify()
+        module.link_in(entry)
+        if not any(function.name.startswith(_ALLOCATES) for function in module.functions):
+            module.link_in(llvm.parse_assembly(_NOTHING_TO_RELEASE))
+        for function in module.functions:
+            if not function.is_declaration and function.name != self.name:
+                function.linkage = "internal"
+        foreign = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
+        foreign += [v.name for v in module.global_variables if v.is_declaration]
+        return Code(self.name, tuple(foreign), self.context.codegen()._tm.emit_object(module))
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function; a line on stderr says so where that fails."""
-        try:
-            super().save_overload(sig, data)
-        except OSError as error:
-            _warn_not_kept(str(self.cache_path), error.strerror or str(error))
+    def _write(self) -> None:
+        builder, conventions, described = self.builder, self.context.call_conv, self.done.fndesc
+        _, arguments, count = self.function.args
+        self._require(_equal(builder, count, len(self.parameters)))
+        values = [self._value(hint, builder.load(_step(builder, arguments, i))) for i, hint in enumerate(self.parameters)]
+        kind = conventions.get_function_type(described.restype, described.argtypes)
+        kernel = ir.Function(self.module, kind, described.llvm_func_name)
+        thread = self._call("PyEval_SaveThread", _POINTER)
+        status, result = conventions.call_function(builder, kernel, described.restype, described.argtypes, values)
+        self._call("PyEval_RestoreThread", ir.VoidType(), thread)
+        raises, returns = self.function.append_basic_block(), self.function.append_basic_block()
+        builder.cbranch(status.is_error, raises, returns)
+        builder.position_at_end(raises)
+        self._raise(status)
+        builder.position_at_end(returns)
+        builder.ret(self._result(described.restype, result))
+        builder.position_at_end(self.wrong)
+        text = cgutils.global_constant(builder.module, "wrong", cgutils.make_bytearray(_WRONG_ARGUMENTS))
+        self._call("PyErr_SetString", ir.VoidType(), self._own(_WRONG), builder.bitcast(text, _POINTER))
+        builder.branch(self.failed)
+        builder.position_at_end(self.failed)
+        builder.ret(ir.Constant(_POINTER, None))
+
+    def _value(self, hint: Any, given: Any) -> Any:
+        """Return what the compiled function takes for a Python object."""
+        builder, kind = self.builder, _type(hint)
+        if isinstance(kind, types.Array):
+            return self._array(kind, given)
+        if isinstance(kind, types.BaseTuple):
+            entries = builder.bitcast(_step(builder, given, _ENTRIES), _POINTER.as_pointer())
+            values = [self._value(field, builder.load(_step(builder, entries, i))) for i, field in enumerate(_fields(hint))]
+            return self.context.make_tuple(builder, kind, values)
+        whole = isinstance(kind, types.Integer)
+        value = self._call("PyLong_AsLongLong", _WORD, given) if whole else self._call("PyFloat_AsDouble", _DOUBLE, given)
+        error = builder.icmp_unsigned("!=", self._call("PyErr_Occurred", _POINTER), ir.Constant(_POINTER, None))
+        follows = self.function.append_basic_block()
+        builder.cbranch(error, self.failed, follows)
+        builder.position_at_end(follows)
+        return value
+
+    def _array(self, kind: Any, given: Any) -> Any:
+        """Return an array's address and shape as numba has them."""
+        builder, dtype = self.builder, np.dtype(str(kind.dtype))
+        self._require(builder.icmp_unsigned("==", _field(builder, given, _TYPE, _POINTER), self._own(_ARRAY)))
+        self._require(_equal(builder, _field(builder, given, _DIMENSIONS, _INT), kind.ndim))
+        flags = _CONTIGUOUS | (_WRITABLE if kind.mutable else 0)
+        self._require(_equal(builder, builder.and_(_field(builder, given, _FLAGS, _INT), ir.Constant(_INT, flags)), flags))
+        numbers = _field(builder, given, _NUMBERS, _POINTER)
+        self._require(_equal(builder, _field(builder, numbers, _NUMBER, _INT), dtype.num))
+        self._require(_equal(builder, _field(builder, numbers, _ORDER, _BYTE), ord("=")))
+        extents = _field(builder, given, _SHAPE, _WORDS)
+        shape = [builder.load(_step(builder, extents, i)) for i in range(kind.ndim)]
+        size = ir.Constant(_WORD, dtype.itemsize)
+        strides = [size]
+        for extent in reversed(shape[1:]):
+            strides.insert(0, builder.mul(strides[0], extent))
+        array = self.context.make_array(kind)(self.context, builder)
+        data = builder.bitcast(_field(builder, given, _DATA, _POINTER), array.data.type)
+        populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
+        return array._getvalue()
+
+    def _result(self, kind: Any, value: Any) -> Any:
+        """Return a result as a Python object."""
+        if kind is types.void:
+            none = self._own(_NONE)
+            self._call("Py_IncRef", ir.VoidType(), none)
+            return none
+        make = "PyLong_FromLongLong" if isinstance(kind, types.Integer) else "PyFloat_FromDouble"
+        return self._call(make, _POINTER, value)
+
+    def _raise(self, status: Any) -> None:
+        """Set the exception `Raised`, with what numba pickled, and leave."""
+        builder = self.builder
+        described = builder.load(status.excinfoptr)
+        data, size = builder.extract_value(described, 0), builder.sext(builder.extract_value(described, 1), _WORD)
+        pickled = self._call("PyBytes_FromStringAndSize", _POINTER, data, size)
+        self._call("PyErr_SetObject", ir.VoidType(), self._own(_RAISED), pickled)
+        self._call("Py_DecRef", ir.VoidType(), pickled)
+        builder.branch(self.failed)
+
+    def _own(self, place: int) -> Any:
+        """Return an entry of the tuple ``self``."""
+        return _field(self.builder, self.function.args[0], _ENTRIES + 8 * place, _POINTER)
+
+    def _require(self, condition: Any) -> None:
+        """Go on where a condition holds."""
+        follows = self.function.append_basic_block()
+        self.builder.cbranch(condition, follows, self.wrong)
+        self.builder.position_at_end(follows)
+
+    def _call(self, name: str, returned: Any, *arguments: Any) -> Any:
+        """Call a function of Python's library."""
+        kind = ir.FunctionType(returned, [argument.type for argument in arguments])
+        return self.builder.call(cgutils.get_or_insert_function(self.module, kind, name), arguments)
 
 
-@functools.cache
-def _engine() -> str:
-    """Return a fingerprint of the files that hold what kernels call: the room linalg, and this file."""
-    return contents(Path(__file__), *sorted((Path(__file__).parent.parent / "linalg").glob("*.py")))
+#: Arrays that Python gives have no owner that compiled code releases, so this is never called where no others are made.
+_NOTHING_TO_RELEASE = "define void @NRT_MemInfo_call_dtor(i8* %nothing) { ret void }"
+#: How names of functions begin that make arrays.
+_ALLOCATES = ("NRT_MemInfo_alloc", "NRT_Allocate", "NRT_MemInfo_new")
+#: Places in the tuple ``self``, see `contin.functions.machine_code.loaded`.
+_ARRAY, _NONE, _RAISED, _WRONG = range(4)
+#: What TypeError says.
+_WRONG_ARGUMENTS = b"an argument of a kernel is not of the type in its annotations\0"
 
 
-@functools.cache
-def _warn_not_kept(folder: str, reason: str) -> None:
-    """Say once why compiled code is not kept."""
-    print(
-        f"contin: compiled code is not kept in {folder} ({reason}); set CONTIN_CACHE_DIR and NUMBA_CACHE_DIR", file=sys.stderr
-    )
+def _step(builder: Any, pointer: Any, count: int) -> Any:
+    """Return the address of a later element."""
+    return builder.gep(pointer, [ir.Constant(_WORD, count)])
 
 
-def _place_cache() -> None:
-    """Choose a folder for the engine's kernels where the package's own cannot be written."""
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return
-    package = Path(__file__).resolve().parent
-    beside = package / "__pycache__"
-    if os.access(beside if beside.exists() else package, os.W_OK):
-        return
-    with contextlib.suppress(ContinError):  # without any folder nothing is kept; what needs one says so
-        folder = str(cache_directory() / "engine")
-        os.environ["NUMBA_CACHE_DIR"] = folder
-        vars(numba.config)["CACHE_DIR"] = folder
+def _field(builder: Any, item: Any, offset: int, kind: Any) -> Any:
+    """Return the field of this type at an offset in bytes."""
+    return builder.load(builder.bitcast(_step(builder, item, offset), kind.as_pointer()))
 
 
-_place_cache()
+def _equal(builder: Any, value: Any, number: int) -> Any:
+    """Return whether a value is a number."""
+    return builder.icmp_signed("==", value, ir.Constant(value.type, number))

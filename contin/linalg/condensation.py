@@ -56,7 +56,7 @@ class Factorization:
         )  # fmt: skip
         self._unknowns, self._work_size = intervals * rows + n + k, work_size(intervals, rows, n, r, size)
         #: Sign of the determinant up to a factor that depends on the shape only.
-        self.sign = factorize(layout, self._factors, corner, first, last)
+        self.sign = factorize(layout, self._factors, corner, first, last, np.empty((n + r, 2 * n + k)))
 
     def solve(self, b: Array) -> Array:
         """Return the x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""

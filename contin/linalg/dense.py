@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import functools
+from typing import Any
+
 import numpy as np
 
-# scipy.linalg takes no start-up time: numba has imported it. LAPACK itself is called because `scipy.linalg.lu_solve` takes
-# 14 us for ten unknowns, `numpy.linalg.solve`, which factors again, 6 us, and dgetrs 0.7 us.
-from scipy.linalg.lapack import dgetrf, dgetrs  # type: ignore[import-untyped]
-
 from contin.arrays import Array
+
+
+@functools.cache
+def _lapack() -> Any:
+    """Return SciPy's LAPACK: it takes .1 s to load, and only problems without a mesh need it.
+
+    `scipy.linalg.lu_solve` takes 14 us for ten unknowns, `numpy.linalg.solve`, which factors again, 6 us, and dgetrs 0.7 us.
+    """
+    from scipy.linalg import lapack  # type: ignore[import-untyped]
+
+    return lapack
 
 
 class DenseFactors:
@@ -33,7 +43,7 @@ class DenseFactors:
     def __init__(self, matrix: Array) -> None:
         if matrix.shape[0] != matrix.shape[1]:
             raise ValueError(f"a matrix of {matrix.shape[0]} rows and {matrix.shape[1]} columns is not square")
-        self._lu, self._exchanges, zero_pivot = dgetrf(matrix)
+        self._lu, self._exchanges, zero_pivot = _lapack().dgetrf(matrix)
         self._singular = zero_pivot > 0
         #: Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite.
         self.sign = self._sign() if np.all(np.isfinite(matrix)) else np.nan
@@ -57,4 +67,4 @@ class DenseFactors:
         b = np.asarray(b)
         if self._singular:
             return np.full(b.shape, np.nan)
-        return np.ascontiguousarray(dgetrs(self._lu, self._exchanges, b.T, trans=transposed)[0].T)
+        return np.ascontiguousarray(_lapack().dgetrs(self._lu, self._exchanges, b.T, trans=transposed)[0].T)

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contin.functions.compiler import IndexMatrix, IndexVector, Matrix, Stack, helper, kernel
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, helper
 from contin.linalg.layout import Layout
 from contin.linalg.vector import (
     PANEL,
@@ -338,13 +339,12 @@ def _eliminate_dense(carried, first, last, dense, pivots):
 
 
 @kernel
-def factorize(layout: Layout, work: Eliminated, corner: Matrix, first: Matrix, last: Matrix) -> float:
+def factorize(layout: Layout, work: Eliminated, corner: Matrix, first: Matrix, last: Matrix, carried: Matrix) -> float:
     """Factor a matrix and return the sign of its determinant, up to a factor that depends on the shape only.
 
-    ``work`` holds the local and the border blocks and takes the result; the others are those of the `Blocks`.
+    ``work`` holds the local and the border blocks and takes the result; ``carried`` (n + r, 2 n + k) is scratch space, the
+    others are those of the `Blocks`.
     """
-    n, (r, k) = layout.order.size, corner.shape
-    carried = np.empty((n + r, 2 * n + k))
     sign: float = _eliminate_interiors(layout, work, corner)
     sign *= _condense_points(layout, work, corner, carried)
     sign *= _eliminate_dense(carried, first, last, work.dense, work.pivots_dense)

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Pattern
-from contin.functions.compiler import IndexVector, Matrix, Stack
+from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack
 
-#: Problems of more states are one group. The search for groups takes up to 40 ms for 500 states, 0.6 s for 5000.
-_MOST_STATES = 500
+#: Problems of more states are one group. The search for groups takes up to .1 s for 200 states.
+_MOST_STATES = 200
 
 
 class Blocks(NamedTuple):
@@ -82,6 +82,8 @@ class Layout(NamedTuple):
         Unknown of each interior column, as i n + a for node i and state a.
     ends : ndarray, shape (2 n,)
         Unknown of each column of the ends (nodes 0 and d), likewise.
+    starts : ndarray, shape (G, d + 1)
+        The first column of each group at each node.
     """
 
     order: IndexVector
@@ -90,6 +92,7 @@ class Layout(NamedTuple):
     rows: IndexVector
     inside: IndexVector
     ends: IndexVector
+    starts: IndexMatrix
 
 
 def layout(depends: Pattern, degree: int) -> Layout:
@@ -110,7 +113,11 @@ def _layout(pattern: bytes, n: int, degree: int) -> Layout:
     member = np.zeros((len(parts), n), dtype=np.float32)
     member[np.repeat(np.arange(len(parts)), np.diff(offsets)), order] = 1
     follows = (member @ depends @ member.T).T > 0
-    return Layout(*(np.array(a, dtype=np.int64) for a in (order, offsets, follows.ravel(), rows, inside, ends)))
+    starts = np.empty((len(parts), d + 1), np.int64)
+    for g, (first, last) in enumerate(zip(offsets, offsets[1:])):
+        starts[g, 1:d] = (d - 1) * first + (last - first) * np.arange(d - 1)
+        starts[g, [0, d]] = (d + 1) * n - 2 * last + np.array([0, last - first])
+    return Layout(*(np.array(a, dtype=np.int64) for a in (order, offsets, follows.ravel(), rows, inside, ends, starts)))
 
 
 def coupled_groups(depends: Pattern) -> list[list[int]]:
@@ -121,12 +128,10 @@ def coupled_groups(depends: Pattern) -> list[list[int]]:
     n = len(depends)
     if n > _MOST_STATES or np.all(depends):
         return [list(range(n))]
-    # Imported here because it takes 45 ms of start-up time (networkx: 150 ms), and problems of one group do without it.
-    from scipy.sparse import csr_array  # type: ignore[import-untyped]
-    from scipy.sparse.csgraph import breadth_first_order, connected_components  # type: ignore[import-untyped]
-
-    graph = csr_array(depends)
-    count, label = connected_components(graph, connection="strong")
-    groups = [np.flatnonzero(label == g).tolist() for g in range(count)]
-    reachable = [len(breadth_first_order(graph, group[0], return_predecessors=False)) for group in groups]
-    return [group for _, group in sorted(zip(reachable, groups))]
+    paths, known = (depends | np.eye(n, dtype=bool)).astype(np.float32), 0  # of one step at most; then of 2, 4, ...
+    while known != (known := np.count_nonzero(paths)):
+        paths = np.minimum(paths @ paths, 1)
+    reach = paths > 0
+    mutual = reach & reach.T
+    groups = {tuple(np.flatnonzero(row).tolist()): int(count) for row, count in zip(mutual, reach.sum(axis=1))}
+    return [list(group) for group in sorted(groups, key=lambda group: (groups[group], group))]

@@ -7,7 +7,8 @@ import functools
 import numpy as np
 
 from contin.arrays import Array
-from contin.functions.compiler import Matrix, kernel
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix
 from contin.linalg.factors import Factors
 
 

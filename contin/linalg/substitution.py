@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from contin.functions.compiler import Matrix, ReadOnlyMatrix, helper, kernel
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix, ReadOnlyMatrix, helper
 from contin.linalg.elimination import Eliminated, Range, at, group_step, point_step, whole_step
 from contin.linalg.layout import Layout
 from contin.linalg.vector import (

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 
-from contin.functions.compiler import for_range, instruction, variable
+from contin.functions.kernel_parts import for_range, instruction, variable
 
 # LLVM's types of numbers.
 _DOUBLE, _WORD, _INT32, _BIT = ir.DoubleType(), ir.IntType(64), ir.IntType(32), ir.IntType(1)

@@ -17,7 +17,8 @@ from contin import checks
 from contin.arrays import Array
 from contin.discretization.protocol import Equations
 from contin.errors import ConvergenceError
-from contin.functions.compiler import Vector, kernel
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Vector
 from contin.linalg.factors import Factors
 
 #: After a larger update the Jacobian is taken anew, and a first update is trusted no further than this: from there chord steps

@@ -30,7 +30,7 @@ def run(quick: bool) -> dict:
     empty = median(row["seconds"] for row in imports.pop("sys"))
     with tempfile.TemporaryDirectory(prefix="bench-start-") as name:
         folder = Path(name)
-        caches = {"CONTIN_CACHE_DIR": str(folder / "contin"), "NUMBA_CACHE_DIR": str(folder / "numba")}
+        caches = {"CONTIN_CACHE_DIR": str(folder / "contin")}
         first, *warm = (_scene(folder / f"{i}.h5", caches) for i in range(repeats + 1))
     return {
         "python": empty,

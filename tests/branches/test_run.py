@@ -338,7 +338,7 @@ def test_a_second_run_on_the_same_file_is_refused(command, call, scene, undistur
 def test_ctrl_c_before_the_first_point(command, scene, tmp_path_factory):
     """While the kernels are being compiled: no traceback, no file."""
     cache = tmp_path_factory.mktemp("cache")
-    process = command.start(scene, "--out", "x.h5", env={"CONTIN_CACHE_DIR": cache, "NUMBA_CACHE_DIR": cache})
+    process = command.start(scene, "--out", "x.h5", env={"CONTIN_CACHE_DIR": cache})
     time.sleep(1.5)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)

@@ -1,97 +1,158 @@
 """Compiled code on disk: whatever state the files are in, and wherever they may not be, the answer is right."""
 
 import errno
-import importlib.util
-import itertools
 import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-import numba
+import numpy as np
 import pytest
-from numba.core.caching import IndexDataCacheFile
 
 from contin import ContinError
-from contin.functions import cache, compiler
-from contin.functions.compiler import _warn_not_kept
+from contin.functions import cache, machine_code
+from contin.functions.kernel import Kernel
+from contin.functions.kernel_parts import Vector, helper
 
-#: The functions that a kernel calls have one version for each kind of argument, in one index.
-KERNEL = """
-from contin.functions.compiler import njit
 
-@njit(cache=True)
-def helper(x):
+@helper
+def _plus_one(x):
     return x + 1
 
-@njit("f8(f8)", cache=True)
-def kernel(x):
-    return 2 * helper(x) + helper(1)
-"""
-numbers = itertools.count()
+
+def _twice(x: Vector, factor: int) -> float:
+    """Double the sum."""
+    return factor * (_plus_one(x[0]) + _plus_one(1.0))
 
 
 @pytest.fixture
 def kernel(tmp_path, monkeypatch):
-    """A function that imports the module above as a new process would; its compiled code lies in ``tmp_path``."""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    path = tmp_path / "kernel_module.py"
-    path.write_text(KERNEL)
-
-    def load():
-        spec = importlib.util.spec_from_file_location(f"kernel_module_{next(numbers)}", path)
-        module = importlib.util.module_from_spec(spec)
-        monkeypatch.setitem(sys.modules, spec.name, module)
-        spec.loader.exec_module(module)
-        return module.kernel
-
-    return load
+    """Return the kernel as a new process would have it; its machine code lies in ``tmp_path``."""
+    monkeypatch.setenv("CONTIN_CACHE_DIR", str(tmp_path))
+    return lambda: Kernel(_twice, reorder=True)
 
 
-def _files(folder: Path, suffix: str) -> list[Path]:
-    return sorted((folder / "__pycache__").glob(f"*{suffix}"))
+def _file(folder: Path) -> Path:
+    (path,) = folder.glob("k*.bin")
+    return path
 
 
-def test_files_cut_anywhere_are_replaced(kernel, tmp_path):
-    assert kernel()(3.0) == 10.0
-    for suffix in (".nbi", ".nbc"):
-        for length in (0, 1, 20, 300):
-            for path in _files(tmp_path, suffix):
-                os.truncate(path, min(length, path.stat().st_size))
-            assert kernel()(3.0) == 10.0
-    assert sum(kernel()._cache_hits.values()) == 1  # and what replaced them is used
+X = np.array([3.0])
 
 
-def test_code_of_another_signature_under_the_same_name_is_not_taken(kernel, tmp_path):
-    """Two processes that compile at once may leave the entry of one signature with the code of the other."""
-    kernel()
-    one, two = (path for path in _files(tmp_path, ".nbc") if ".helper" in path.name)
-    first, second = one.read_bytes(), two.read_bytes()
-    one.write_bytes(second)
-    two.write_bytes(first)
-    for path in _files(tmp_path, ".nbi"):
-        if ".kernel" in path.name:
-            path.unlink()
-    assert kernel()(3.0) == 10.0
+def test_machine_code_is_kept(kernel, tmp_path):
+    assert kernel().stored() is None
+    assert kernel()(X, 2) == 12.0
+    found = kernel().stored()
+    assert found(X, 2) == 12.0
+    assert found.__name__ == "_twice" and found.__doc__ == "Double the sum." and found.__module__ == __name__
 
 
-def test_code_of_another_version_of_numba_is_not_taken(kernel, tmp_path, monkeypatch):
-    monkeypatch.setattr(numba, "__version__", "0.0.1")
-    kernel()
-    monkeypatch.undo()
-    assert IndexDataCacheFile(str(tmp_path / "__pycache__"), _files(tmp_path, ".nbi")[0].stem, None)._load_index() == {}
+@pytest.mark.parametrize("length", [0, 1, 20, 300, -1])
+def test_files_cut_anywhere_are_replaced(kernel, tmp_path, length):
+    kernel()(X, 2)
+    path = _file(tmp_path)
+    whole = path.read_bytes()
+    os.truncate(path, length % len(whole))
+    assert kernel().stored() is None
+    assert kernel()(X, 2) == 12.0
+    assert len(path.read_bytes()) == len(whole)
+
+
+def test_a_changed_byte_is_noticed(kernel, tmp_path):
+    kernel()(X, 2)
+    path = _file(tmp_path)
+    data = bytearray(path.read_bytes())
+    for place in (0, 40, len(data) // 2, len(data) - 1):
+        path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+        assert kernel().stored() is None
+
+
+def test_code_of_another_key_under_the_same_name_is_not_taken(kernel, tmp_path):
+    kernel()(X, 2)
+    other = Kernel(_twice, reorder=False)
+    _file(tmp_path).rename(tmp_path / f"k{other.key}.bin")
+    assert other.stored() is None
+    assert other(X, 2) == 12.0
+
+
+def test_code_that_calls_a_function_that_is_not_there_is_not_taken(kernel):
+    kernel()(X, 2)
+    key = kernel().key
+    path = cache.cache_directory() / f"k{key}.bin"
+    head, code = machine_code._unpacked(path.read_bytes())
+    machine_code.keep(key, machine_code.Code(head["entry"], ("no_such_function",), code))
+    assert kernel().stored() is None
+
+
+def test_the_key_depends_on_the_machine_and_on_versions(monkeypatch):
+    """A cache may lie in a home that several machines share."""
+    from contin.functions import kernel as module
+
+    keys = {Kernel(_twice, reorder=True).key}
+    for target, name, value in (
+        (machine_code.llvm, "get_host_cpu_name", lambda: "z80"), (np, "__version__", "0.0.1"), (sys, "version", "2.7"),
+    ):  # fmt: skip
+        with monkeypatch.context() as patch:
+            patch.setattr(target, name, value)
+            module._surroundings.cache_clear()
+            keys.add(Kernel(_twice, reorder=True).key)
+    module._surroundings.cache_clear()
+    assert len(keys) == 4
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (), (X,), (X, 2, 3), (X, None), ([3.0], 2), (X.astype("f4"), 2), (X.astype(">f8"), 2), (X[None], 2),
+        (np.ones(4)[::2], 2), (np.float64(3.0), 2), (X, "2"), (X, 2.5), (X, 2**70),
+    ],
+)  # fmt: skip
+def test_arguments_of_other_types_are_refused(kernel, arguments):
+    with pytest.raises((TypeError, OverflowError)):
+        kernel()(*arguments)
+    assert kernel()(X, np.int64(2)) == 12.0
+
+
+def test_arrays_that_cannot_be_written_are_refused_where_they_might_be(kernel):
+    fixed = X.copy()
+    fixed.flags.writeable = False
+    with pytest.raises(TypeError):
+        kernel()(fixed, 2)
 
 
 def test_a_full_disk_costs_a_line_and_the_cache(kernel, monkeypatch, capsys):
     def full(*arguments):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(IndexDataCacheFile, "save", full)
-    _warn_not_kept.cache_clear()
-    assert kernel()(3.0) == 10.0
+    monkeypatch.setattr(machine_code, "write_whole", full)
+    machine_code._warn_not_kept.cache_clear()
+    assert kernel()(X, 2) == 12.0
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "No space left on device" in said and "CONTIN_CACHE_DIR" in said
+
+
+WITHOUT_NUMBA = """
+import sys
+exec(open(sys.argv[1]).read())
+print(sorted({"numba", "scipy", "sympy"} & set(sys.modules)))
+"""
+
+
+def test_a_second_process_needs_no_compiler(tmp_path):
+    """Machine code on disk needs neither numba nor SciPy: loading them would take longer than most runs."""
+    problem = tmp_path / "problem.py"
+    problem.write_text(PROBLEM)
+    environment = {**os.environ, "CONTIN_CACHE_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+    lines = [
+        subprocess.run(
+            [sys.executable, "-c", WITHOUT_NUMBA, problem], env=environment, capture_output=True, text=True, check=True
+        ).stdout.split("\n")
+        for _ in range(2)
+    ]
+    assert lines[0][0] == lines[1][0]
+    assert "numba" in lines[0][1] and lines[1][1] == "[]"
 
 
 def test_code_finds_a_place_or_says_what_to_set(tmp_path, monkeypatch, capsys):
@@ -114,7 +175,7 @@ def test_code_finds_a_place_or_says_what_to_set(tmp_path, monkeypatch, capsys):
 PROBLEM = """
 import contin
 problem = contin.BoundaryValueProblem(
-    lambda t, u, p: (u.v, -p.lam * u.u), lambda a, b, p: (a.u, b.u - 1), ["u", "v"], {"lam": 1.0}
+    lambda t, u, p: (u.v, -p.lam * u.u + 0 * u.v), lambda a, b, p: (a.u, b.u - 1), ["u", "v"], {"lam": 1.0}
 )
 print(repr(contin.solve(problem, [0, 1], intervals=4).x.sum()))
 """
@@ -173,16 +234,14 @@ def test_functions_of_one_name_compiled_by_two_processes_stay_apart(tmp_path):
 
 
 def test_an_installation_and_a_home_that_cannot_be_used(tmp_path, monkeypatch, capsys):
-    """Neither the package's folder nor a home: kernels and problems go to one temporary folder, and a line says what to set."""
+    """Neither a cache nor a home: compiled code goes to one temporary folder, and a line says what to set."""
     monkeypatch.setattr(os, "access", lambda path, mode: str(path).startswith(str(tmp_path)))
     monkeypatch.setattr(cache, "_temporary_directory", cache.functools.cache(cache._temporary_directory.__wrapped__))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    for name, value in {"HOME": "/proc/none", "XDG_CACHE_HOME": "", "CONTIN_CACHE_DIR": "", "NUMBA_CACHE_DIR": ""}.items():
+    for name, value in {"HOME": "/proc/none", "XDG_CACHE_HOME": "", "CONTIN_CACHE_DIR": ""}.items():
         monkeypatch.setenv(name, value)
-    compiler._place_cache()
     folder = cache.cache_directory()
-    assert folder.parent == tmp_path and os.environ["NUMBA_CACHE_DIR"] == numba.config.CACHE_DIR == str(folder / "engine")
+    assert folder.parent == tmp_path and Kernel(_twice, reorder=True)(X, 2) == 12.0 and _file(folder).exists()
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "set CONTIN_CACHE_DIR to keep it" in said
     monkeypatch.setattr(tempfile, "tempdir", "/proc/none")

@@ -6,7 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from contin.functions.compiler import Matrix, Vector, kernel
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix, Vector
 from contin.linalg import vector
 from contin.linalg.elimination import at
 from contin.linalg.vector import LANES, PANEL

@@ -1,0 +1,230 @@
+"""Users' functions compiled: operators that are not analytic are replaced by a pass of the compiler.
+
+See `contin.functions.complex_step`, which says what is replaced and why.
+"""
+
+from __future__ import annotations
+
+import operator
+import types as python_types
+from collections.abc import Sequence
+from typing import Any
+
+import numba
+from numba import types
+from numba.core import ir
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.ir_utils import build_definitions
+from numba.core.untyped_passes import IRProcessing
+from numba.extending import overload
+
+from contin.arrays import Function
+from contin.errors import ProblemError
+from contin.functions.complex_step import REPLACED, ComplexStep
+from contin.functions.kernel import Kernel
+
+#: Starts of messages of numba that say what is wrong with a user's function; the lines before them are about numba itself.
+_REASONS = ("No implementation", "Untyped", "Unknown", "Invalid")
+
+
+class _Compiled(ComplexStep):
+    """Rewrite functions for the complex step, and let numba compile them."""
+
+    def finished(self, copy: python_types.FunctionType) -> Any:
+        """Return the function as compiled code calls it, with operators replaced."""
+        inside: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # only compiled code calls it
+        return numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler, **inside)
+
+    def stand_in(self, value: Any) -> Any:
+        """Return the stand-in as compiled code calls it."""
+        found = super().stand_in(value)
+        return numba.njit(found) if found in REPLACED.values() else found
+
+
+def compile_batch(kernel: Kernel, functions: Sequence[Function]) -> Any:
+    """Return the compiled kernel, which calls users' functions as function0, function1, ...
+
+    Raises
+    ------
+    ProblemError
+        A function that cannot be compiled; the message says which and why.
+    """
+    rewriter = _Compiled()
+    compiled = {f"function{i}": rewriter.function(function) for i, function in enumerate(functions)}
+    kernel.function.__globals__.update(compiled)
+    try:
+        return kernel.compiled
+    except (numba.core.errors.NumbaError, AssertionError) as error:  # the latter are numba's own
+        names = " and ".join(function.__name__ for function in functions)
+        raise ProblemError(_explanation(names, error)) from error
+
+
+def _explanation(name: str, error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    reason = next((line for line in lines if line.startswith(_REASONS)), None)
+    reason = reason or (lines[0] if lines else "numba fails (a list of whole and other numbers? write 0.0, not 0)")
+    return (
+        f"function {name!r} cannot be compiled for real and complex numbers: {reason} "
+        "(use arithmetic, comparisons, and functions of numbers from math or numpy)"
+    )
+
+
+# Every implementation has a name of its own: numba tells compiled functions apart by name and types, and machine code of
+# several cached modules shares one space of names.
+
+
+def power(x, y):
+    """x ** y."""
+    return x**y
+
+
+def _one(x, y):
+    return 1.0 + 0.0 * x
+
+
+def _itself(x, y):
+    return x
+
+
+def _square(x, y):
+    return x * x
+
+
+def _cube(x, y):
+    return x * x * x
+
+
+def _fourth(x, y):
+    return (x * x) * (x * x)
+
+
+def _by_products(x, y):
+    result, factor, left = 1.0 + 0.0 * x, x, abs(y)
+    while left:
+        if left & 1:
+            result = result * factor
+        factor = factor * factor
+        left >>= 1
+    return result if y >= 0 else 1.0 / result
+
+
+def _by_products_if_whole(x, y):
+    if y.imag != 0 or y.real != int(y.real):
+        return x**y
+    result, factor, left = 1.0 + 0.0 * x, x, abs(int(y.real))
+    while left:
+        if left & 1:
+            result = result * factor
+        factor = factor * factor
+        left >>= 1
+    return result if y.real >= 0 else 1.0 / result
+
+
+def _plain_power(x, y):
+    return x**y
+
+
+@overload(power, prefer_literal=True)
+def _choose_power(x, y):
+    if isinstance(y, types.IntegerLiteral) and 0 <= y.literal_value <= 4:
+        return (_one, _itself, _square, _cube, _fourth)[y.literal_value]
+    if isinstance(y, types.Integer):
+        return _by_products
+    if isinstance(x, types.Complex) and isinstance(y, (types.Float, types.Complex)):
+        return _by_products_if_whole
+    return _plain_power
+
+
+def greater(a, b):
+    """a > b of the real parts."""
+    return a.real > b.real
+
+
+def less(a, b):
+    """a < b of the real parts."""
+    return a.real < b.real
+
+
+def greater_equal(a, b):
+    """a >= b of the real parts."""
+    return a.real >= b.real
+
+
+def less_equal(a, b):
+    """a <= b of the real parts."""
+    return a.real <= b.real
+
+
+def _plain_greater(a, b):
+    return a > b
+
+
+def _plain_less(a, b):
+    return a < b
+
+
+def _plain_greater_equal(a, b):
+    return a >= b
+
+
+def _plain_less_equal(a, b):
+    return a <= b
+
+
+def _compare(function, plain):
+    def choose(a, b):
+        return function if isinstance(a, types.Number) and isinstance(b, types.Number) else plain
+
+    overload(function)(choose)
+    return function
+
+
+#: Operators whose meaning for complex numbers spoils the complex step, and the functions called in their place.
+_STAND_INS = {
+    operator.pow: power,
+    operator.ipow: power,
+    operator.gt: _compare(greater, _plain_greater),
+    operator.lt: _compare(less, _plain_less),
+    operator.ge: _compare(greater_equal, _plain_greater_equal),
+    operator.le: _compare(less_equal, _plain_less_equal),
+}
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _UseStandIns(FunctionPass):
+    """Replace binary operators by calls of their stand-ins."""
+
+    _name = "contin_use_stand_ins"
+
+    def __init__(self):
+        FunctionPass.__init__(self)
+
+    def run_pass(self, state):
+        blocks, changed = state.func_ir.blocks, False
+        for block in blocks.values():
+            body = []
+            for statement in block.body:
+                value: Any = getattr(statement, "value", None)
+                binary = isinstance(statement, ir.Assign) and isinstance(value, ir.Expr)
+                if binary and value.op in ("binop", "inplace_binop") and value.fn in _STAND_INS:
+                    function = block.scope.redefine("$stand_in", value.loc)
+                    body.append(ir.Assign(ir.Global("stand_in", _STAND_INS[value.fn], value.loc), function, value.loc))
+                    call = ir.Expr.call(function, (value.lhs, value.rhs), (), value.loc)
+                    statement = ir.Assign(call, statement.target, statement.loc)
+                    changed = True
+                body.append(statement)
+            block.body = body
+        if changed:
+            state.func_ir._definitions = build_definitions(blocks)
+        return changed
+
+
+class AnalyticCompiler(CompilerBase):
+    """Numba's pipeline with the stand-ins put in."""
+
+    def define_pipelines(self):
+        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        manager.add_pass_after(_UseStandIns, IRProcessing)
+        manager.finalize()
+        return [manager]

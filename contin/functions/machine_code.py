@@ -1,0 +1,154 @@
+"""Machine code on disk, and in memory as Python functions, without a compiler.
+
+The code of a kernel is an object file for this machine. It holds a function that Python calls like one of its own: it checks
+its arguments, reads the addresses and shapes of arrays, and calls the kernel. `contin.functions.compiler` writes it.
+
+A file in the cache is used only where it is whole, of the wanted key, and finds all functions of other libraries that it calls.
+The cache can only help: a file that cannot be read, written or trusted costs time, never an answer.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import hashlib
+import json
+import pickle
+import sys
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from contin.errors import ContinError
+from contin.files import write_whole
+from contin.functions.cache import cache_directory
+
+#: The name of the function in an object file that Python calls, followed by the key of the code.
+ENTRY = "contin_"
+#: Python calls it with an array of arguments (METH_FASTCALL).
+_CALLED_WITH_ARRAY = 0x0080
+
+
+class Code(NamedTuple):
+    """The machine code of a kernel.
+
+    ``entry`` is the name of the function that Python calls, ``foreign`` are names of functions in other libraries.
+    """
+
+    entry: str
+    foreign: tuple[str, ...]
+    object: bytes
+
+
+class Raised(Exception):
+    """An exception of the compiled function, as the compiler pickled it."""
+
+    def exception(self) -> BaseException:
+        """Return the exception."""
+        try:
+            kind, arguments = pickle.loads(self.args[0])[:2]
+            found: BaseException = kind(*(arguments or ()))
+        except Exception:  # of a kind that only the compiler can read
+            return RuntimeError("a compiled function raised an exception that cannot be read")
+        return found
+
+
+def machine() -> tuple[str, str, str]:
+    """Return what machine code is for: the system, the processor's name, and its features."""
+    return llvm.get_default_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+def stored(key: str, name: str, doc: str | None) -> Callable[..., Any] | None:
+    """Return the function of this key in the cache; None where there is none that can be used."""
+    try:
+        data = (cache_directory() / f"k{key}.bin").read_bytes()
+        head, code = _unpacked(data)
+    except (OSError, ContinError, ValueError):
+        return None
+    if head["key"] != key:
+        return None
+    try:
+        return loaded(Code(head["entry"], tuple(head["foreign"]), code), name, doc)
+    except ContinError:
+        return None
+
+
+def keep(key: str, code: Code) -> None:
+    """Keep the code of a kernel in the cache; a line on stderr says so where that fails."""
+    folder = cache_directory()
+    head = json.dumps({"key": key, "entry": code.entry, "foreign": code.foreign}).encode()
+    body = len(head).to_bytes(8, "little") + head + code.object
+    try:
+        write_whole(folder / f"k{key}.bin", hashlib.sha256(body).digest() + body)
+    except OSError as error:
+        _warn_not_kept(str(folder), error.strerror or str(error))
+
+
+def _unpacked(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """Return the head and the object code of a file.
+
+    Raises
+    ------
+    ValueError
+        The file is not whole.
+    """
+    body = memoryview(data)[32:]
+    if hashlib.sha256(body).digest() != data[:32]:
+        raise ValueError("the file is not whole")
+    size = int.from_bytes(body[:8], "little")
+    return json.loads(bytes(body[8 : 8 + size])), bytes(body[8 + size :])
+
+
+class _Method(ctypes.Structure):
+    """Python's PyMethodDef."""
+
+    _fields_ = [("name", ctypes.c_char_p), ("function", ctypes.c_void_p), ("flags", ctypes.c_int), ("doc", ctypes.c_char_p)]
+
+
+#: What functions point to, as long as the process lives.
+_KEPT: list[_Method] = []
+
+
+def loaded(code: Code, name: str, doc: str | None) -> Callable[..., Any]:
+    """Return machine code as a Python function; ``name`` is that of its module and its own.
+
+    Raises
+    ------
+    ContinError
+        It calls a function that this process does not have.
+    """
+    engine = _engine()
+    missing = [symbol for symbol in code.foreign if llvm.address_of_symbol(symbol) is None]
+    if missing:  # those of numba's library
+        from numba.core.registry import cpu_target  # takes .3 s; only code that makes arrays of its own needs it
+
+        cpu_target.target_context.refresh()
+        missing = [symbol for symbol in missing if llvm.address_of_symbol(symbol) is None]
+    if missing:
+        raise ContinError(f"{name}: the function {missing[0]}, which its machine code calls, is not there")
+    engine.add_object_file(llvm.object_file.ObjectFileRef.from_data(code.object))
+    engine.finalize_object()
+    module, _, own = name.rpartition(".")
+    method = _Method(own.encode(), engine.get_function_address(code.entry), _CALLED_WITH_ARRAY, (doc or "").encode())
+    _KEPT.append(method)
+    make = ctypes.pythonapi.PyCFunction_NewEx
+    make.restype, make.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
+    function: Callable[..., Any] = make(ctypes.addressof(method), (np.ndarray, None, Raised, TypeError), module)
+    return function
+
+
+@functools.cache
+def _engine() -> Any:
+    """Return the loader of object files."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    target = llvm.Target.from_default_triple().create_target_machine()
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), target)
+
+
+@functools.cache
+def _warn_not_kept(folder: str, reason: str) -> None:
+    """Say once why compiled code is not kept."""
+    print(f"contin: compiled code is not kept in {folder} ({reason}); set CONTIN_CACHE_DIR", file=sys.stderr)
