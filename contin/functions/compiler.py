@@ -69,7 +69,6 @@ def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Cod
         done = compiler.compile_extra(
             cpu_target.typing_context, context, _ready(function), tuple(map(_type, parameters)), result, flags, {}
         )
-        done.library.finalize()
         return _Entry(context, done, parameters, entry).code()
 
 
@@ -198,7 +197,7 @@ class _Entry:
     def code(self) -> Code:
         """Return entry and kernel as one object file."""
         self._write()
-        module = self.done.library._final_module.clone()
+        module = _linked(self.done.library)
         entry = llvm.parse_assembly(cgutils.normalize_ir_text(str(self.module)))
         entry.verify()
         module.link_in(entry)
@@ -305,6 +304,14 @@ class _Entry:
         """Call a function of Python's library."""
         kind = ir.FunctionType(returned, [argument.type for argument in arguments])
         return self.builder.call(cgutils.get_or_insert_function(self.module, kind, name), arguments)
+
+
+def _linked(library: Any) -> Any:
+    """Return the module of a library with all that it calls, optimized: `library.finalize()` would also make machine code."""
+    for other in dict.fromkeys(library._linking_libraries):
+        library._final_module.link_in(other._get_module_for_linking(), preserve=True)
+    library._optimize_final_module()
+    return library._final_module
 
 
 #: Arrays that Python gives have no owner that compiled code releases, so this is never called where no others are made.

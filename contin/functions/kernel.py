@@ -13,10 +13,15 @@ called for the first time, and keeps it. `contin.functions.kernel_parts` has the
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import importlib
 import importlib.util
+import os
+import subprocess
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
@@ -24,6 +29,7 @@ import llvmlite
 import numpy as np
 
 from contin.functions import machine_code
+from contin.functions.cache import cache_directory
 from contin.functions.fingerprint import Fingerprint, contents
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -65,6 +71,28 @@ class Kernel:
         found = self.stored()
         if found is not None:
             return found
+        _share_work()
+        others = [other for other in _PENDING if other is not self and "compiled" not in vars(other)]
+        while True:
+            with machine_code.claim(self.key) as mine:
+                found = self._made() if mine else None
+            if found is not None:
+                return found
+            if others:  # another process makes this one
+                others.pop().prepare()
+            else:
+                time.sleep(_WAIT)
+
+    def prepare(self) -> None:
+        """Make the machine code, unless the cache has it, or another process is making it."""
+        with machine_code.claim(self.key) as mine:
+            if mine:
+                vars(self).setdefault("compiled", self._made())
+
+    def _made(self) -> Callable[..., Any]:
+        found = self.stored()
+        if found is not None:
+            return found
         from contin.functions import compiler  # numba takes .3 s, and is needed the first time only
 
         code = compiler.machine_code(self.function, self.reorder, machine_code.ENTRY + self.key)
@@ -93,8 +121,54 @@ def kernel(function: Any = None, *, reorder: bool = True) -> Any:
     """
     if function is None:
         return functools.partial(kernel, reorder=reorder)
-    pending = Kernel(function, reorder)
-    return pending.stored() or pending
+    made = Kernel(function, reorder)
+    found = made.stored()
+    if found is None:
+        _PENDING.append(made)
+    return found or made
+
+
+#: Kernels whose machine code was not in the cache when they were defined.
+_PENDING: list[Kernel] = []
+#: Seconds between two looks whether another process has made what this one waits for.
+_WAIT = 0.05
+#: Kernels of these modules are worth a second process.
+_PACKAGE = __name__.partition(".")[0] + "."
+
+
+@functools.cache
+def _share_work() -> subprocess.Popen[bytes] | None:
+    """Start a process that makes machine code of the package's kernels as well; say that there is something to wait for."""
+    modules = dict.fromkeys(each.function.__module__ for each in _PENDING if each.name.startswith(_PACKAGE))
+    if not modules:
+        return None
+    if sys.stderr is not None and sys.stderr.isatty():
+        print("contin: compiling for this machine (once, some 15 s)", file=sys.stderr)
+    if (os.cpu_count() or 1) < 2 or not sys.executable:
+        return None
+    quiet: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    with contextlib.suppress(OSError):  # this process makes all of it, then
+        environment = {**os.environ, "CONTIN_CACHE_DIR": str(cache_directory())}
+        return subprocess.Popen([sys.executable, "-c", _PREPARE, *sys.path, "", *modules], env=environment, **quiet)
+    return None
+
+
+#: The program of that process; its arguments are this one's path, and modules.
+_PREPARE = """
+import sys
+split = sys.argv.index("", 1)
+sys.path[:] = sys.argv[1:split]
+from contin.functions.kernel import prepare
+prepare(sys.argv[split + 1:])
+"""
+
+
+def prepare(modules: Sequence[str]) -> None:
+    """Make the machine code of the kernels that modules define."""
+    for module in modules:
+        importlib.import_module(module)
+    for each in list(_PENDING):
+        each.prepare()
 
 
 @functools.cache

@@ -9,13 +9,14 @@ The cache can only help: a file that cannot be read, written or trusted costs ti
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 import hashlib
 import json
 import pickle
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
@@ -84,6 +85,26 @@ def keep(key: str, code: Code) -> None:
         write_whole(folder / f"k{key}.bin", hashlib.sha256(body).digest() + body)
     except OSError as error:
         _warn_not_kept(str(folder), error.strerror or str(error))
+
+
+@contextlib.contextmanager
+def claim(key: str) -> Iterator[bool]:
+    """Hold the right to make the machine code of this key; False where another process holds it."""
+    from filelock import FileLock, Timeout  # takes 25 ms, and is needed the first time only
+
+    try:
+        lock = FileLock(cache_directory() / f"k{key}.lock", timeout=0)
+        lock.acquire()
+    except Timeout:
+        yield False
+        return
+    except (OSError, NotImplementedError):  # a folder that has no locks: the work is done twice
+        yield True
+        return
+    try:
+        yield True
+    finally:
+        lock.release()
 
 
 def _unpacked(data: bytes) -> tuple[dict[str, Any], bytes]:

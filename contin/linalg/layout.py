@@ -129,7 +129,7 @@ def coupled_groups(depends: Pattern) -> list[list[int]]:
     if n > _MOST_STATES or np.all(depends):
         return [list(range(n))]
     paths, known = (depends | np.eye(n, dtype=bool)).astype(np.float32), 0  # of one step at most; then of 2, 4, ...
-    while known != (known := np.count_nonzero(paths)):
+    while known != (known := int(np.count_nonzero(paths))):
         paths = np.minimum(paths @ paths, 1)
     reach = paths > 0
     mutual = reach & reach.T

@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 
 from contin import ContinError
 from contin.functions import cache, machine_code
+from contin.functions import kernel as kernels
 from contin.functions.kernel import Kernel
 from contin.functions.kernel_parts import Vector, helper
 
@@ -77,6 +80,31 @@ def test_code_of_another_key_under_the_same_name_is_not_taken(kernel, tmp_path):
     assert other(X, 2) == 12.0
 
 
+def test_a_kernel_that_another_process_makes_is_waited_for(kernel):
+    kernel()(X, 2)
+    key, path = kernel().key, cache.cache_directory() / f"k{kernel().key}.bin"
+    made = path.read_bytes()
+    path.unlink()
+    with ThreadPoolExecutor() as executor:
+        with machine_code.claim(key) as mine:
+            waiting = executor.submit(kernel(), X, 2)
+            time.sleep(0.3)
+            assert mine and not waiting.done()
+            path.write_bytes(made)
+        assert waiting.result(timeout=60) == 12.0
+    assert path.read_bytes() == made
+
+
+def test_the_second_process_makes_kernels_of_modules(tmp_path, monkeypatch):
+    (tmp_path / "one_kernel.py").write_text(
+        "from contin.functions.kernel import kernel\n\n@kernel\ndef one(x: int) -> int:\n    return x + 1\n"
+    )
+    monkeypatch.setenv("CONTIN_CACHE_DIR", str(tmp_path))
+    program = [sys.executable, "-c", kernels._PREPARE, str(tmp_path), *sys.path, "", "one_kernel"]
+    subprocess.run(program, check=True)
+    assert len(list(tmp_path.glob("k*.bin"))) == 1
+
+
 def test_code_that_calls_a_function_that_is_not_there_is_not_taken(kernel):
     kernel()(X, 2)
     key = kernel().key
@@ -88,17 +116,15 @@ def test_code_that_calls_a_function_that_is_not_there_is_not_taken(kernel):
 
 def test_the_key_depends_on_the_machine_and_on_versions(monkeypatch):
     """A cache may lie in a home that several machines share."""
-    from contin.functions import kernel as module
-
     keys = {Kernel(_twice, reorder=True).key}
     for target, name, value in (
         (machine_code.llvm, "get_host_cpu_name", lambda: "z80"), (np, "__version__", "0.0.1"), (sys, "version", "2.7"),
     ):  # fmt: skip
         with monkeypatch.context() as patch:
             patch.setattr(target, name, value)
-            module._surroundings.cache_clear()
+            kernels._surroundings.cache_clear()
             keys.add(Kernel(_twice, reorder=True).key)
-    module._surroundings.cache_clear()
+    kernels._surroundings.cache_clear()
     assert len(keys) == 4
 
 
