@@ -54,7 +54,7 @@ def quotients(before: Factors, after: Factors, size: int, rounds: int = 2) -> Co
         values = _quotients(before, after, size, watched, rounds)
         if watched == size or not np.all(np.isfinite(values)) or _steady(values):
             return values
-        watched = min(2 * watched, size)  # all of them change: there may be more
+        watched, rounds = min(2 * watched, size), 2  # all of them change: there may be more
 
 
 def _steady(values: ComplexArray) -> bool:
