@@ -139,9 +139,9 @@ def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[di
         else:
             diagram_graph.add_branch(graph, stored, primary_file(one))
     plan, failed = _Plan(configs, fresh, graph), {}
+    _load_kernels(fresh)
     display.begin_diagram(config, len(configs), len(configs) - len(fresh))
     if fresh:
-        _load_kernels(fresh)
         with run as (submit, wait, limit):
             for one, result in run_jobs(plan.next, _compute_one, submit, limit, wait):
                 problem = _take(folder, one, result, graph)

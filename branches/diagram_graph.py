@@ -300,7 +300,7 @@ def describe_node(node) -> str:
     if node["kind"] == "circle":
         return f"circle {node['covering']} at {node['kappa_n']:.6f}"
     if node["kind"] == "leaves":
-        return f"leaves at {node['kappa_n']:.10g}, a limit of the scene"
+        return f"stops at {node['kappa_n']:.10g}, the scene's own limit"
     return f"{node['kind']} at {node['kappa_n']:.6f}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import signal
 import time
 from pathlib import Path
@@ -12,7 +13,7 @@ from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
 from branches.start import UntilPrimary, seed, settings_of
 from branches.store import BranchWriter, open_branch, read_state
-from contin import Continuation, exact_text
+from contin import Continuation, Stop, exact_text
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 
@@ -69,8 +70,15 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
         display.begin(config, writer.count, len(writer.events()))
         outcome = _follow(config, run, writer, display, _Interruption())
         seconds = time.perf_counter() - began
-        display.summary(config, writer.events(), writer.count, seconds, path, outcome, run.stop)
+        display.summary(config, writer.events(), writer.count, seconds, path, outcome, _shown(run.stop))
     return outcome
+
+
+def _shown(stop: Stop | None) -> Stop | None:
+    """Return why a run ended as people are told: a limit is one that the scene sets, not one of the strip."""
+    if stop is None or stop.reason != "limit":
+        return stop
+    return dataclasses.replace(stop, message=f"{stop.message}, the scene's own limit")
 
 
 def compute_branch(config: Config, display) -> tuple[bytes, str]:

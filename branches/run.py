@@ -61,12 +61,13 @@ def _run(options) -> int:
         path = output_path(options)
     except ConfigError as error:
         return _refuse(error)
-    from branches.display import Display
+    from branches.progress import StartingDisplay
+
+    display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.files import StoreError
     from branches.job import run_branch
     from contin import ContinError
 
-    display = Display(quiet=options.quiet)
     try:
         outcome = run_branch(config, path, display, resume=options.resume, overwrite=options.overwrite)
     except (ConfigError, StoreError, ContinError) as error:
@@ -81,11 +82,6 @@ def _run_diagram(config, options) -> int:
     from pathlib import Path
 
     from branches.config import ConfigError
-    from branches.diagram import run_diagram
-    from branches.display import Display
-    from branches.executor import ExecutorError
-    from branches.files import StoreError
-    from contin import ContinError
 
     if options.resume:
         raise ConfigError("--resume: a scene of many branches needs none; run it again and it computes what is missing")
@@ -96,7 +92,14 @@ def _run_diagram(config, options) -> int:
     folder = Path(options.out or Path(options.config).stem)
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
-    display = Display(quiet=options.quiet)
+    from branches.progress import StartingDisplay
+
+    display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
+    from branches.diagram import run_diagram
+    from branches.executor import ExecutorError
+    from branches.files import StoreError
+    from contin import ContinError
+
     try:
         outcome = run_diagram(
             config, folder, display, scheduler=options.scheduler, workers=options.workers, time_limit=options.time_limit,

@@ -14,16 +14,18 @@ if __name__ == "__main__":  # before the imports below, which take a second
 import argparse
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from branches import diagram_graph as diagram
 from branches.config import Config, ConfigError, dump, parse
-from branches.display import Display, complain, write_output
+from branches.display import complain, write_output
 from branches.files import StoreError, prepare, write_bytes
 from branches.job import compute_branch
 from branches.names import DIAGRAM, secondary_file
+from branches.progress import Progress
 from branches.read import StoredBranch, complete_run, read_branch
 from contin import ContinError
 from ribbon_model.domains import CELL, HALF_LOOPS
@@ -32,7 +34,7 @@ from ribbon_model.modes import Mode
 # --- all that leave the branches of a result ------------------------------------------------------------------------
 
 
-def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[dict]:
+def follow_all(result: Path, folder: Path, settings: list[str], progress: Progress) -> list[dict]:
     """Follow every secondary branch of a result, in the same folder as a diagram with the primary ones.
 
     Parameters
@@ -43,8 +45,8 @@ def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[di
         Where files and diagram go.
     settings : list of str
         ``key=value`` over the scenes of the secondary branches, which otherwise take those of the primary ones.
-    tell : callable
-        Gets a line of text for every attempt.
+    progress : Progress
+        Shows how far the work is, and a line of text for every attempt.
 
     Returns
     -------
@@ -65,12 +67,13 @@ def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[di
         write_bytes(folder / name, (result if result.is_file() else result / name).read_bytes())
         if name not in there:
             diagram.add_branch(graph, branch, name)
-    switches = []
-    for name, branch in primaries.items():
-        for event in branch.events[branch.events["label"] == b"SB"]:
-            for switch in _attempts(graph, branch, name, event, folder, settings):
-                switches.append(switch)
-                tell(_line(switch))
+    switches, events = [], [(name, event) for name, one in primaries.items() for event in one.events if event["label"] == b"SB"]
+    progress.expect(len(events))
+    for name, event in events:
+        for switch in _attempts(graph, primaries[name], name, event, _Place(folder, settings, progress)):
+            switches.append(switch)
+            progress.tell(_line(switch) + "\n")
+        progress.part_done()
     graph.graph["switches"] = json.dumps(old + switches)
     diagram.save(graph, folder)
     return switches
@@ -111,7 +114,16 @@ def _remove_secondaries(graph, primaries) -> list[dict]:
     return [switch for switch in switches if switch["primary"] not in primaries]
 
 
-def _attempts(graph, branch: StoredBranch, name: str, event, folder: Path, settings):
+@dataclass(frozen=True)
+class _Place:
+    """Where secondary branches are kept, what changes their scenes, and who is told how far they have come."""
+
+    folder: Path
+    settings: list[str]
+    progress: Progress
+
+
+def _attempts(graph, branch: StoredBranch, name: str, event, place: _Place):
     """Leave one bifurcation by every kind of branch, one after the other: records of what came of it."""
     config = branch.config
     where = {column: float(event[column]) for column in ("kappa_n", "kappa_star")}
@@ -127,18 +139,19 @@ def _attempts(graph, branch: StoredBranch, name: str, event, folder: Path, setti
         yield record | {"outcome": "failed", "reason": "its modes keep no mirror and no axis: they need the whole loop"}
     for reversal in how.keeps:
         this = record | {"keeps": how.kept(reversal), "breaks": how.broken(reversal), "domain": HALF_LOOPS[reversal].name}
-        yield this | _attempt(graph, branch, event, reversal, folder, settings)
+        place.progress.part(f"({this['m']}, {this['n']}) at {where['kappa_n']:.6f}, {this['mode']}, keeps {this['keeps']}")
+        yield this | _attempt(graph, branch, event, reversal, place)
 
 
-def _attempt(graph, branch: StoredBranch, event, reversal: str, folder: Path, settings) -> dict:
+def _attempt(graph, branch: StoredBranch, event, reversal: str, place: _Place) -> dict:
     """Follow one branch, put it into the diagram: how it ended."""
-    config = _scene(branch.config, event, reversal, settings)
+    config = _scene(branch.config, event, reversal, place.settings)
     file = secondary_file(config, {data["file"] for _, _, data in graph.edges(data=True)})
     known = _arrived_before(graph, config)
     if known:
         return {"outcome": "known", "reason": f"the other end of {known}", "file": known}
     try:
-        stored = _computed(folder / file, config)
+        stored = _computed(place.folder / file, config, place.progress)
     except (ConfigError, ContinError) as error:
         return {"outcome": "failed", "reason": str(error)}
     diagram.add_branch(graph, stored, file)
@@ -171,11 +184,11 @@ def _arrived_before(graph, config: Config) -> str:
     return ""
 
 
-def _computed(path: Path, config: Config) -> StoredBranch:
+def _computed(path: Path, config: Config, progress: Progress) -> StoredBranch:
     """The branch of a scene: the one in the file if it is complete, or computed."""
     stored = complete_run(path, config)
     if stored is None:
-        image, _ = compute_branch(config, Display(silent=True))
+        image, _ = compute_branch(config, progress)
         write_bytes(path, image)
         stored = read_branch(path)
     return stored
@@ -189,7 +202,9 @@ def _goes(graph, file: str) -> str:
         return f"the branch ({end['m']}, {end['n']}) at {end['kappa_n']:.8f}"
     if end["kind"] == "primary branch":
         return f"a primary branch that the diagram does not hold, at {end['kappa_n']:.8f}"
-    return f"the limit {end['what']}" if end["kind"] == "leaves" else f"its end, {end['what']}, at {end['kappa_n']:.6f}"
+    if end["kind"] == "leaves":
+        return f"the scene's own limit, {end['what']}"
+    return f"its end, {end['what']}, at {end['kappa_n']:.6f}"
 
 
 # --- command line ---------------------------------------------------------------------------------------------------
@@ -228,7 +243,8 @@ def main(argv=None) -> int:
     try:
         if folder.exists() and not folder.is_dir():
             raise ConfigError(f"--out {str(folder)!r}: must be a folder")
-        switches = follow_all(result, folder, options.set, lambda text: options.quiet or write_output(text + "\n"))
+        with Progress("secondary bifurcations", quiet=options.quiet) as progress:
+            switches = follow_all(result, folder, options.set, progress)
     except (ConfigError, StoreError, ContinError) as error:
         complain(f"error: {error}")
         return 2

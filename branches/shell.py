@@ -31,6 +31,7 @@ from pathlib import Path
 from branches.display import complain, survive_any_encoding, write_output
 from branches.executor import cores, run_jobs
 from branches.files import StoreError, only_run, prepare, write_bytes
+from branches.progress import Progress
 from contin import exact_text
 
 PROGRAM = "ccx"
@@ -281,10 +282,13 @@ def solve(case: Case, stopped: Callable[[], bool] = lambda: False) -> Outcome:
 # --- many cases, kept -------------------------------------------------------------------------------------------------
 
 
-def compute(cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], None] = lambda outcome, left: None) -> None:
+def compute(
+    cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], None] = lambda outcome, left: None, quiet: bool = False
+) -> None:
     """Compute what the file at ``path`` does not hold yet, a case on each core, and keep each when it is done.
 
-    A case that failed before is tried again. ``report(outcome, left)`` is called after each.
+    A case that failed before is tried again. ``report(outcome, left)`` is called after each. Unless ``quiet``, a line of
+    progress is shown.
 
     Raises
     ------
@@ -300,7 +304,12 @@ def compute(cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], 
     version()
     prepare(path)
     stop, waiting, count = threading.Event(), iter(missing), len(missing)
-    with interrupt.unwinding(), only_run(path), ThreadPoolExecutor(cores()) as pool:
+    with (
+        interrupt.unwinding(),
+        only_run(path),
+        Progress("cases", count, quiet) as progress,
+        ThreadPoolExecutor(cores()) as pool,
+    ):
         try:
             jobs = run_jobs(lambda running: next(waiting, None), lambda case: solve(case, stop.is_set), pool.submit, cores())
             for number, (_, outcome) in enumerate(jobs, 1):
@@ -308,7 +317,9 @@ def compute(cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], 
                     raise outcome
                 kept[outcome.case] = outcome
                 _write(path, kept.values())
+                progress.clear()
                 report(outcome, count - number)
+                progress.part_done()
         finally:
             stop.set()  # an interrupt leaves no CalculiX behind
 
@@ -403,12 +414,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--out", required=True, metavar="FILE", type=Path, help="HDF5 file; fig7 looks for DIR/shell.h5")
     parser.add_argument("--full", action="store_true", help="the fuller set: finer meshes, other strips")
+    parser.add_argument("--quiet", action="store_true", help="show no line of progress")
     options = parser.parse_args(argv)
     survive_any_encoding()
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # unwinds, and so ends CalculiX too
     cases = DEFAULT + FULLER if options.full else DEFAULT
     try:
-        compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"))
+        compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"), options.quiet)
         outcomes = read(options.out)
     except (ShellError, StoreError) as error:
         complain(f"error: {error}")

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from branches.display import Parser, complain, survive_any_encoding, write_output
+from branches.progress import Progress
 from ribbon_model.strip import NAMES, Strip
 
 #: Covering indices looked at: odd ones, which a loop can be folded into; up to the second beyond the natural curvature.
@@ -84,18 +85,22 @@ def _energy(strip: Strip, values) -> float:
     return (values["energy"] + strip.kappa_n**2 / 2) * strip.energy_unit
 
 
-def buckled(strip: Strip) -> tuple[list[State], list[tuple[str, float]]]:
-    """States on the primary branches at the strip's natural curvature; and the folds on the branch (1, 2), (name, kappa_n)."""
+def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[str, float]]]:
+    """Return the states on the primary branches at the strip's natural curvature, and the folds on the branch (1, 2).
+
+    A fold is a pair (name, kappa_n). Unless ``quiet``, a line of progress is shown.
+    """
     states, folds, seen = [], [], []
-    for m in coverings(strip):
-        for n in range(1, coverings(strip)[-1] + 2):
-            if n == m:
-                continue
+    modes = [(m, n) for m in coverings(strip) for n in range(1, coverings(strip)[-1] + 2) if n != m]
+    with Progress("branches", len(modes), quiet) as progress:
+        for m, n in modes:
+            progress.part(f"({m}, {n})")
             for point, equilibrium in _at_natural_curvature(strip, m, n, folds if (m, n) == (1, 2) else []):
                 place = point["energy"], point["kappa_star"]
                 if not any(n == other and np.allclose(place, there, rtol=_SAME, atol=_SAME) for other, there in seen):
                     seen.append((n, place))
                     states.append(_state(strip, f"buckled ({m}, {n})", point, equilibrium))
+            progress.part_done()
     return states, folds
 
 
@@ -171,10 +176,10 @@ def _law(strip: Strip) -> str:
 # --- the answer -------------------------------------------------------------------------------------------------------
 
 
-def answer(strip: Strip, yield_strain: float | None = None) -> str:
-    """One screen."""
+def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) -> str:
+    """Return what the command prints, one screen; unless ``quiet``, a line of progress is shown meanwhile."""
     rings = circles(strip)
-    others, folds = buckled(strip)
+    others, folds = buckled(strip, quiet)
     lines = [
         f"Gamma = w^2/(h L/2pi) = {strip.Gamma:.4g}, natural curvature kappa_n L/2pi = {strip.kappa_n:.4g}",
         f"law: {_law(strip)}",
@@ -278,9 +283,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         help_text = f"{unit}{more}" if unit else "Poisson's ratio"
         parser.add_argument(f"--{name.replace('_', '-')}", type=float, required=True, metavar="X", help=help_text)
     parser.add_argument("--yield-strain", type=float, metavar="X", help="states strained beyond it are marked")
+    parser.add_argument("--quiet", action="store_true", help="show no line of progress")
     options = vars(parser.parse_args(argv))
     survive_any_encoding()
-    yield_strain = options.pop("yield_strain")
+    yield_strain, quiet = options.pop("yield_strain"), options.pop("quiet")
     try:
         if yield_strain is not None and not 0 < yield_strain < math.inf:
             raise ValueError(f"yield_strain: {yield_strain:g} must be positive and finite")
@@ -291,7 +297,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, "blas"):  # the matrices are small
-        write_output(answer(strip, yield_strain))
+        write_output(answer(strip, yield_strain, quiet))
     return 0
 
 

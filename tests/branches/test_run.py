@@ -55,17 +55,18 @@ def rows(path):
         return file["points"][:]
 
 
-def test_zeros_that_agree_in_six_digits_have_two_names(tmp_path, capsys):
-    path = tmp_path / "x.h5"
-    run_branch(scene_of(zeros={"kappa_n": [3.0, 3.0000001]}, limits={"kappa_n": (-100.0, 3.2000001)}), path, Display())
+def test_zeros_that_agree_in_six_digits_have_names_of_their_own(tmp_path, capsys):
+    path, values = tmp_path / "x.h5", [3.0, 3.0000001, 3.00000014]
+    run_branch(scene_of(zeros={"kappa_n": values}, limits={"kappa_n": (-100.0, 3.2000001)}), path, Display())
     with h5py.File(path) as file:
         events = file["events"][:]
     zeros = events[events["label"] == b"UZ"]
-    assert zeros["name"].tolist() == [b"kappa_n = 3", b"kappa_n = 3.0000001"]
-    assert zeros["kappa_n"] == pytest.approx([3.0, 3.0000001], abs=1e-11)
+    assert zeros["name"].tolist() == [b"kappa_n = 3", b"kappa_n = 3.0000001", b"kappa_n = 3.00000014"]
+    assert zeros["kappa_n"] == pytest.approx(values, abs=1e-11)
     assert events["name"][-1] == b"kappa_n = 3.2000001"
     said = capsys.readouterr().out
-    assert "user value (kappa_n = 3.0000001) at" in said and "stopped: reached kappa_n = 3.2000001" in said
+    assert "user value (kappa_n = 3.0000001) at" in said
+    assert "stopped: reached kappa_n = 3.2000001, the scene's own limit" in said
 
 
 # --- the main job ---------------------------------------------------------------------------------------------------
