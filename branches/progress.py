@@ -141,6 +141,12 @@ class StartingDisplay(Display):
         self._start.stop()
         super().clear()
 
+    def point(self, point: Point, number: int, step: float) -> None:
+        """Show a point; the rate counts from the first one, without the time that the start took."""
+        if number == self._first:
+            self._began = self._shown = time.monotonic()
+        super().point(point, number, step)
+
 
 def _duration(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < _MINUTES_FROM else f"{seconds / 60:.0f} min"
