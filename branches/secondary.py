@@ -1,7 +1,7 @@
-"""``python -m branches.secondary RESULT``: follow what leaves the primary branches where their index changes.
+"""``python -m branches.secondary RESULT``: follow the branches that leave primary branches where the index changes.
 
-A secondary branch is a scene of its own, with an ``origin``: `branches.run` computes it like any other. This program makes
-those scenes from the labelled points SB of a result, runs them, and puts the branches into the diagram.
+A secondary branch has its own scene, with an ``origin``; `branches.run` computes it like any other. This command makes
+these scenes from the labelled points SB of a result, runs them, and adds the branches to the diagram.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from contin import ContinError
 from ribbon_model.domains import CELL, HALF_LOOPS
 from ribbon_model.modes import Mode
 
-# --- all that leave the branches of a result ------------------------------------------------------------------------
+# --- all secondary branches of a result -----------------------------------------------------------------------------
 
 
 def follow_all(result: Path, folder: Path, settings: list[str], progress: Progress) -> list[dict]:
@@ -42,9 +42,9 @@ def follow_all(result: Path, folder: Path, settings: list[str], progress: Progre
     result : Path
         A branch file, or the folder of a diagram.
     folder : Path
-        Where files and diagram go.
+        The folder for files and diagram.
     settings : list of str
-        ``key=value`` over the scenes of the secondary branches, which otherwise take those of the primary ones.
+        ``key=value`` changes of the scenes of the secondary branches; other fields are those of the primary ones.
     progress : Progress
         Shows how far the work is, and a line of text for every attempt.
 
@@ -56,7 +56,7 @@ def follow_all(result: Path, folder: Path, settings: list[str], progress: Progre
     Raises
     ------
     StoreError, ConfigError
-        A result that cannot be used; a setting that cannot be.
+        A result or a setting that cannot be used.
     """
     primaries = _primaries(result)
     prepare(folder / DIAGRAM)
@@ -80,7 +80,7 @@ def follow_all(result: Path, folder: Path, settings: list[str], progress: Progre
 
 
 def _primaries(result: Path) -> dict[str, StoredBranch]:
-    """The primary branches of a result that have the index along them, by file name.
+    """Return the primary branches of a result that have an index, by file name.
 
     Raises
     ------
@@ -100,12 +100,12 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
 
 
 def _diagram_in(folder: Path):
-    """The diagram of a folder, or a new one."""
+    """Return the diagram of a folder, or a new one."""
     return diagram.read(folder) if (folder / DIAGRAM).exists() else diagram.new_graph()
 
 
 def _remove_secondaries(graph, primaries) -> list[dict]:
-    """Take what this program added earlier for these primary branches out of a diagram; the attempts for others."""
+    """Remove the secondary branches of these primary branches from a diagram; return the attempts for other branches."""
     switches = json.loads(graph.graph.get("switches", "[]"))
     files = {switch["file"] for switch in switches if switch["primary"] in primaries and "file" in switch}
     edges = graph.edges(keys=True, data=True)
@@ -116,7 +116,7 @@ def _remove_secondaries(graph, primaries) -> list[dict]:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where secondary branches are kept, what changes their scenes, and who is told how far they have come."""
+    """The folder of secondary branches, the changes of their scenes, and the line of progress."""
 
     folder: Path
     settings: list[str]
@@ -124,7 +124,7 @@ class _Place:
 
 
 def _attempts(graph, branch: StoredBranch, name: str, event, place: _Place):
-    """Leave one bifurcation by every kind of branch, one after the other: records of what came of it."""
+    """Follow every kind of branch that leaves one bifurcation; yield a record of each attempt."""
     config = branch.config
     where = {column: float(event[column]) for column in ("kappa_n", "kappa_star")}
     about = {key: config[key] for key in ("law", "Gamma", "nu", "m", "n")} | where | {"mode": event["name"].decode()}
@@ -144,7 +144,7 @@ def _attempts(graph, branch: StoredBranch, name: str, event, place: _Place):
 
 
 def _attempt(graph, branch: StoredBranch, event, reversal: str, place: _Place) -> dict:
-    """Follow one branch, put it into the diagram: how it ended."""
+    """Follow one branch and add it to the diagram; return the outcome."""
     config = _scene(branch.config, event, reversal, place.settings)
     file = secondary_file(config, {data["file"] for _, _, data in graph.edges(data=True)})
     known = _arrived_before(graph, config)
@@ -165,7 +165,7 @@ def _attempt(graph, branch: StoredBranch, event, reversal: str, place: _Place) -
 
 
 def _scene(primary: dict, event, reversal: str, settings: list[str]) -> Config:
-    """The scene of a secondary branch: as that of the primary one, where that makes sense on another domain."""
+    """Return the scene of a secondary branch: the fields of the primary one that are valid on another domain."""
     kept = {name: primary[name] for name in ("law", "nu", "Gamma", "m", "n", "steps", "stability", "stride")}
     kept["mesh"] = primary["mesh"]
     kept["limits"] = {name: list(ends) for name, ends in primary["limits"].items() if name not in ("M1", "M2")}
@@ -175,7 +175,7 @@ def _scene(primary: dict, event, reversal: str, settings: list[str]) -> Config:
 
 
 def _arrived_before(graph, config: Config) -> str:
-    """The file of a branch on this domain that begins or ends at the origin, if the diagram has it."""
+    """Return the file of a branch on this domain that begins or ends at the origin, if the diagram has one."""
     origin = config.origin.model_dump(exclude={"mode"})
     for branch in diagram.secondaries(graph, config.material, config.nu):
         ends = branch["nodes"][0], branch["nodes"][-1]
@@ -185,7 +185,7 @@ def _arrived_before(graph, config: Config) -> str:
 
 
 def _computed(path: Path, config: Config, progress: Progress) -> StoredBranch:
-    """The branch of a scene: the one in the file if it is complete, or computed."""
+    """Return the branch of a scene: from the file if it is complete, otherwise computed."""
     stored = complete_run(path, config)
     if stored is None:
         image, _ = compute_branch(config, progress)
@@ -195,7 +195,7 @@ def _computed(path: Path, config: Config, progress: Progress) -> StoredBranch:
 
 
 def _goes(graph, file: str) -> str:
-    """Where a branch of the diagram ends, in words."""
+    """Return the end of a branch of the diagram in words."""
     (branch,) = (branch for branch in diagram.secondaries(graph) if branch["file"] == file)
     end = branch["nodes"][-1]
     if end["kind"] == "secondary bifurcation":
@@ -211,7 +211,7 @@ def _goes(graph, file: str) -> str:
 
 
 def _line(switch: dict) -> str:
-    """An attempt in words."""
+    """Return an attempt in words."""
     start = f"({switch['m']}, {switch['n']}) at {switch['kappa_n']:.8f}, {switch['mode']}"
     if "keeps" not in switch:
         return f"{start}: {switch['outcome']}: {switch['reason']}"
@@ -227,16 +227,18 @@ def main(argv=None) -> int:
     """Run the command; the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m branches.secondary", allow_abbrev=False,
-        description="Follow the branches that leave a primary branch at its secondary bifurcations, and put them in a diagram.",
+        description="Follow the branches that leave a primary branch at its secondary bifurcations, and add them to a diagram.",
         epilog="Exit code: 0 done, 1 some branch could not be followed to its end (the diagram says why), 2 bad input, "
         "130 interrupted.",
     )  # fmt: skip
     parser.add_argument("result", help="file of a primary branch with its index (stability: true), or a diagram's folder")
-    parser.add_argument("--out", metavar="DIR", help="folder (default: the diagram's own; NAME_secondary beside a file)")
+    parser.add_argument(
+        "--out", metavar="DIR", help="folder for the results (default: the folder of the diagram; for a file NAME_secondary)"
+    )
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field of the scenes of secondary branches"
     )
-    parser.add_argument("--quiet", action="store_true", help="print where the result is only")
+    parser.add_argument("--quiet", action="store_true", help="print only the last line")
     options = parser.parse_args(argv)
     result = Path(options.result)
     folder = Path(options.out) if options.out else result if result.is_dir() else result.with_name(f"{result.stem}_secondary")

@@ -157,7 +157,7 @@ MISTAKES = {
     "name too long": (["scene.yaml", "--out", "x" * 300], "too long"),
     "folder is a file": (["scene.yaml", "--out", "scene.yaml/x.h5"], "scene.yaml' is not a folder"),
     "folder cannot be made": (["scene.yaml", "--out", "/proc/none/x.h5"], "cannot write '/proc/none/x.h5'"),
-    "foreign file": (["scene.yaml", "--out", "foreign.h5"], "exists and is no readable result of this program"),
+    "foreign file": (["scene.yaml", "--out", "foreign.h5"], "exists and is not a readable result of this program"),
     "foreign file to resume": (["scene.yaml", "--out", "foreign.h5", "--resume"], "not a readable HDF5 file"),
     "another scene": (["scene.yaml", "--out", "other.h5"], "another scene (n = 3 there, 2 here); --overwrite"),
     "another scene to resume": (["scene.yaml", "--out", "other.h5", "--resume"], "another scene (n = 3 there, 2 here); resume"),
@@ -190,7 +190,7 @@ def test_an_unfinished_result_is_not_replaced_unasked(tmp_path, silent, undistur
     path, config = tmp_path / "x.h5", scene_of()
     stop = silent({9: lambda: os.kill(os.getpid(), signal.SIGINT)})
     assert run_branch(config, path, stop) == "interrupted"
-    with pytest.raises(StoreError, match="unfinished run of this scene; --resume goes on"):
+    with pytest.raises(StoreError, match="unfinished run of this scene; --resume continues it"):
         run_branch(config, path, silent())
     assert run_branch(config, path, silent(), overwrite=True) == "complete"
     assert tables(path) == undisturbed(config)
@@ -401,7 +401,7 @@ def test_a_run_extended_is_the_run_that_went_on(tmp_path, silent, undisturbed, t
     ({"steps": {"max_points": 10}}, {"nu": 0.2, "steps": {"max_points": 20}}, "nu = 0.3 there, 0.2 here"),
     ({"steps": {"max_points": 10}}, {"steps": {"max_points": 20, "largest": 0.1}}, "steps = "),
     ({"steps": {"max_points": 10}}, {"steps": {"max_points": 5}}, "max_points: 5 must exceed the 9 points taken already"),
-    ({"steps": {"max_points": 20}}, {"limits": {"kappa_n": (0, 3)}}, "limits: kappa_n: 0, 3 must contain the place to go on"),
+    ({"steps": {"max_points": 20}}, {"limits": {"kappa_n": (0, 3)}}, "kappa_n: 0, 3 must contain the last point of the file"),
 ])  # fmt: skip
 def test_a_run_that_cannot_be_extended_so(tmp_path, silent, first, then, said):
     path = tmp_path / "x.h5"
