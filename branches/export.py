@@ -33,7 +33,7 @@ _FRAMES = (2, 2000)
 
 
 def arguments(argv=None):
-    """The command line, parsed."""
+    """Return the command line, parsed."""
     parser = Parser(
         prog="python -m branches.export",
         allow_abbrev=False,

@@ -6,8 +6,8 @@ symmetry is x = 0. Two methods compute the same planar state:
 - 'direct', as in section 5.4 of Audoly & Seffen (2015): the stress-free arc is meshed, its rigid end faces are turned step by
   step, and may approach each other along x.
 - 'thermal', for thin strips, for which the direct method is slow or fails: the arc of radius R/(1 - xi) is meshed, both
-  end faces are held, and expansion along the strip, linear through the thickness, gives it the natural curvature 1/R. Its ends cannot
-  approach each other, so in-plane vibrations have no meaning; only the others are computed. It is for 0 < xi < 1.
+  end faces are held, and expansion along the strip, linear through the thickness, gives it the natural curvature 1/R. The
+  ends cannot approach each other, so in-plane vibrations have no meaning; only the others are computed. It is for 0 < xi < 1.
 
 For each state the lowest vibrations about it are computed. omega**2 has its sign: it is negative if the state is
 unstable. Lengths in mm, steel; results do not depend on either.

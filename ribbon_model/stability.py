@@ -75,7 +75,7 @@ class SymmetryClass:
 
     @property
     def name(self) -> tuple[int, str]:
-        """What tells the class from the others of the same loop."""
+        """The name of the class: wavenumber and parity."""
         return self.wavenumber, self.parity
 
     @property
@@ -93,7 +93,7 @@ class SymmetryClass:
 
     @property
     def nearest(self) -> int:
-        """Which eigenvalue is nearest to zero."""
+        """The number of the eigenvalue nearest to zero."""
         return int(np.argmin(np.abs(self.eigenvalues)))
 
 
@@ -108,11 +108,11 @@ class Stability:
     decided : bool
         False where an eigenvalue is zero as far as the state is known, or the loop is not closed.
     reason : str
-        If not decided: what could not be told.
+        The reason if it is not decided.
     residual : float
         |Q| of the shift of phase over |v|^2. It would be zero without discretization: this is the error of eigenvalues.
     gap : float
-        By how much the loop does not close.
+        Gap of the loop; zero if it is closed.
     classes : tuple of SymmetryClass
     """
 
@@ -124,7 +124,7 @@ class Stability:
     classes: tuple[SymmetryClass, ...]
 
     def __getitem__(self, name: tuple[int, str]) -> SymmetryClass:
-        """A class by its ``name``."""
+        """Return a class by its ``name``."""
         return next(entry for entry in self.classes if entry.name == tuple(name))
 
     @property
@@ -134,7 +134,7 @@ class Stability:
 
 
 def index(equilibrium: Equilibrium) -> Stability:
-    """Number of negative directions of the energy of a closed equilibrium, on the mesh of the equilibrium.
+    """Return the number of negative directions of the energy of a closed equilibrium, on the mesh of the equilibrium.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def index(equilibrium: Equilibrium) -> Stability:
         nearest = entry.eigenvalues[entry.nearest]
         if abs(nearest) <= floor:
             label = f"class {entry.wavenumber} {entry.parity}".strip()
-            reasons.append(f"{label}: an eigenvalue {nearest:.1e} cannot be told from zero")
+            reasons.append(f"{label}: an eigenvalue {nearest:.1e} cannot be distinguished from zero")
     total = sum(entry.multiplicity * entry.negative for entry in classes)
     return Stability(total, not reasons, "; ".join(reasons), form.residual, points.gap, classes)
 
@@ -175,7 +175,7 @@ class _Points:
 
 
 def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
-    """Frame, centreline by the collocation's own quadrature, strains and compliance, and what Q is made of."""
+    """Return the frame, centreline by the collocation's own quadrature, strains, compliance, and the quantities of Q."""
     tables, mesh = basis(equilibrium.degree), equilibrium.mesh
     lengths = np.diff(mesh)
     stations = mesh[:-1, None] + lengths[:, None] * tables.points
@@ -217,7 +217,7 @@ def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
 
 @functools.cache
 def _reversal(symmetry: Symmetry) -> np.ndarray:
-    """The matrix (6, 6) that takes E'(S) to E'(-S) for perturbations that keep the mirror or axis at S = 0.
+    """Return the matrix (6, 6) that takes E'(S) to E'(-S) for perturbations that keep the mirror or axis at S = 0.
 
     The mirror is normal to e1, or the axis is e1. With X the mirror's matrix, u(-S) = X u(S) for both, x(-S) = X x(S) for the
     mirror and -X x(S) for the axis, so that u x x is multiplied by -X or X.
@@ -228,7 +228,7 @@ def _reversal(symmetry: Symmetry) -> np.ndarray:
 
 @functools.cache
 def _motion(symmetry: Symmetry) -> np.ndarray:
-    """The matrix T (6, 6) that takes E'(S) to E' one part further for perturbations of class 0; x turns like w."""
+    """Return the matrix T (6, 6) that takes E'(S) to E' one part further for perturbations of class 0; x turns like w."""
     angle = 2 * np.pi * symmetry.winding / symmetry.order
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     return np.kron(np.diag([1.0, -1.0 if symmetry.flip else 1.0]), turn)
@@ -258,7 +258,7 @@ def _closing(symmetry: Symmetry, wavenumber: int) -> tuple[np.ndarray, np.ndarra
 
 
 def _symmetric(matrix, symmetry: Symmetry) -> np.ndarray:
-    """The part of N (6, 6) that has the symmetry of the loop: all of it, but for what a state beside a branch lacks."""
+    """Return the part of N (6, 6) that has the symmetry of the loop: all of it, except for a state that is not on a branch."""
     phases = _phases(symmetry)
     circular = _CIRCULAR @ matrix @ _CIRCULAR.conj().T
     circular[(phases[:, None] - phases) % symmetry.order != 0] = 0
@@ -313,7 +313,7 @@ class _Intervals:
         return _Intervals(np.concatenate([upper, lower], axis=1), np.concatenate([first, last], axis=2), motion)
 
     def split(self, at: int) -> tuple[_Intervals, _Intervals]:
-        """The first intervals, ``at`` of them, and the others."""
+        """Return the first intervals, ``at`` of them, and the others."""
         parts = self.local, self.increments, self.motion
         return _Intervals(*(part[:at] for part in parts)), _Intervals(*(part[at:] for part in parts))
 
@@ -378,7 +378,7 @@ class _Form:
         return tuple(found)
 
     def _part(self, j: int, parity: str):
-        """The matrix (n, n) on a part of the loop without what closes it, and W (6, n) of the part.
+        """Return the matrix (n, n) on a part of the loop without what closes it, and W (6, n) of the part.
 
         With a reversal, v on the image of the piece is v on the piece times 1 or -1 (``parity``). Without a parity both kinds
         are unknowns, the second times i, which makes the matrix real.

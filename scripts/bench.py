@@ -26,7 +26,7 @@ PARTS = ("like-for-like", "fold", "cost", "startup", "stress")
 
 
 def arguments(argv=None) -> argparse.Namespace:
-    """The command line, parsed."""
+    """Return the command line, parsed."""
     parser = argparse.ArgumentParser(prog="python scripts/bench.py", description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"what to run: {', '.join(PARTS)} (default: all)")
     parser.add_argument("--quick", action="store_true", help="few repeats: under two minutes instead of ten")

@@ -69,7 +69,7 @@ def plain(key: str, value: Any) -> np.ndarray:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a single number."""
+    """Return whether a value is a single number."""
     return isinstance(value, (bool, int, float, complex, np.number, np.bool_))
 
 
@@ -128,7 +128,7 @@ def of_file(key: str, path: Path) -> Record:
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """The environment of processes: this tree before any installed one, one thread, compiled code kept in ``folder``."""
+    """Return the environment of processes: this tree before any installed one, one thread, compiled code kept in ``folder``."""
     paths = filter(None, [str(ROOT), str(bank_folder().parent), os.environ.get("PYTHONPATH", "")])
     caches = {"NUMBA_CACHE_DIR": str(folder / "numba"), "CONTIN_CACHE_DIR": str(folder / "contin")}
     changes = {"PYTHONPATH": os.pathsep.join(paths), "PYTHONIOENCODING": "utf-8", "COLUMNS": "80"}
@@ -158,13 +158,13 @@ def command(key: str, words: list[str], folder: Path, env: dict[str, str]) -> Re
 
 
 def strip_options(path: Path) -> list[str]:
-    """The options of `branches.strip` that a scene's strip amounts to; none where it has no strip."""
+    """Return the options of `branches.strip` that a scene's strip amounts to; none where it has no strip."""
     strip = yaml.safe_load(path.read_text(encoding="utf-8")).get("strip", {})
     return [word for name, value in strip.items() for word in (f"--{name.replace('_', '-')}", str(value))]
 
 
 def has_secondaries(path: Path) -> bool:
-    """Whether secondary branches leave the branch of a result file."""
+    """Return whether secondary branches leave the branch of a result file."""
     with h5py.File(path) as file:
         return bool(np.any(file["events"]["label"] == b"SB"))
 
@@ -193,7 +193,7 @@ def scene(path: Path, folder: Path, env: dict[str, str]) -> Record:
 
 @functools.cache
 def bank_folder() -> Path:
-    """The folder of the bank of reference problems, wherever it lies below tests/."""
+    """Return the folder of the bank of reference problems, wherever it lies below tests/."""
     found = sorted((ROOT / "tests").glob("**/bank/case.py"))
     if len(found) != 1:
         raise CompareError(f"{ROOT / 'tests'} must hold one bank/case.py, not {len(found)}")
@@ -201,13 +201,13 @@ def bank_folder() -> Path:
 
 
 def bank_modules() -> list[str]:
-    """The modules of the bank that have cases."""
+    """Return the modules of the bank that have cases."""
     files = sorted(bank_folder().glob("*.py"))
     return [file.stem for file in files if re.search(r"^CASES\b", file.read_text(encoding="utf-8"), re.MULTILINE)]
 
 
 def of_point(key: str, point: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """All fields of a point; of its discretization what it is known by."""
+    """Yield all fields of a point; of its discretization what it is known by."""
     for field in dataclasses.fields(point):
         value = getattr(point, field.name)
         if field.name == "system":
@@ -231,7 +231,7 @@ def of_bank() -> Record:
 
 
 def bank(folder: Path, env: dict[str, str]) -> Record:
-    """The bank's record, made in a process of its own."""
+    """Return the bank's record, made in a process of its own."""
     path = folder / "bank.npz"
     run([str(Path(__file__).resolve()), "--bank", str(path)], env)
     return read(path)
@@ -254,7 +254,7 @@ def write(path: Path, record: Record) -> None:
 
 
 def read(path: Path) -> Record:
-    """The arrays of a record."""
+    """Return the arrays of a record."""
     try:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
@@ -301,7 +301,7 @@ def record(path: Path) -> None:
 
 
 def is_long(path: Path) -> bool:
-    """Whether a scene takes much longer than others, and should not come last: those of many branches."""
+    """Return whether a scene takes much longer than others, and should not come last: those of many branches."""
     values = yaml.safe_load(path.read_text(encoding="utf-8"))
     return any(isinstance(value, list) for value in values.values())
 
@@ -310,7 +310,7 @@ def is_long(path: Path) -> bool:
 
 
 def columns(array: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    """The named columns of an array; itself, without a name, where it has none."""
+    """Return the named columns of an array; itself, without a name, where it has none."""
     names = array.dtype.names
     return [("", array)] if names is None else [(name, array[name]) for name in names]
 
@@ -323,12 +323,12 @@ def count(arrays: Iterable[np.ndarray]) -> str:
 
 
 def same(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether two arrays agree in type, shape and every bit."""
+    """Return whether two arrays agree in type, shape and every bit."""
     return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
 def gaps(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
-    """The largest absolute and relative difference of two arrays of numbers; inf where one alone is not a number."""
+    """Return the largest absolute and relative difference of two arrays of numbers; inf where one alone is not a number."""
     wide = complex if "c" in (a.dtype.kind, b.dtype.kind) else float
     a, b = np.atleast_1d(a.astype(wide)), np.atleast_1d(b.astype(wide))
     with np.errstate(all="ignore"):
@@ -340,7 +340,7 @@ def gaps(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
 
 
 def changed_line(a: np.ndarray, b: np.ndarray) -> str:
-    """The first line in which two arrays of texts differ."""
+    """Return the first line in which two arrays of texts differ."""
     lines = [[line for text in array.astype(str).ravel().tolist() for line in text.split("\n")] for array in (a, b)]
     longest = max(map(len, lines))
     pairs = zip(*(part + [""] * (longest - len(part)) for part in lines))

@@ -41,7 +41,7 @@ SCENES = {
 
 
 def undisturbed(name: str, folder: Path) -> Scene:
-    """A scene computed without faults: how long it takes, and what comes out."""
+    """Return a scene computed without faults: how long it takes, and what comes out."""
     folder.mkdir(parents=True)
     (folder / "scene.yaml").write_text(SCENES[name])
     if name == "diagram":

@@ -21,7 +21,7 @@ DEGREES = range(2, 9)
 
 
 def run(quick: bool) -> dict:
-    """All cost laws."""
+    """Return all cost laws."""
     repeats = 5 if quick else 15
     return {
         "intervals": _sweep([(n, 7, 4) for n in (10, 20, 40, 80, 160, 320, 640)], repeats),
@@ -139,7 +139,7 @@ def _errors(m, n, limits, chosen, name, quick) -> dict:
 
 
 def _reference(m, n, truth):
-    """A well resolved solution of contin at the exact point's kappa_n: system and unknowns."""
+    """Return a well resolved solution of contin at the exact point's kappa_n: system and unknowns."""
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 20, 6)
     settings = contin.Settings(
         limits={"kappa_n": (-2e4, 2e3)}, errors=False, branch_points=False, trivial="M2", max_points=5000

@@ -86,7 +86,7 @@ def _auto() -> dict[tuple[str, str], Callable]:
 
 
 def _scipy() -> dict[tuple[str, str], Callable]:
-    """The tolerance of solve_bvp."""
+    """Return the tolerance of solve_bvp."""
     tolerances = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
     return {(SCIPY, f"tol {t:.0e}"): lambda t=t: second_run("scipy_fold", tolerance=t) for t in tolerances}
 

@@ -19,7 +19,7 @@ ONE_THREAD = dict.fromkeys(
 
 
 def environment(**changes: str) -> dict[str, str]:
-    """The environment of a child process: one thread, this project importable."""
+    """Return the environment of a child process: one thread, this project importable."""
     paths = [str(SCRIPTS), str(SCRIPTS.parent), os.environ.get("PYTHONPATH", "")]
     return os.environ | ONE_THREAD | {"PYTHONPATH": os.pathsep.join(filter(None, paths))} | changes
 

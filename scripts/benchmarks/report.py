@@ -26,7 +26,7 @@ TABLES = {
 
 
 def markdown(results: dict) -> dict[str, str]:
-    """A block of Markdown for the machine and for every part that was run."""
+    """Return a block of Markdown for the machine and for every part that was run."""
     machine = dict(results["machine"])
     load = machine.pop("load_at_start")
     text = ", ".join(f"{name} {value}" for name, value in machine.items())
@@ -43,7 +43,7 @@ def markdown(results: dict) -> dict[str, str]:
 
 
 def page(results: dict) -> str:
-    """The whole as one Markdown document."""
+    """Return the whole as one Markdown document."""
     blocks = markdown(results)
     parts = [f"## {TITLES[part]}\n\n{text}\n" for part, text in blocks.items() if part != "machine"]
     return "\n".join([f"# Benchmark\n\n{blocks['machine']}\n", *parts])

@@ -83,7 +83,7 @@ def _case(what, m, n, nu, changes) -> dict:
 
 
 def _drift(point) -> float:
-    """The largest deviation of the quaternion's length from one at mesh points."""
+    """Return the largest deviation of the quaternion's length from one at mesh points."""
     states = point.system.states(point.x)[:: point.system.degree, :4]
     return float(np.abs((states**2).sum(axis=1) - 1).max())
 

@@ -15,7 +15,7 @@ import time
 
 @functools.cache
 def half_loop_in_full():
-    """The half loop in the thirteen components (M, R, q, x), the statement of ``peers/auto/half.f90``."""
+    """Return the half loop in the thirteen components (M, R, q, x), the statement of ``peers/auto/half.f90``."""
     import contin
     from ribbon_model.equilibrium import directors, spin
     from ribbon_model.laws import RIBBON
@@ -41,7 +41,7 @@ def half_loop_in_full():
 
 
 def circle_in_full(t):
-    """The thirteen components of the circle at kappa_n = 2.3."""
+    """Return the thirteen components of the circle at kappa_n = 2.3."""
     a = math.pi * t
     return (-1.3, 0, 0, 0, 0, 0, math.cos(a / 2), math.sin(a / 2), 0, 0, 0, math.cos(a) - 1, math.sin(a))
 
@@ -85,14 +85,14 @@ def cell(intervals=8, degree=6, tolerance=1e-12, angle=0.35, accuracy=0.02, step
 
 
 def scipy_fold(tolerance=1e-8) -> dict:
-    """The fold of (1, 2) by ``solve_bvp``."""
+    """Return the fold of (1, 2) by ``solve_bvp``."""
     from peers import scipy_bvp
 
     return scipy_bvp.fold(tolerance) | {"circle_seconds": 0.0}
 
 
 def _until(run, label):
-    """Points of a run up to the first with a label, after the start."""
+    """Return the points of a run up to the first with a label, after the start."""
     COUNTER.update(linearizations=0, linearize_seconds=0.0)
     points = []
     for point in run:
@@ -113,7 +113,7 @@ def _summary(points) -> dict:
 
 
 def counted(which="half_loop", **arguments) -> dict:
-    """A task with the factorizations on its branch counted, and the time in them."""
+    """Return a task with the factorizations on its branch counted, and the time in them."""
     import contin
 
     linearize = contin.Collocation.linearize

@@ -41,7 +41,7 @@ def missing() -> str | None:
 
 @functools.cache
 def build(statement: str) -> tuple[Path, float]:
-    """The executable of one statement, and the seconds that compiling took. Removed when the process ends."""
+    """Return the executable of one statement, and the seconds that compiling took. Removed when the process ends."""
     folder = tempfile.TemporaryDirectory(prefix="bench-auto-")
     _FOLDERS.append(folder)
     program = Path(folder.name) / "program"

@@ -32,12 +32,12 @@ def spin(q0, q1, q2, q3, w1, w3, length):
 
 
 def second(q0, q1, q2, q3):
-    """Lab components of d2."""
+    """Return the lab components of d2."""
     return 2 * (q1 * q2 - q0 * q3), q0**2 - q1**2 + q2**2 - q3**2, 2 * (q2 * q3 + q0 * q1)
 
 
 def half_rates(u, p):
-    """The thirteen components, over [0, L/2]."""
+    """Return the thirteen components, over [0, L/2]."""
     M1, M2, M3, R1, R2, R3, q0, q1, q2, q3 = (u[i] for i in range(10))
     w1, w3 = strains(M1, M3, p[0])
     rates = [M2 * w3 + R2, M3 * w1 - M1 * w3 - R1, -M2 * w1, R2 * w3, R3 * w1 - R1 * w3, -R2 * w1]
@@ -67,7 +67,7 @@ def half_start(u, p, t):
 
 
 def cell_rates(u, p):
-    """The quarter wave of (1, 2); p = kappa_n, M1, M2."""
+    """Return the quarter wave of (1, 2); p = kappa_n, M1, M2."""
     q0, q1, q2, q3 = (u[i] for i in range(4))
     M1 = (q0**2 + q1**2 - q2**2 - q3**2) * p[1] + 2 * (q1 * q2 + q0 * q3) * p[2]
     M3 = 2 * (q1 * q3 + q0 * q2) * p[1] + 2 * (q2 * q3 - q0 * q1) * p[2]
@@ -75,7 +75,7 @@ def cell_rates(u, p):
 
 
 def cell_conditions(a, b, p):
-    """The frame at S = 0; d2 normal to the moment at the other end, and turned about it by pi/4."""
+    """Return the frame at S = 0; d2 normal to the moment at the other end, and turned about it by pi/4."""
     x, y, z = second(b[0], b[1], b[2], b[3])
     c = math.sqrt(0.5)
     moment = -((p[1] * p[1] + p[2] * p[2]) ** 0.5)

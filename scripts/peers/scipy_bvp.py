@@ -18,7 +18,7 @@ NU, LENGTH, TURN = 0.3, np.pi / 4, np.pi / 4
 
 
 def directors(q):
-    """Lab components of d1 and d2, shape (2, 3, ...), and their derivatives by q, shape (2, 3, 4, ...)."""
+    """Return the lab components of d1 and d2, shape (2, 3, ...), and their derivatives by q, shape (2, 3, 4, ...)."""
     q0, q1, q2, q3 = q
     d = [
         [q0**2 + q1**2 - q2**2 - q3**2, 2 * (q1 * q2 + q0 * q3), 2 * (q1 * q3 - q0 * q2)],
@@ -53,7 +53,7 @@ def _third(q):
 
 
 def _local(q, p):
-    """Strains, d(M1, M3)/dq (2, 4, points), d(M1, M3)/d(M1, M2) at S = 0 (2, 2, points)."""
+    """Return the strains, d(M1, M3)/dq (2, 4, points), d(M1, M3)/d(M1, M2) at S = 0 (2, 2, points)."""
     kappa, m1, m2 = p
     d, slopes = directors(q)
     third, third_slopes = _third(q)
@@ -77,7 +77,7 @@ def rhs(t, q, p):
 
 
 def rhs_jacobian(t, q, p):
-    """Derivatives by q (4, 4, points) and by kappa_n, M1, M2 (4, 3, points)."""
+    """Return the derivatives by q (4, 4, points) and by kappa_n, M1, M2 (4, 3, points)."""
     (w1, w3, slopes), by_q, by_moment = _local(q, p)
     spin, h, zero = _spins(q), LENGTH / 2, np.zeros_like(w1)
     gain = np.einsum("sip,stp->itp", spin, slopes)  # dq'/d(M1, M3, kappa_n)
@@ -88,7 +88,7 @@ def rhs_jacobian(t, q, p):
 
 
 def _conditions(q, qb, p):
-    """The six conditions of the cell and their derivatives by q(0), q(1), p: shapes (6,), (6, 4), (6, 4), (6, 3)."""
+    """Return the six conditions of the cell and their derivatives by q(0), q(1), p: shapes (6,), (6, 4), (6, 4), (6, 3)."""
     _, m1, m2 = p
     (_, d2), (_, s2) = directors(qb)
     mu, c, s = -np.hypot(m1, m2), np.cos(TURN), np.sin(TURN)
@@ -109,7 +109,7 @@ class Loop:
         self.solutions, self.nodes = 0, 0
 
     def solve(self, row, target, guess, tolerance):
-        """The solution with row . (kappa_n, M1, M2) = target, from (t, q, p)."""
+        """Return the solution with row . (kappa_n, M1, M2) = target, from (t, q, p)."""
 
         def boundary(q, qb, p):
             return np.append(_conditions(q, qb, p)[0], row @ p - target)

@@ -114,7 +114,7 @@ def test_a_file_holds_its_scene(returned):
         ("domain=half loop between axes", "must be 'half loop'"),
         ("origin.mode=sideways", "mode: 'sideways' must be"),
         ("origin.kappa_n=-300", "limits: kappa_n"),
-        ("m=[3, 5]", "belongs to a scene of one branch"),
+        ("m=[3, 5]", "must not be given in a scene of many branches"),
     ],
 )
 def test_origins_that_are_none(change, message):
