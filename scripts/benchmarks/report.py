@@ -67,7 +67,7 @@ def update(path: Path, results: dict) -> None:
 
 
 def pictures(results: dict, folder: Path) -> list[Path]:
-    """Draw what was run; the files."""
+    """Draw the results; return the files."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -88,7 +88,7 @@ def _saved(figure, path: Path) -> Path:
 
 
 def _plain(axis, values):
-    """Ticks of a logarithmic axis at these values, written as numbers."""
+    """Set the ticks of a logarithmic axis at these values, written as numbers."""
     axis.set_ticks(values, [f"{value:g}" for value in values])
     axis.set_ticks([], minor=True)
 

@@ -1,4 +1,4 @@
-"""What contin and SciPy are timed at, each task in a process of its own: ``python -m benchmarks.tasks NAME ARGUMENTS REPEATS``.
+"""The timed tasks of contin and SciPy, each in its own process: ``python -m benchmarks.tasks NAME ARGUMENTS REPEATS``.
 
 Prints one line of JSON: ``first`` (the run that also loads compiled code), ``runs`` (repeats in the same process), ``imported``
 (seconds that the imports took).
@@ -47,7 +47,7 @@ def circle_in_full(t):
 
 
 def half_loop(intervals=40, degree=4, tolerance=1e-10, stop="BP") -> dict:
-    """The circle to its bifurcation, the branch from there to its fold (LP) or end (BP): contin on AUTO's formulation."""
+    """Follow the circle to its bifurcation, and the branch to its fold (LP) or end (BP), in AUTO's formulation."""
     import contin
 
     newton, mesh = contin.Newton(tolerance), contin.MeshControl(min_intervals=intervals, max_intervals=intervals, every=3)
@@ -64,9 +64,9 @@ def half_loop(intervals=40, degree=4, tolerance=1e-10, stop="BP") -> dict:
 
 
 def cell(intervals=8, degree=6, tolerance=1e-12, angle=0.35, accuracy=0.02, step=0.05, stop="LP", m=1, n=2) -> dict:
-    """The branch (m, n) on its quarter wave, from its bifurcation to its fold (LP) or end (BP), on a fixed number of intervals.
+    """Follow the branch (m, n) on its quarter wave to its fold (LP) or end (BP), on a fixed number of intervals.
 
-    ``angle``, ``accuracy`` and ``step``, the first one, are settings of contin that say how long its steps are.
+    ``angle``, ``accuracy`` and the first ``step`` are settings of contin that determine its steps.
     """
     import contin
     from ribbon_model.laws import RIBBON
@@ -103,7 +103,7 @@ def _until(run, label):
 
 
 def _summary(points) -> dict:
-    """Counts and special values of a branch; ``iterations`` are those of the points that came out."""
+    """Return counts and special values of a branch; ``iterations`` are those of its points."""
     folds = [point["kappa_n"] for point in points if point.label == "LP"]
     return {
         "points": len(points), "iterations": sum(point.iterations for point in points), "fold": folds[0] if folds else None,
@@ -133,7 +133,7 @@ def counted(which="half_loop", **arguments) -> dict:
     return result | COUNTER
 
 
-#: What `counted` counts; a task that follows a branch sets it to zero where the branch begins.
+#: The counters of `counted`; a task sets them to zero at the first point of its branch.
 COUNTER = {"linearizations": 0, "linearize_seconds": 0.0}
 
 
