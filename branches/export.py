@@ -59,7 +59,7 @@ def arguments(argv=None):
 
 
 def main(argv=None) -> int:
-    """Run the command; the exit code."""
+    """Run the command; return the exit code."""
     survive_any_encoding()
     with interrupt.unwinding():  # unfinished files are removed
         return _export(arguments(argv))

@@ -33,7 +33,7 @@ def read(path: str | Path):
 
 
 def main(argv=None) -> int:
-    """Answer questions; the exit code."""
+    """Answer the queries; return the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m branches.graph", description="List branches, states and folds of a bifurcation diagram."
     )

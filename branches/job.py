@@ -111,16 +111,16 @@ def _kind(config: Config) -> type[Continuation]:
     return Continuation if config.origin is None else UntilPrimary
 
 
-def _monitors(config: Config, watch) -> list:
+def _test_functions(config: Config, watch) -> list:
     """Return the test functions of the index, if it is computed, and of the end of the law, if it has one."""
-    return [*(watch.monitors if watch else ()), *convexity.monitors(LAWS[config.law])]
+    return [*(watch.monitors if watch else ()), *convexity.test_functions(LAWS[config.law])]
 
 
 def begun(config: Config):
     """Return the run from the branch's first point, and its watch; the caller passes its points to `branches.ends.checked`."""
     system, x, tangent = seed(config)
     watch = _watch(config, system, x)
-    return _kind(config)(system, x, settings_of(config, _monitors(config, watch)), tangent), watch
+    return _kind(config)(system, x, settings_of(config, _test_functions(config, watch)), tangent), watch
 
 
 def _resumed(config: Config, path: Path):
@@ -136,7 +136,7 @@ def _resumed(config: Config, path: Path):
                 f"limits: {name}: {exact_text(low)}, {exact_text(high)} must contain the last point of the file, "
                 f"{name} = {last[name]:.10g}"
             )
-    settings = settings_of(config, _monitors(config, watch))
+    settings = settings_of(config, _test_functions(config, watch))
     return (_kind(config)(state.system, state.x, settings, state=state, start=start), watch), image
 
 

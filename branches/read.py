@@ -18,7 +18,7 @@ from ribbon_model.solution import Solution
 
 @dataclass(frozen=True)
 class StoredBranch:
-    """A branch file in memory: the scene, the tables of points and events (structured arrays), the kept solutions.
+    """A branch file in memory: the scene, the tables of points and of labelled points (structured arrays), the kept solutions.
 
     ``stop`` is a sentence with the reason why the run ended, ``reason`` a key word ("trivial branch", "limit", ...).
     """

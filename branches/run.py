@@ -49,7 +49,7 @@ def arguments(argv=None):
 
 
 def main(argv=None) -> int:
-    """Run the command; the exit code."""
+    """Run the command; return the exit code."""
     from branches.display import survive_any_encoding, write_output
 
     survive_any_encoding()

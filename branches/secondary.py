@@ -224,7 +224,7 @@ def _line(switch: dict) -> str:
 
 
 def main(argv=None) -> int:
-    """Run the command; the exit code."""
+    """Run the command; return the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m branches.secondary", allow_abbrev=False,
         description="Follow the branches that leave a primary branch at its secondary bifurcations, and add them to a diagram.",

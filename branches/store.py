@@ -109,8 +109,8 @@ class BranchWriter:
     image : bytes, optional
         An unfinished file to continue.
     watch : optional
-        ``watch.index(point)`` is the value of the column of that name, ``watch.change(point)`` what the events have besides
-        (`branches.stability.Watch`); no such columns without.
+        ``watch.index(point)`` is the value of the column of that name, ``watch.change(point)`` holds the further columns of
+        labelled points (`branches.stability.Watch`). Without it there are no such columns.
     """
 
     #: Seconds between checkpoints of a run. A kill loses the points of this time; ten times less would slow short steps.

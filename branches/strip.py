@@ -120,8 +120,8 @@ def _at_natural_curvature(strip: Strip, m: int, n: int, folds: list) -> Iterator
         return  # no such bifurcation
     limits = {"kappa_n": (min(start, kappa_n) - _REACH, max(start, kappa_n) + _REACH)}
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 8, 7, Gamma=Gamma)
-    monitors = convexity.monitors(FINITE_WIDTH)
-    run = follow(system, x, Settings(trivial="M2", limits=limits, zeros={"kappa_n": [kappa_n]}, monitors=monitors), tangent)
+    ends = convexity.test_functions(FINITE_WIDTH)
+    run = follow(system, x, Settings(trivial="M2", limits=limits, zeros={"kappa_n": [kappa_n]}, test_functions=ends), tangent)
     for point in run:
         if point.label == "LP":
             folds.append((f"fold of ({m}, {n})", point["kappa_n"]))

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contin import Batch, Monitor
+from contin import Batch, TestFunction
 from ribbon_model.laws import Law
 from ribbon_model.shape import frames
 from ribbon_model.solution import Solution
@@ -64,7 +64,7 @@ def _moments(solution: Solution):
     return np.einsum("kij,kj->ki", frames(states), np.broadcast_to(moment, (len(states), 3)))
 
 
-def monitors(law: Law) -> list[Monitor]:
+def test_functions(law: Law) -> list[TestFunction]:
     """Return the test function that ends a run where the law ends; none for a law with a closed expression for H."""
     least = margin(law)
-    return [Monitor("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []
+    return [TestFunction("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []

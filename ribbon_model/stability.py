@@ -288,7 +288,7 @@ class _Intervals:
     motion: np.ndarray
 
     def condensed(self) -> _Intervals | None:
-        """What does not change the increments eliminated: 6 unknowns on each; None where that is not positive definite.
+        """Return the form after elimination of what does not change the increments, 6 unknowns each; None if indefinite.
 
         By a QR factorization of B^T, B the increments, the first 6 of K orthonormal coordinates y give all increments.
         """
