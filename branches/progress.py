@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from branches.display import Display, write_output
 
@@ -40,6 +40,9 @@ class Progress(Display):
     ...         progress.part_done()  # "1 of 2 branches done, 1 s so far, about 1 s to go"
     """
 
+    #: The lines that are open. A line inside the block of another one is shown in its place.
+    _open: ClassVar[list[Progress]] = []
+
     def __init__(self, what: str, total: int = 0, quiet: bool = False):
         super().__init__(quiet)
         self._tells = not quiet
@@ -51,6 +54,7 @@ class Progress(Display):
 
     def __enter__(self) -> Progress:
         if self._moving:
+            self._open.append(self)
             self._ticker = threading.Thread(target=self._tick, daemon=True)
             self._ticker.start()
         return self
@@ -64,6 +68,7 @@ class Progress(Display):
         if self._ticker is not None:
             self._ticker.join()
             self._ticker = None
+            self._open.remove(self)
             self.clear()
 
     def expect(self, total: int) -> None:
@@ -120,7 +125,7 @@ class Progress(Display):
 
     def _show(self) -> None:
         with self._lock:
-            if self._ticker is not None and not self._over.is_set():
+            if self._ticker is not None and not self._over.is_set() and self._open[-1] is self:
                 self._line(self.text())
 
 

@@ -49,6 +49,17 @@ def test_the_line_is_overwritten_and_goes_away(monkeypatch, capsys):
     assert capsys.readouterr().out == "a line\n"
 
 
+def test_a_line_inside_another_one_is_shown_in_its_place(monkeypatch):
+    terminal = a_terminal(monkeypatch)
+    with Progress("items", total=2) as outer:
+        with Progress("cases", total=3) as inner:
+            inner.part("thin")
+            outer.part("fig7")
+        outer.part_done()
+    shown = list(dict.fromkeys(lines(terminal.getvalue())))  # each is written twice, for the cursor to end behind it
+    assert [line.split()[3] for line in shown] == ["cases", "items"] and shown[1].startswith("1 of 2 items done")
+
+
 def test_nothing_is_shown_if_quiet_or_elsewhere_than_on_a_terminal(monkeypatch, capsys):
     terminal = a_terminal(monkeypatch)
     with Progress("branches", total=1, quiet=True) as progress:
