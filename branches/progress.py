@@ -110,13 +110,14 @@ class Progress(Display):
         return f"{self._done} of {self._total} {self._what} done, {so_far}{estimate}{part}"
 
     def _left(self, now: float) -> float | None:
-        """Return the estimate of the seconds left: the mean time of the finished parts, for each part that is left.
+        """Return the estimate of the seconds left: the mean time of the parts, for each part that is left.
 
-        The time spent on the current part is taken off, but not more than that mean.
+        The mean is that of the finished parts, or of these and the current part if that is larger. The time spent on the
+        current part is taken off, but not more than the mean.
         """
         if not self._done:
             return None
-        mean = (self._done_at - self._began) / self._done
+        mean = max((self._done_at - self._began) / self._done, (now - self._began) / (self._done + 1))
         return max(mean * (self._total - self._done) - min(now - self._part_began, mean), 0.0)
 
     def _tick(self) -> None:

@@ -100,6 +100,18 @@ def test_the_estimate_converges(monkeypatch):
     assert "18 min so far, about 0 s to go" in progress.text()  # never negative
 
 
+def test_a_part_that_takes_longer_than_the_others_raises_the_estimate(monkeypatch):
+    """Two parts in 100 s so far: 50 s for each of the three that are left, less 50 s of the current one."""
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    progress = Progress("items", total=4)
+    now[0] += 2
+    progress.part_done()
+    progress.part("long")
+    now[0] += 98
+    assert progress.text() == "1 of 4 items done, 100 s so far, about 100 s to go: long"
+
+
 def shown_on_a_terminal(command, *arguments, program, **more):
     """What a command writes on a pseudo-terminal."""
     pty = pytest.importorskip("pty")
