@@ -29,7 +29,7 @@ _BOOKKEEPING = (
     (
         "label",
         "S2",
-        "AUTO's label: BP branch point, LP fold, SB secondary bifurcation, UZ user zero, EP end, MX failed; empty for others",
+        "AUTO's label: BP branch point, LP fold, SB secondary bifurcation, UZ user value, EP end, MX failed; empty for others",
     ),
     ("arclength", "f8", "distance from the first point in the continuation norm"),
     ("intervals", "i4", "mesh intervals N of this point's solution"),
