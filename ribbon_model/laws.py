@@ -387,7 +387,7 @@ class FiniteWidth(Law):
         return finite_width.convex_limits(nu, m * Gamma)
 
     def arc(self, xi, nu, width=None) -> tuple:
-        """Return a circle of curvature kappa that is naturally of curvature 1."""
+        """Return the values of a circle of curvature kappa whose natural curvature is 1."""
         import numpy as np
 
         kappa = 1 - xi

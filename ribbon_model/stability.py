@@ -57,7 +57,7 @@ class SymmetryClass:
     Attributes
     ----------
     wavenumber : int
-        j: from one part of the loop to the next the perturbation gains the factor exp(2 pi i j / order), besides the motion
+        j: from one part of the loop to the next the perturbation is multiplied by exp(2 pi i j / order), after the motion
         that takes one part to the next. j = 0 keeps the symmetry.
     parity : str
         'even' or 'odd' under the mirror (or two-fold axis) at S = 0; '' where that takes j to another class, or there is none.
@@ -129,7 +129,7 @@ class Stability:
 
     @property
     def critical(self) -> SymmetryClass:
-        """The class that has the eigenvalue nearest to zero."""
+        """The class with the eigenvalue nearest to zero."""
         return min(self.classes, key=lambda entry: abs(entry.eigenvalues[entry.nearest]))
 
 
@@ -175,7 +175,7 @@ class _Points:
 
 
 def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
-    """Return the frame, centreline by the collocation's own quadrature, strains, compliance, and the quantities of Q."""
+    """Return the fields of an equilibrium at the Gauss points; the centreline is by the collocation's own quadrature."""
     tables, mesh = basis(equilibrium.degree), equilibrium.mesh
     lengths = np.diff(mesh)
     stations = mesh[:-1, None] + lengths[:, None] * tables.points
@@ -203,7 +203,7 @@ def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
 
 
 def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
-    """x(0) from a centre of all symmetries, given x(end) - x(0) of the piece; and the gap of the loop."""
+    """Return x(0) from a centre of all symmetries, given x(end) - x(0) of the piece; and the gap of the loop."""
     if not symmetry.reverses:
         return np.zeros(3), float(np.linalg.norm(end))
     start, middle = (np.eye(3) + each[3:, 3:] for each in (_reversal(symmetry), _motion(symmetry) @ _reversal(symmetry)))
@@ -240,16 +240,16 @@ _CIRCULAR = np.kron(np.eye(2), np.array([[1, 1j, 0], [1, -1j, 0], [0, 0, np.sqrt
 
 @functools.cache
 def _phases(symmetry: Symmetry) -> np.ndarray:
-    """T on the circular axes is exp(2 pi i p / order): the whole numbers p (6,)."""
+    """Return the whole numbers p (6,): T on the circular axes is exp(2 pi i p / order)."""
     turning = np.array([symmetry.winding, -symmetry.winding, 0])
     return np.concatenate([turning, turning + (symmetry.order // 2 if symmetry.flip else 0)])
 
 
 @functools.cache
 def _closing(symmetry: Symmetry, wavenumber: int) -> tuple[np.ndarray, np.ndarray]:
-    """From the increment D of E over a part, E(0) = Z D in a class: Z (6, 6), and the rows (c, 6) whose product with D is zero.
+    """Return Z (6, 6) and rows (c, 6) of a class: E(0) = Z D for the increment D of E over a part, and rows . D = 0.
 
-    E(0) + D = rho T E(0). Where rho T has the eigenvalue 1, D is zero and E(0) a rigid motion, which does not matter.
+    E(0) + D = rho T E(0). Where rho T has the eigenvalue 1, D is zero and E(0) a rigid motion, which has no effect.
     """
     phases = (wavenumber + _phases(symmetry)) % symmetry.order
     factors = np.exp(2j * np.pi * phases / symmetry.order) - 1
@@ -304,7 +304,7 @@ class _Intervals:
         return _Intervals(local, self.increments @ axes[:, :, :_RIGID], motion[:, :_RIGID])
 
     def paired(self, coupling) -> _Intervals:
-        """Two intervals as one each time; their number is even."""
+        """Return pairs of intervals as one each; the number of intervals is even."""
         first, last = self.increments[::2], self.increments[1::2]
         across = first.transpose(0, 2, 1) @ coupling @ last / 2
         upper = np.concatenate([self.local[::2], across], axis=2)
@@ -318,13 +318,13 @@ class _Intervals:
         return _Intervals(*(part[:at] for part in parts)), _Intervals(*(part[at:] for part in parts))
 
     def joined(self, other: _Intervals) -> _Intervals:
-        """These intervals and others behind them."""
+        """Return these intervals, followed by others."""
         parts = zip((self.local, self.increments, self.motion), (other.local, other.increments, other.motion))
         return _Intervals(*(np.concatenate(pair) for pair in parts))
 
 
 def _of_mesh(points: _Points, coupling, degree: int) -> _Intervals:
-    """Q on each interval of the mesh; unknowns are v at the Gauss points times the roots of their weights.
+    """Return Q on each interval of the mesh; unknowns are v at the Gauss points times the roots of their weights.
 
     It is the identity plus l c_ij G_j^T N G_i / 2 between the Gauss points j and i, l the length and
     c_ij = a_ij sqrt(w_i / w_j) - a_ji sqrt(w_j / w_i), with the Runge-Kutta method's matrix a and weights w.
@@ -340,7 +340,7 @@ def _of_mesh(points: _Points, coupling, degree: int) -> _Intervals:
 
 
 def _condensed(intervals: _Intervals, coupling) -> _Intervals:
-    """Intervals of the mesh with six unknowns each, joined in pairs as long as what is eliminated is positive definite."""
+    """Return intervals with six unknowns each, joined in pairs as long as the eliminated block is positive definite."""
     found = intervals.condensed()
     while found is not None:
         intervals, even = found, len(found.local) // 2 * 2
@@ -367,7 +367,7 @@ class _Form:
         blocks[range(count), :, range(count)] += (intervals.local + intervals.local.transpose(0, 2, 1)) / 2
 
     def classes(self) -> tuple[SymmetryClass, ...]:
-        """Every class; sets ``residual``."""
+        """Return every class; set ``residual``."""
         symmetry, found = self.symmetry, []
         for j in range(symmetry.order // 2 + 1):
             own = 2 * j % symmetry.order == 0
@@ -397,7 +397,7 @@ class _Form:
         return form, np.hstack([self.increments + reflected, 1j * (self.increments - reflected)]) * np.sqrt(0.5)
 
     def _eigenvalues(self, form, increments, j: int, known):
-        """Eigenvalues of a class: closed, under the conditions of closure, the shift of phase ``known`` left out."""
+        """Return the eigenvalues of a class under the conditions of closure, without the shift of phase ``known``."""
         closing, rows = _closing(self.symmetry, j)
         closing = closing.conj().T @ self.coupling
         closing = (closing + closing.conj().T) / 2
