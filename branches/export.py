@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid comman
 EXIT_BAD_INPUT = 2
 #: Allowed endings of --out and --movie.
 SURFACES, MOVIES = (".stl", ".obj", ".glb", ".gltf", ".vtk", ".vtu"), (".gif", ".mp4")
-#: Default width if the scene has no Gamma, in units of L: that of the pictures, 0.3 L/2 pi.
+#: Default width, in units of L: that of the pictures, 0.3 L/2 pi.
 _WIDTH = 0.3 / (2 * math.pi)
 #: Largest default width, relative to the largest possible width: where generators nearly cross, cells
 #: degenerate. At .99 the narrowest cells of the branch (1, 2) are a hundredth of the others.
@@ -209,7 +209,7 @@ def _mesh(branch: StoredBranch, shape: Shape, options):
     width, most = _width(branch, options), solid.widest(shape)
     if width is None:
         width = min(_WIDTH * options.length, _ROOM * most)
-        write_output(f"width {width:.6g}: the default, as the scene has no Gamma; change it with --width\n")
+        write_output(f"width {width:.6g}: the default; change it with --width\n")
     if width >= most:
         raise ConfigError(f"--width {width:g}: must be below {most:.6g}, where generators of the surface begin to cross")
     if options.thickness is None:
