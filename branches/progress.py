@@ -147,8 +147,13 @@ class StartingDisplay(Display):
         self._start.stop()
         super().clear()
 
+    def begin_diagram(self, config, total: int, kept: int) -> None:
+        """Say how many branches there are; estimates of the time left do not contain the time of the start."""
+        super().begin_diagram(config, total, kept)
+        self._began = time.monotonic()
+
     def point(self, point: Point, number: int, step: float) -> None:
-        """Show a point; the rate counts from the first one, without the time that the start took."""
+        """Show a point; the rate counts from the first one, without the time of the start."""
         if number == self._first:
             self._began = self._shown = time.monotonic()
         super().point(point, number, step)
