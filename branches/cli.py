@@ -1,20 +1,20 @@
 """``ribbon COMMAND ...``: all commands under one name; each does what ``python -m branches.COMMAND`` does.
 
-Nothing is imported here but what is needed to start a command: ``ribbon --help`` answers at once.
+Only the imports that start a command are here, so that ``ribbon --help`` answers at once.
 """
 
 from __future__ import annotations
 
 import sys
 
-#: Commands and what they do. Each is the module of this package that has its name.
+#: Commands with a description. Each is the module of this package with its name.
 COMMANDS = {
     "run": "follow a branch, or all branches of a diagram, to result files",
     "secondary": "follow the branches that leave at secondary bifurcations",
-    "graph": "ask a bifurcation diagram for folds, states and courses",
-    "explore": "write results as one page to look at in a browser",
+    "graph": "list branches, states and folds of a bifurcation diagram",
+    "explore": "write results as one page for a browser",
     "export": "write a strip for 3D printing, Blender, ParaView or a table; a branch as a film",
-    "strip": "say what a strip of given dimensions does, in SI units",
+    "strip": "compute the states of a strip of given dimensions, in SI units",
     "paper": "compute the tables and figures of Audoly & Seffen (2015)",
     "shell": "compute the unfolding strip as a solid by finite elements (CalculiX)",
 }
@@ -22,14 +22,14 @@ EXIT_BAD_INPUT = 2
 
 
 def help_text() -> str:
-    """All commands, with a line each."""
+    """Return the list of all commands."""
     lines = [f"  {name:<10} {what}" for name, what in COMMANDS.items()]
     head = "usage: ribbon COMMAND ...\n\nBuckled equilibria of closed elastic strips.\n\n"
     return head + "\n".join(lines) + "\n\n'ribbon COMMAND --help' lists the options of a command.\n"
 
 
 def main(argv=None) -> int:
-    """Start a command with the arguments that follow it; the exit code, unless the command ends the process itself."""
+    """Start a command with its arguments; return the exit code, unless the command ends the process itself."""
     words = list(sys.argv[1:] if argv is None else argv)
     if words[:1] in (["--help"], ["-h"], ["help"]):
         sys.stdout.write(help_text())
@@ -41,7 +41,7 @@ def main(argv=None) -> int:
         return 0
     if not words or words[0] not in COMMANDS:
         problem = f"there is no command {words[0]!r}" if words else "a command is needed"
-        sys.stderr.write(f"error: {problem}; known are {', '.join(COMMANDS)} (--help says what they do)\n")
+        sys.stderr.write(f"error: {problem}; the commands are {', '.join(COMMANDS)} (--help describes them)\n")
         return EXIT_BAD_INPUT
     import runpy
 

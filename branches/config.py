@@ -1,4 +1,4 @@
-"""A scene: what to compute, from a YAML file, checked field by field before anything starts."""
+"""Scenes: the input of a computation, from a YAML file, checked field by field before the computation starts."""
 
 from __future__ import annotations
 
@@ -26,13 +26,15 @@ class _Strict(BaseModel):
 
 
 class MeshConfig(_Strict):
-    """How finely a branch is resolved."""
+    """Fields of the mesh."""
 
     degree: int = Field(7, ge=2, le=8, description="polynomial degree of the collocation")
     intervals: int = Field(8, ge=1, le=2000, description="intervals of the first mesh")
     max_intervals: int = Field(2000, ge=1, le=2000)
-    tolerance: float = Field(1e-12, ge=1e-14, le=1e-2, description="wanted error; the number of intervals adapts to it")
-    adapt_every: int = Field(3, ge=0, description="steps between looks at the mesh, 0 for a fixed one")
+    tolerance: float = Field(
+        1e-12, ge=1e-14, le=1e-2, description="tolerance of the discretization error; the number of intervals adapts to it"
+    )
+    adapt_every: int = Field(3, ge=0, description="steps between adaptations of the mesh, 0 for a fixed mesh")
 
     @model_validator(mode="after")
     def _order(self):
@@ -42,9 +44,9 @@ class MeshConfig(_Strict):
 
 
 class StepConfig(_Strict):
-    """How a branch is stepped along."""
+    """Fields of the steps along a branch."""
 
-    first: float | None = Field(None, ge=1e-6, le=10, description="first step of arclength; 0.05 where the bounds allow it")
+    first: float | None = Field(None, ge=1e-6, le=10, description="first step of arclength; 0.05 if the bounds allow it")
     smallest: float = Field(1e-6, gt=0, le=1)
     largest: float = Field(10.0, gt=0, description="largest step of arclength")
     max_points: int = Field(2000, ge=1, le=1_000_000)
@@ -61,7 +63,7 @@ class StepConfig(_Strict):
 
     @property
     def first_step(self) -> float:
-        """The first step of arclength, chosen where ``first`` is not given."""
+        """The first step of arclength; chosen if ``first`` is not given."""
         return min(max(0.05, self.smallest), self.largest) if self.first is None else self.first
 
 
@@ -77,15 +79,15 @@ Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]
 
 
 class OriginConfig(_Strict):
-    """Where a secondary branch leaves the primary branch (m, n)."""
+    """The point at which a secondary branch leaves the primary branch (m, n)."""
 
     kappa_n: float = Field(description="natural curvature there")
-    kappa_star: float = Field(description="conjugate curvature there, which tells the place from others at this kappa_n")
-    mode: str = Field(description="class of the critical mode, as the labelled point SB of the primary branch is named")
+    kappa_star: float = Field(description="conjugate curvature there, which distinguishes points with the same kappa_n")
+    mode: str = Field(description="class of the critical mode: the name of the labelled point SB on the primary branch")
 
 
 class Config(_Strict):
-    """One branch, followed to its end: that of the mode of wavenumber n on the m-covered circle, or one that leaves it."""
+    """One branch: that of the mode of wavenumber n on the m-covered circle, or a secondary branch that leaves it."""
 
     title: str = ""
     law: Literal[*LAWS] = RIBBON.name
@@ -97,17 +99,19 @@ class Config(_Strict):
     origin: OriginConfig | None = Field(None, description="follow the secondary branch that leaves (m, n) there instead")
     limits: dict[Column, Interval] = Field(default_factory=lambda: {"kappa_n": (-100.0, 100.0)})
     zeros: dict[Column, Annotated[list[float], Field(max_length=100)]] = Field(
-        default_factory=dict, description="values to label UZ"
+        default_factory=dict, description="values at which points are labelled UZ"
     )
     mesh: MeshConfig = MeshConfig()
     steps: StepConfig = StepConfig()
-    stability: bool = Field(False, description="compute the index of every point, and where it changes")
+    stability: bool = Field(False, description="compute the index of every point, and the points where it changes")
     stride: int = Field(1, ge=1, description="the full solution is kept at every stride-th point and at labelled ones")
 
     @model_validator(mode="after")
     def _bifurcation_exists(self):
         if (self.domain == "cell" or self.origin) and self.m % (2 * self.n) == 0:
-            raise ValueError(f"m = {self.m}, n = {self.n}: m / n must not be even on the cell, where the loop would stay open")
+            raise ValueError(
+                f"m = {self.m}, n = {self.n}: m / n must not be even on the cell, because the loop would not close"
+            )
         self._origin_fits()
         start = self.at_bifurcation() if self.origin is None else self.origin.model_dump()
         for name, (low, high) in self.limits.items():
@@ -119,22 +123,22 @@ class Config(_Strict):
         return self
 
     def _origin_fits(self) -> None:
-        """ValueError where the domain is not one that a branch from this origin can be followed on."""
+        """Raise ValueError if a branch from this origin cannot be followed on the domain."""
         if self.origin is None:
             if self.domain == "half loop between axes":
-                raise ValueError("domain: the half loop between axes is for secondary branches, which have an origin")
+                raise ValueError("domain: the half loop between axes is only for secondary branches, which have an origin")
             return
-        from ribbon_model.domains import HALF_LOOPS  # brings the engine along (.3 s): not for every scene
+        from ribbon_model.domains import HALF_LOOPS  # imports the engine (.3 s), which other scenes do not need here
         from ribbon_model.modes import Mode
 
         allowed = [HALF_LOOPS[reversal].name for reversal in Mode.parse(self.n, self.origin.mode).keeps]
         if not allowed:
-            raise ValueError(f"origin: {self.origin.mode!r} keeps no mirror and no axis, and is not followed")
+            raise ValueError(f"origin: {self.origin.mode!r} keeps no mirror and no axis; such branches are not followed")
         if self.domain not in allowed:
             raise ValueError(f"domain: {self.domain!r} must be {' or '.join(map(repr, allowed))} for {self.origin.mode!r}")
 
     def at_bifurcation(self) -> dict[Column, float]:
-        """What the columns are on the circle where the branch starts (there the strain is omega = (m, 0, 0)).
+        """Return the columns on the circle where the branch starts (there the strain is omega = (m, 0, 0)).
 
         Raises
         ------
@@ -149,7 +153,7 @@ class Config(_Strict):
 
     @property
     def material(self) -> str:
-        """The law with its Gamma, if it has one, as one name."""
+        """The name of the law, with its Gamma if it has one."""
         return label(self.law, self.Gamma)
 
 
@@ -161,9 +165,9 @@ class DiagramConfig:
     ----------
     title : str
     values : dict
-        The scene as it was written.
+        The fields of the scene as given.
     branches : tuple of Config
-        Every combination, n = m (a rigid rotation) and, on the cell, even m / n (a loop that stays open) left out.
+        Every combination, without n = m (a rigid rotation) and, on the cell, even m / n (a loop that does not close).
     absent : dict
         Combinations that cannot be run, by name, with the reason: no such bifurcation, or one outside the limits.
     """
@@ -176,7 +180,7 @@ class DiagramConfig:
 
 #: Fields that may hold a list; a scene that has one, or ``pairs``, is a diagram.
 _SWEPT = ("law", "nu", "Gamma", "m", "n")
-#: More branches than anybody wants in one scene.
+#: Largest number of branches in one scene. With ten times more, a mistyped list would run for hours.
 _MOST_BRANCHES = 10_000
 
 
@@ -185,13 +189,13 @@ def _is_diagram(values: dict) -> bool:
 
 
 def _diagram(values: dict, name: str, settings: list[str]) -> DiagramConfig:
-    """The scene of many branches that these values state."""
+    """Return the scene of many branches with these values."""
     lists = {key: values[key] if isinstance(values.get(key), list) else [values[key]] for key in _SWEPT if key in values}
     for key, entries in lists.items():
         if not entries:
             raise ConfigError(f"{name}: {key}: the list is empty")
     if "origin" in values:
-        raise ConfigError(f"{name}: origin: belongs to a scene of one branch, not of many")
+        raise ConfigError(f"{name}: origin: must not be given in a scene of many branches")
     pairs = _pairs(values, lists, name)
     families = _families(lists)
     if len(families) * len(pairs) > _MOST_BRANCHES:
@@ -205,7 +209,7 @@ def _diagram(values: dict, name: str, settings: list[str]) -> DiagramConfig:
         try:
             found.append(Config.model_validate({**shared, "law": law, "nu": nu, "Gamma": Gamma, "m": m, "n": n}))
         except ValidationError as error:
-            if error.errors()[0]["loc"]:  # a field is wrong in itself, whatever the combination
+            if error.errors()[0]["loc"]:  # a field is invalid in every combination
                 raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
             absent[_branch_name(law, Gamma, nu, m, n)] = _sentence(error)
     if not found:
@@ -216,26 +220,26 @@ def _diagram(values: dict, name: str, settings: list[str]) -> DiagramConfig:
 
 
 def _branch_name(law: str, Gamma: float | None, nu: float, m: int, n: int) -> str:
-    """A branch of a diagram in words."""
+    """Return the name of a branch of a diagram, for messages."""
     return f"{label(law, Gamma)}, nu = {exact_text(nu)}, ({m}, {n})"
 
 
 def _check_different(branches: list[Config], name: str) -> None:
-    """ConfigError where a branch stands twice, or two differ by so little in Gamma that their names would be the same."""
+    """Raise ConfigError if a branch is listed twice, or if two values of Gamma are so close that their names are equal."""
     seen, Gammas = set(), {}
     for one in branches:
         key = one.law, one.Gamma, one.nu, one.m, one.n
         if key in seen:
-            raise ConfigError(f"{name}: the branch {_branch_name(*key)} stands twice in the lists; give each value once")
+            raise ConfigError(f"{name}: the branch {_branch_name(*key)} is listed twice; give each value once")
         seen.add(key)
         other = Gammas.setdefault(one.material, one.Gamma)
         if other != one.Gamma:
             both = f"{exact_text(other)} and {exact_text(one.Gamma)}"
-            raise ConfigError(f"{name}: Gamma: {both} agree in 12 digits, which is all that names of results show; give one")
+            raise ConfigError(f"{name}: Gamma: {both} agree in 12 digits, the precision of the names of results; give one")
 
 
 def _families(lists: dict) -> list[tuple]:
-    """All (law, nu, Gamma) of a diagram; beside the law that has a Gamma, the others stand without."""
+    """Return all (law, nu, Gamma) of a diagram; laws without a Gamma get None."""
     laws, Gammas = lists.get("law", [RIBBON.name]), lists.get("Gamma", [None])
     wide = [name for name, law in LAWS.items() if law.has_width and name in laws]
     without = [None] if wide else Gammas
@@ -244,31 +248,31 @@ def _families(lists: dict) -> list[tuple]:
 
 
 def _pairs(values: dict, lists: dict, name: str) -> list[tuple]:
-    """All (m, n) of a diagram."""
+    """Return all (m, n) of a diagram."""
     if "pairs" not in values:
         for key in ("m", "n"):
             if key not in lists:
                 raise ConfigError(f"{name}: the field {key!r} is missing")
         return list(itertools.product(lists["m"], lists["n"]))
     if "m" in values or "n" in values:
-        raise ConfigError(f"{name}: pairs: stands beside m or n; give either pairs or lists of m and n")
+        raise ConfigError(f"{name}: pairs: must not be given together with m or n")
     pairs = values["pairs"]
     if not (isinstance(pairs, list) and pairs and all(isinstance(pair, list) and len(pair) == 2 for pair in pairs)):
         raise ConfigError(f"{name}: pairs: must be a list of [m, n], not {_show(pairs)}")
     return [tuple(pair) for pair in pairs]
 
 
-#: A scene is a few lines; what is larger is some other file (or a device that never ends).
+#: Largest size of a scene. Scenes have a few lines; a larger file is not a scene (or is a device that never ends).
 _MOST_BYTES = 1_000_000
 
 
 def load(path: str | Path, settings: list[str] = ()) -> Config | DiagramConfig:
-    """The scene of a YAML file, with ``key=value`` settings (dotted keys, YAML values) put over it.
+    """Return the scene of a YAML file, changed by ``key=value`` settings (dotted keys, YAML values).
 
     Raises
     ------
     ConfigError
-        A file that cannot be read, or a field that is unknown, of the wrong type or impossible.
+        A file that cannot be read, or a field that is unknown, of the wrong type or invalid.
     """
     try:
         with open(path, "rb") as file:
@@ -279,12 +283,12 @@ def load(path: str | Path, settings: list[str] = ()) -> Config | DiagramConfig:
     except UnicodeDecodeError as error:
         raise ConfigError(f"cannot read the config {str(path)!r}: it is not UTF-8 text") from error
     if len(data) > _MOST_BYTES:
-        raise ConfigError(f"cannot read the config {str(path)!r}: it is larger than a megabyte, which no scene is")
+        raise ConfigError(f"cannot read the config {str(path)!r}: it is larger than a megabyte; a scene must be smaller")
     return parse(text, _plain(str(path)), settings)
 
 
 def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramConfig:
-    """The scene of a YAML text; ``name`` says in messages where it came from."""
+    """Return the scene of a YAML text; messages call the text ``name``."""
     values = _yaml(text, name)
     if not isinstance(values, dict):
         found = "it is empty" if values is None else f"not {_show(values)}"
@@ -306,7 +310,7 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
 
 
 def _of_strip(values: dict, name: str) -> dict:
-    """The scene with the dimensionless numbers of its ``strip``, in SI units: law, nu, Gamma; its kappa_n is labelled UZ."""
+    """Replace the ``strip`` of a scene (SI units) by law, nu and Gamma; its kappa_n is labelled UZ."""
     from ribbon_model.strip import NAMES, Strip
 
     strip = values["strip"]
@@ -320,7 +324,7 @@ def _of_strip(values: dict, name: str) -> dict:
             raise ConfigError(f"{name}: the field 'strip.{field}' is missing")
     for field in ("law", "nu", "Gamma"):
         if field in values:
-            raise ConfigError(f"{name}: {field}: stands beside strip, which says it already")
+            raise ConfigError(f"{name}: {field}: must not be given together with strip, which determines it")
     try:
         found = Strip(**strip)
     except ValueError as error:
@@ -328,7 +332,7 @@ def _of_strip(values: dict, name: str) -> dict:
     rest = {key: value for key, value in values.items() if key != "strip"}
     rest |= {"law": FINITE_WIDTH.name, "nu": found.poisson_ratio, "Gamma": found.Gamma}
     zeros = rest.get("zeros", {})
-    if isinstance(zeros, dict) and isinstance(zeros.get("kappa_n", []), list):  # else its own check complains
+    if isinstance(zeros, dict) and isinstance(zeros.get("kappa_n", []), list):  # otherwise the check of the field rejects it
         rest["zeros"] = {**zeros, "kappa_n": [*zeros.get("kappa_n", []), found.kappa_n]}
     return rest
 
@@ -336,12 +340,12 @@ def _of_strip(values: dict, name: str) -> dict:
 # --- YAML ---------------------------------------------------------------------------------------------------------
 
 
-#: A scene has no more levels than this.
+#: Largest number of nested levels. Scenes have three; thousands would take seconds to read.
 _DEEPEST = 20
 
 
 class _Loader(yaml.SafeLoader):
-    """The YAML that a scene needs: no aliases (which can expand without bound), no tags, no key twice.
+    """Loader for the subset of YAML in scenes: no aliases (which can expand without bound), no tags, no duplicate keys.
 
     Plain words are read as in YAML 1.2: 1e-12 is a number, while 1:30, 010 and yes are text.
     """
@@ -363,7 +367,7 @@ class _Loader(yaml.SafeLoader):
         seen = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode) and key.value in seen:
-                raise yaml.MarkedYAMLError(problem=f"the key {key.value!r} stands twice", problem_mark=key.start_mark)
+                raise yaml.MarkedYAMLError(problem=f"the key {key.value!r} is given twice", problem_mark=key.start_mark)
             seen.add(key.value if isinstance(key, yaml.ScalarNode) else None)
         return super().construct_mapping(node, deep)
 
@@ -378,19 +382,19 @@ for _kind, _pattern, _first in (
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes what ``_Loader`` would not read as text."""
+    """Dumper that quotes texts which ``_Loader`` would read as other types."""
 
     yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
 
 
 def dump(config: Config | DiagramConfig) -> str:
-    """The YAML text of a scene, fields at their defaults left out; `parse` reads it back."""
+    """Return the YAML text of a scene without fields at their defaults; `parse` reads it back."""
     values = config.values if isinstance(config, DiagramConfig) else config.model_dump(mode="json", exclude_defaults=True)
     return yaml.dump(values, Dumper=_Dumper, sort_keys=False)
 
 
 def difference(stored: Config, config: Config, ignored: Sequence[str] = ()) -> str:
-    """The first field in which the scene of a file differs from another scene, in words; '' if they agree.
+    """Return the first field in which the scene of a file differs from another scene, in words; '' if they agree.
 
     Parameters
     ----------
@@ -436,7 +440,7 @@ def _where(complaint) -> str:
 
 
 def _origin(error: ValidationError, name: str, settings: list[str]) -> str:
-    """The setting that the first complaint is about, else the file."""
+    """Return the setting that the first error is about, otherwise the file."""
     where = _where(error.errors()[0])
     for setting in reversed(settings):
         key = setting.partition("=")[0].strip()
@@ -446,13 +450,13 @@ def _origin(error: ValidationError, name: str, settings: list[str]) -> str:
 
 
 def _plain(text: str) -> str:
-    """A text as a message shows it: one line, of bounded length."""
+    """Return a text for a message: one line of bounded length."""
     text = text if text.isprintable() else repr(text)[1:-1]
     return text if len(text) <= 200 else text[:197] + "..."
 
 
 def _sentence(error: ValidationError) -> str:
-    """The first complaint as `field: value ... what is allowed`, and how many more there are."""
+    """Return the first error as `field: value ... what is allowed`, and the number of further errors."""
     errors = error.errors()
     first = errors[0]
     where, kind, message = _where(first), first["type"], first["msg"].removeprefix("Value error, ")

@@ -1,4 +1,4 @@
-"""A scene of many branches: run concurrently, each to a file of its own, assembled as a graph."""
+"""Run a scene of many branches: in parallel, each to its own file, and assembled as a graph."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from branches.read import complete_run, read_branch
 
 
 def compute(text: str) -> tuple[bytes, str]:
-    """One branch from the text of its scene: the image of its file, and how it ended. Runs anywhere."""
+    """Compute one branch from the text of its scene, in any process: return the image of its file, and the outcome."""
     from branches.display import Display
     from branches.job import compute_branch
 
@@ -24,10 +24,10 @@ def compute(text: str) -> tuple[bytes, str]:
 
 
 class _Plan:
-    """Which branch to compute next: none twice, from its other end.
+    """The order of the branches, in which none is computed twice from its two ends.
 
-    A branch (m, n) may arrive at the (2n - m)-covered circle, where it is the branch (2n - m, n). Of such a pair the second one
-    waits for the first, and is left out if that came to its start.
+    A branch (m, n) may end on the (2n - m)-covered circle, where it is the branch (2n - m, n). The second branch of such a pair
+    waits for the first, and is left out if the first one ends at its start.
     """
 
     def __init__(self, configs: list[Config], missing: list[Config], graph):
@@ -47,7 +47,7 @@ class _Plan:
         return law, nu, 2 * n - m, n
 
     def next(self, running):
-        """The next branch, `WAIT`, or None."""
+        """Return the next branch, `WAIT`, or None."""
         busy = {self._key(config) for config in running}
         for config in list(self._open):
             other = self._later.get(self._key(config))
@@ -69,7 +69,7 @@ def run_diagram(
     Parameters
     ----------
     time_limit : float, optional
-        Seconds that a branch may take in a process of this machine.
+        Largest time in seconds of a branch in a process of this machine.
 
     Returns
     -------
@@ -97,9 +97,9 @@ def run_diagram(
 
 
 def _refuse_another_scene(config: DiagramConfig, folder: Path) -> None:
-    """StoreError where a branch in the folder would be replaced, or would be in no diagram any more.
+    """Raise StoreError if a branch in the folder would be replaced, or would no longer be in a diagram.
 
-    A scene that has the same branches and more is not another scene.
+    A scene with the same branches and further ones is accepted.
     """
     advice = "--overwrite replaces its diagram, --out writes elsewhere"
     ours = {primary_file(one): one for one in config.branches}
@@ -109,27 +109,27 @@ def _refuse_another_scene(config: DiagramConfig, folder: Path) -> None:
         if differs:
             raise StoreError(f"{str(folder)!r} holds another scene ({name}: {differs}); {advice}")
         if name not in ours:
-            raise StoreError(f"{str(folder)!r} holds another scene ({name} is no branch of this one); {advice}")
+            raise StoreError(f"{str(folder)!r} holds another scene ({name} is not a branch of this one); {advice}")
 
 
 def _stored_scenes(folder: Path, names, advice: str) -> dict[str, Config]:
-    """The scenes of the branches that a folder holds by its diagram, and by those of its files that have one of the names."""
+    """Return the scenes of the branches in a folder: those of its diagram, and those of its files with one of the names."""
     found = {}
     if (folder / DIAGRAM).exists():
         try:
             text = diagram_graph.read(folder).graph["config"]
             scene = parse(text, DIAGRAM)
         except (StoreError, ConfigError, KeyError) as error:
-            raise StoreError(f"{str(folder)!r} holds a diagram that is no result of branches.run; {advice}") from error
+            raise StoreError(f"{str(folder)!r} holds a diagram that is not a result of branches.run; {advice}") from error
         found = {primary_file(one): one for one in scene.branches}
     for name in names:
-        with contextlib.suppress(StoreError, ConfigError):  # what cannot be read is computed again
+        with contextlib.suppress(StoreError, ConfigError):  # an unreadable branch is computed again
             found[name] = Config.model_validate(read_branch(folder / name).config)
     return found
 
 
 def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[dict[str, str], list[Config]]:
-    """Compute what the folder does not hold; what failed, by file name with the reason, and what was there already."""
+    """Compute the missing branches; return the failed ones, by file name with the reason, and those left out as duplicates."""
     configs = config.branches
     fresh = []
     for one in configs:
@@ -139,9 +139,9 @@ def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[di
         else:
             diagram_graph.add_branch(graph, stored, primary_file(one))
     plan, failed = _Plan(configs, fresh, graph), {}
+    _load_kernels(fresh)
     display.begin_diagram(config, len(configs), len(configs) - len(fresh))
     if fresh:
-        _load_kernels(fresh)
         with run as (submit, wait, limit):
             for one, result in run_jobs(plan.next, _compute_one, submit, limit, wait):
                 problem = _take(folder, one, result, graph)
@@ -153,18 +153,18 @@ def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[di
 
 
 def _summary(config, graph, failed, left_out, seconds, folder) -> list[str]:
-    """What came out, in lines to quote."""
+    """Return the lines of the summary."""
     nodes = [data["kind"] for _, data in graph.nodes(data=True)]
     lines = [
         f"{config.title or 'diagram'}: {len(diagram_graph.families(graph))} branches in {seconds:.2f} s",
         f"  {nodes.count('circle')} bifurcations of circles, {nodes.count('fold')} folds, "
-        f"{nodes.count('leaves')} branches that end at a limit of the scene",
+        f"{nodes.count('leaves')} branches that end at the scene's own limits",
     ]
     if left_out:
-        lines.append(f"  {len(left_out)} more are the same branches from their other ends")
-    lines += [f"  not there: {name}: {reason}" for name, reason in config.absent.items()]
+        lines.append(f"  {len(left_out)} duplicates (the same branches from their other ends) are merged")
+    lines += [f"  left out: {name}: {reason}" for name, reason in config.absent.items()]
     lines += [f"  failed: {name}: {reason}" for name, reason in failed.items()]
-    return [*lines, f"  written to {folder} (diagram.json, diagram.graphml, one file a branch)"]
+    return [*lines, f"  written to {folder} (diagram.json, diagram.graphml, one file per branch)"]
 
 
 def _compute_one(config: Config):
@@ -172,7 +172,7 @@ def _compute_one(config: Config):
 
 
 def _load_kernels(configs):
-    """Load (the first time: compile) what the branches need, once, before processes are forked."""
+    """Load the compiled functions of the branches (or compile them), once before processes are forked."""
     from branches.job import seed
 
     for law in {config.law: config for config in configs}.values():
@@ -181,7 +181,7 @@ def _load_kernels(configs):
 
 
 def _take(folder: Path, config: Config, result, graph) -> str:
-    """Keep a finished branch; what went wrong with it, if anything."""
+    """Write a finished branch to its file and add it to the diagram; return the reason of a failure, or ''."""
     if isinstance(result, BaseException):
         return trouble(result)
     image, outcome = result

@@ -1,7 +1,7 @@
-"""The bifurcation diagram as a graph: where branches start, turn and end, and the pieces between; and questions put to it.
+"""The bifurcation diagram as a graph: special points, the pieces of branches between them, and queries.
 
 Nodes are circle bifurcations, folds, branch points and other ends; edges are the pieces of branches between them and carry
-their columns. ``python -m branches.graph DIR`` (`branches.graph`) answers from the command line.
+their columns. The command is ``python -m branches.graph DIR`` (`branches.graph`).
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from ribbon_model.linear import circle, covering
 
 #: Columns of a branch that an edge carries.
 COLUMNS = ("arclength", "kappa_n", "kappa_star", "energy")
-#: Where a secondary branch meets a primary one, the second where the diagram holds no such point of a primary branch.
+#: Kinds of points where a secondary branch meets a primary one; the second kind if that point is not in the diagram.
 _MEETINGS = ("secondary bifurcation", "primary branch")
 #: Points that agree in kappa_n, kappa* and energy to this, relative to 1 + their size, are one up to symmetry.
 _SAME = 1e-6
 
 
 def new_graph(title: str = ""):
-    """An empty diagram."""
+    """Return an empty diagram."""
     import networkx
 
     return networkx.MultiGraph(title=title, format="ribbon bifurcation diagram", format_version=1)
@@ -43,12 +43,12 @@ def add_branch(graph, branch, name: str) -> bool:
     graph : networkx.MultiGraph
     branch : branches.read.StoredBranch
     name : str
-        Its file, kept with every edge.
+        Its file; every edge carries it.
 
     Returns
     -------
     bool
-        False if it is in the diagram already, computed from its other end. (From a bifurcation one branch emanates on each
+        False if the diagram has it already, computed from its other end. (One branch leaves a bifurcation on each
         domain, and its images under the symmetries of the primary branch.)
     """
     config = branch.config
@@ -75,9 +75,9 @@ def add_branch(graph, branch, name: str) -> bool:
 
 
 def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str, dict]]:
-    """The nodes of a secondary branch, those that the diagram holds already among them.
+    """Return the nodes of a secondary branch; nodes that the diagram already has are reused.
 
-    The identifiers of new ones tell its origin in nine digits, or exactly where another branch has these identifiers.
+    Identifiers of new nodes give the origin in nine digits, or exactly if another branch has these identifiers.
     """
     origin = branch.config["origin"]
     exact = f"{exact_text(origin['kappa_n'])}, {exact_text(origin['kappa_star'])}"
@@ -90,7 +90,7 @@ def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str,
 
 
 def _known(graph, node):
-    """The node of a diagram that is where a secondary branch meets a primary one, if it holds that."""
+    """Return the node of a diagram at a point where a secondary branch meets a primary one, or None."""
     _, values = node
     if values["kind"] not in _MEETINGS:
         return None
@@ -102,19 +102,19 @@ def _known(graph, node):
 
 
 def same_place(a: dict, b: dict) -> bool:
-    """Whether two special points agree in what neither a rigid motion nor another start on the loop changes."""
+    """Return whether two special points agree in quantities that rigid motions and the starting point do not change."""
     columns = [column for column in COLUMNS[1:] if column in a and column in b]
     return all(abs(a[column] - b[column]) < _SAME * (1 + abs(b[column])) for column in columns)
 
 
 def common_index(values) -> int:
-    """The index on a piece between special points: one number, or -1 where it is undecided or changes unexplained."""
+    """Return the index on a piece between special points, or -1 if it is undecided or changes along the piece."""
     decided = set(values[1:-1][values[1:-1] >= 0].tolist())
     return decided.pop() if len(decided) == 1 else -1
 
 
 def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dict], **attributes) -> bool:
-    """Add a branch: its nodes from end to end, as of `node`, and the columns of the pieces between; see `add_branch`."""
+    """Add a branch from its nodes (see `node`), from end to end, and the columns of the pieces between; see `add_branch`."""
     if _circle(family, family["m"]) in graph and nodes[-1][1]["kind"] == "circle" and nodes[-1][0] in graph:
         return False
     graph.add_nodes_from(nodes)
@@ -124,7 +124,7 @@ def connect(graph, family: dict, nodes: list[tuple[str, dict]], pieces: list[dic
 
 
 def holds_circle(graph, law: str, nu: float, covering: int, mode: int) -> bool:
-    """Whether some branch of the diagram leaves or reaches the circle of this covering index with this wavenumber."""
+    """Return whether a branch of the diagram begins or ends on the circle of this covering index with this wavenumber."""
     return _circle({"law": law, "nu": nu, "n": mode}, covering) in graph
 
 
@@ -133,15 +133,15 @@ def _circle(family, covering: int) -> str:
 
 
 def _strip(family) -> str:
-    """The law and nu of a branch in identifiers of nodes: exact, so that they can be looked up by them."""
+    """Return the law and nu of a branch for identifiers of nodes; exact, so that nodes can be found by them."""
     return f"{family['law']} nu={exact_text(family['nu'])}"
 
 
 def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -> tuple[str, dict]:
-    """Identifier and attributes of a special point, the ``number``-th point of its branch.
+    """Return identifier and attributes of a special point, the ``number``-th point of its branch.
 
-    A circle has one identifier whichever branch meets it there: its covering index (negative where it is curled against its
-    natural curvature) and the wavenumber. Other points name the branch (m, n) that they were found on and, on a secondary
+    The identifier of a circle does not depend on the branch: it is the covering index (negative if it is curled against its
+    natural curvature) and the wavenumber. Identifiers of other points contain the branch (m, n) and, on a secondary
     branch, its ``origin``.
     """
     attributes = {name: family[name] for name in ("law", "nu")} | values | {"kind": kind}
@@ -155,29 +155,29 @@ def node(family: dict, kind: str, values: dict, number: int, origin: str = "") -
 
 
 def _node_of(event, family, reason, origin: str = ""):
-    """The node of a labelled point of a branch file."""
+    """Return the node of a labelled point of a branch file."""
     values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
     values |= {"error": float(event["error_kappa_n"]), "what": event["name"].decode()}
     kind = kind_of(event["label"].decode(), values["what"], reason, "origin" in family)
     return node(family, kind, values, int(event["point"]), origin)
 
 
-# --- questions ----------------------------------------------------------------------------------------------------
+# --- queries ------------------------------------------------------------------------------------------------------
 
 
 def families(graph) -> list[tuple]:
-    """The (law, nu, m, n) of all primary branches, in order; each is known by the end it was followed from."""
+    """Return the (law, nu, m, n) of all primary branches, in order; (m, n) is that of the end where the run started."""
     return sorted({family_of(data) for _, _, data in graph.edges(data=True) if "origin" not in data})
 
 
 def pieces(graph, family: tuple) -> list[tuple]:
-    """The edges (a, b, columns) of the primary branch (law, nu, m, n), from end to end."""
+    """Return the edges (a, b, columns) of the primary branch (law, nu, m, n), from end to end."""
     found = [edge for edge in graph.edges(data=True) if family_of(edge[2]) == family and "origin" not in edge[2]]
     return sorted(found, key=lambda edge: edge[2]["arclength"][0])
 
 
 def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[dict]:
-    """The secondary branches: what they left and where (family, origin, mode, domain, file), edges from end to end, nodes."""
+    """Return the secondary branches: their origin (family, origin, mode, domain, file), edges from end to end, and nodes."""
     found = {}
     for edge in graph.edges(data=True):
         data = edge[2]
@@ -193,7 +193,7 @@ def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[
 
 
 def course(graph, m: int, n: int, law: str | None = None, nu: float | None = None) -> list[dict]:
-    """The special points along the branch (m, n), in order from the m-covered circle; for every law and nu asked for.
+    """Return the special points along the branch (m, n), in order from the m-covered circle, for the given law and nu or all.
 
     Raises
     ------
@@ -219,7 +219,7 @@ def family_of(data) -> tuple:
 
 
 def _in_order(graph, edges) -> list[dict]:
-    """The nodes along consecutive edges (whose ends networkx may give either way round)."""
+    """Return the nodes along consecutive edges, whose ends networkx may give in either order."""
     nodes = []
     for a, b, data in edges:
         ends = sorted((a, b), key=lambda node: abs(graph.nodes[node]["kappa_star"] - data["kappa_star"][0]))
@@ -229,7 +229,7 @@ def _in_order(graph, edges) -> list[dict]:
 
 
 def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = None) -> list[dict]:
-    """All equilibria of the diagram at a natural curvature: planar circles and points on branches, by energy.
+    """Return all equilibria of the diagram at a natural curvature: planar circles and points on branches, by energy.
 
     Values between computed points come from a cubic spline over arclength.
     """
@@ -251,14 +251,14 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
 
 
 def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
-    """kappa* and energy of a planar circle."""
+    """Return kappa* and energy of a planar circle."""
     material, Gamma = from_label(law)
     values = circle(material, m, kappa_n, nu, Gamma)
     return {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
 
 
 def _crossings(data, kappa_n):
-    """Places on one piece of a branch where kappa_n takes a value."""
+    """Yield the points on one piece of a branch with a given kappa_n."""
     from scipy.interpolate import CubicSpline
 
     s, keep = np.unique(data["arclength"], return_index=True)
@@ -276,7 +276,7 @@ def _crossings(data, kappa_n):
 
 
 def folds(graph, low: float, high: float, law: str | None = None, nu: float | None = None) -> list[dict]:
-    """The folds with low <= kappa_n <= high, in order of kappa_n."""
+    """Return the folds with low <= kappa_n <= high, in order of kappa_n."""
     nodes = [dict(data) for _, data in graph.nodes(data=True) if data["kind"] == "fold" and low <= data["kappa_n"] <= high]
     nodes = [data for data in nodes if law in (None, data["law"]) and nu in (None, data["nu"])]
     return sorted(nodes, key=lambda data: data["kappa_n"])
@@ -286,21 +286,21 @@ def folds(graph, low: float, high: float, law: str | None = None, nu: float | No
 
 
 def describe(graph, m: int, n: int, law: str, nu: float) -> str:
-    """Where one branch goes, in a line."""
+    """Return the special points of one branch in one line."""
     return " -> ".join(map(describe_node, course(graph, m, n, law, nu)[0]["nodes"]))
 
 
 def describe_secondary(branch: dict) -> str:
-    """Where a secondary branch, as of `secondaries`, goes, in a line."""
+    """Return the special points of a secondary branch (see `secondaries`) in one line."""
     return f"{branch['mode']}, {branch['domain']}: " + " -> ".join(map(describe_node, branch["nodes"]))
 
 
 def describe_node(node) -> str:
-    """A special point in words."""
+    """Return a special point in words."""
     if node["kind"] == "circle":
         return f"circle {node['covering']} at {node['kappa_n']:.6f}"
     if node["kind"] == "leaves":
-        return f"leaves at {node['kappa_n']:.10g}, a limit of the scene"
+        return f"stops at {node['kappa_n']:.10g}, the scene's own limit"
     return f"{node['kind']} at {node['kappa_n']:.6f}"
 
 
@@ -325,7 +325,7 @@ def save(graph, folder: Path) -> tuple[Path, Path]:
 
 
 def read(folder: str | Path):
-    """The diagram in a folder, or in a ``diagram.json``.
+    """Return the diagram in a folder, or in a ``diagram.json``.
 
     Raises
     ------
@@ -346,11 +346,11 @@ def read(folder: str | Path):
     except OSError as error:
         raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, networkx.NetworkXException) as error:
-        raise StoreError(f"cannot read {str(path)!r}: it is no diagram written by this program") from error
+        raise StoreError(f"cannot read {str(path)!r}: it is not a diagram written by this program") from error
 
 
 def _check(graph) -> None:
-    """ValueError, KeyError or TypeError unless nodes and edges have what the questions ask for."""
+    """Raise ValueError, KeyError or TypeError unless nodes and edges have the data for the queries."""
     for _, data in graph.nodes(data=True):
         if not (isinstance(data["kind"], str) and isinstance(data["law"], str)):
             raise TypeError("kind and law are texts")

@@ -1,4 +1,4 @@
-"""The ends of a branch, as far as the law and the linear theory know more of them than the engine does."""
+"""Checks of the ends of a branch against the law and the linear theory, which the engine does not know."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ribbon_model.laws import LAWS
 from ribbon_model.linear import covering, thresholds
 from ribbon_model.solution import Solution
 
-#: An end on a circle misses its value in the linear theory by no more than ten times its error estimate, or by this, relative
-#: to 1 + its size: branches that end are known to 1e-11 and better, and other bifurcations of the circle are not as near.
+#: An end on a circle differs from the linear theory by at most ten times its error estimate, or by this, relative
+#: to 1 + its size: ends are known to 1e-11 and better, and other bifurcations of the circle are farther away.
 _ESTIMATES, _SAME = 10, 1e-7
-#: At this margin of convexity and below a law whose equations have no value a step further has come to its end: the response
-#: is found down to some 1e-2. At 0.5 another failure could be taken for the law's end.
+#: If the equations have no value a step further, a smaller margin of convexity means the end of the law: the response
+#: is found down to about 1e-2. With 0.5 another failure could be taken for the end of the law.
 _NEARLY_CONVEX = 0.1
 
 
 def checked(point: Point, run: Continuation, config: Config) -> Point:
-    """Return a point of a run, an end on a circle that the linear theory does not know named "possible".
+    """Return a point of a run; an end on a circle that is not in the linear theory is named "possible".
 
-    The run's stop then says so. It also gets the reason why the law ends, where that stopped the run.
+    The run's stop then says so. If the end of the law stopped the run, the stop gives that reason.
     """
     if point.label == "MX":
         run.stop = _explained(run, config)

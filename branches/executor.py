@@ -1,4 +1,4 @@
-"""Where independent jobs run: processes of this machine, or a Dask cluster. Nothing else in the project knows which."""
+"""Run independent jobs in processes of this machine or on a Dask cluster; the callers do not know which."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ Wait = Callable[[Iterable[futures.Future]], set[futures.Future]]
 def executor(
     scheduler: str | None = None, workers: int | None = None, time_limit: float | None = None
 ) -> Iterator[tuple[Submit, Wait, int]]:
-    """A function ``submit(function, job)`` that returns a future, one that waits for some, and how many run at a time.
+    """Yield ``submit(function, job)``, which returns a future, a function that waits for some, and the number of parallel jobs.
 
     Parameters
     ----------
     scheduler : str, optional
-        Address of a Dask scheduler, as in ``tcp://host:8786``; local processes without.
+        Address of a Dask scheduler, as in ``tcp://host:8786``; local processes if None.
     workers : int, optional
-        Local processes; `cores` by default.
+        Number of local processes; `cores` by default.
     time_limit : float, optional
-        Seconds after which a job in a local process is killed; its future then raises TimeoutError. A process that dies takes
-        its own job with it and no other.
+        Seconds after which a job in a local process is killed; its future then raises TimeoutError. If a process dies,
+        only its own job fails.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def first_done(running: Iterable[futures.Future]) -> set[futures.Future]:
 
 
 class _Worker:
-    """A process that does one job after the other, with a pipe of its own: what happens to it, happens to no other."""
+    """A process that does one job after the other, with its own pipe, so that its failure affects no other process."""
 
     def __init__(self, context):
         self.pipe, its_end = context.Pipe()
@@ -81,14 +81,14 @@ class _Worker:
         self.deadline = math.inf
 
     def begin(self, future: futures.Future, task: tuple, time_limit: float | None) -> None:
-        """Hand it a job."""
+        """Send it a job."""
         self.future = future
         self.deadline = time.monotonic() + time_limit if time_limit else math.inf
-        with contextlib.suppress(OSError):  # it died meanwhile; that will be seen when the answer is read
+        with contextlib.suppress(OSError):  # it died; `finish` reports that
             self.pipe.send(task)
 
     def finish(self) -> futures.Future:
-        """Read its answer, or find that it died; the job's future, settled."""
+        """Read its answer, or find that it died; return the finished future."""
         future, self.future, self.deadline = self.future, None, math.inf
         try:
             good, result = pickle.loads(self.pipe.recv_bytes())
@@ -113,7 +113,7 @@ class WorkerDied(Exception):
 
 
 class _Processes:
-    """Local processes, looked after by the thread that uses them: no lock is shared, so that none can be left behind locked."""
+    """Local processes, managed by the thread that uses them, without shared locks: a killed process leaves no lock behind."""
 
     def __init__(self, count: int, time_limit: float | None):
         self._context = multiprocessing.get_context(_start_method())
@@ -122,7 +122,7 @@ class _Processes:
         self._queue: collections.deque[tuple[futures.Future, tuple]] = collections.deque()
 
     def submit(self, function: Callable[[Any], Any], job: Any) -> futures.Future:
-        """Have ``function(job)`` done as soon as a process is free."""
+        """Queue ``function(job)`` for the next free process."""
         future: futures.Future = futures.Future()
         self._queue.append((future, (function, job)))
         self._dispatch()
@@ -166,7 +166,7 @@ class _Processes:
 
 
 def _work(pipe) -> None:
-    """What a worker process does."""
+    """Do jobs in a worker process until its end."""
     _begin_worker()
     while True:
         function, job = pipe.recv()
@@ -178,32 +178,32 @@ def _work(pipe) -> None:
 
 
 def _sendable(error: Exception) -> Exception:
-    """The error, or one that says the same where it does not survive being sent."""
+    """Return the error, or a RuntimeError with its message if it cannot be pickled."""
     try:
         pickle.loads(pickle.dumps(error))
-    except Exception:  # whatever its own methods do
+    except Exception:  # the methods of the error can raise anything
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error
 
 
-#: What the schedulers of clusters (Slurm, PBS, Grid Engine, LSF) call the cores that a job was given.
+#: Environment variables with the number of cores that a cluster's scheduler (Slurm, PBS, Grid Engine, LSF) grants.
 _GRANTED = ("SLURM_CPUS_PER_TASK", "PBS_NUM_PPN", "NSLOTS", "LSB_DJOB_NUMPROC")
 
 
 def cores() -> int:
-    """How many cores this process may use: those it is bound to, but no more than a cluster's scheduler granted."""
+    """Return the number of cores that this process may use: those it is bound to, at most as many as a scheduler grants."""
     bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     granted = [os.environ.get(name, "") for name in _GRANTED]
     return min([bound, *(int(text) for text in granted if text.isdecimal() and int(text) > 0)])
 
 
 def _start_method() -> str:
-    """A forked process has the compiled kernels already; elsewhere than on Linux forks are not safe or not there."""
+    """Return how processes start: forks have the compiled kernels; outside Linux they are not safe or not available."""
     return "fork" if sys.platform.startswith("linux") else "spawn"
 
 
 def _begin_worker():
-    """Leave Ctrl-C to the parent, and never outlive it, however it ended."""
+    """Leave Ctrl-C to the parent, and end when the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
@@ -215,7 +215,7 @@ def _begin_worker():
 
 
 def trouble(error: BaseException) -> str:
-    """Why a job gave no result, in words."""
+    """Return the reason why a job gave no result."""
     if isinstance(error, TimeoutError):
         return "not finished within the time limit"
     if isinstance(error, WorkerDied):
@@ -223,7 +223,7 @@ def trouble(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-#: What a source of jobs returns when the next one depends on jobs that are still running.
+#: A source of jobs returns this if its next job depends on running jobs.
 WAIT = object()
 
 
@@ -235,14 +235,14 @@ def run_jobs(
     Parameters
     ----------
     source : callable
-        ``source(running)``, given the list of jobs handed out, returns the next one; None at the end; or `WAIT`.
+        ``source(running)`` gets the list of running jobs; it returns the next job, `WAIT`, or None at the end.
     function : callable
-        At module level, so that it can be sent to another process.
+        A function at module level, so that it can be sent to another process.
     """
     running: dict[futures.Future, object] = {}
     exhausted = False
     while True:
-        while not exhausted and len(running) <= limit:  # one waits, so that no process does
+        while not exhausted and len(running) <= limit:  # one job more than processes, so that no process waits
             job = source(list(running.values()))
             if job is WAIT:
                 break

@@ -1,4 +1,4 @@
-"""``python -m branches.export FILE --point LABEL --out strip.stl``: a strip for other programs; a branch as a film."""
+"""``python -m branches.export FILE --point LABEL --out strip.stl``: write a strip for other programs, or a branch as a film."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from typing import TYPE_CHECKING
 
 from branches.display import Parser, complain, survive_any_encoding, write_output
 
-if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and mistakes in the command line answer at once
+if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid command lines are answered at once
     from numpy import ndarray
 
     from branches.read import StoredBranch
     from ribbon_model.shape import Shape
 
 EXIT_BAD_INPUT = 2
-#: Endings of what --out and --movie write.
+#: Allowed endings of --out and --movie.
 SURFACES, MOVIES = (".stl", ".obj", ".glb", ".gltf", ".vtk", ".vtu"), (".gif", ".mp4")
-#: Width where the result knows none and none is given, in units of L: that of the pictures, 0.3 L/2 pi.
+#: Default width, in units of L: that of the pictures, 0.3 L/2 pi.
 _WIDTH = 0.3 / (2 * math.pi)
-#: Part of the largest possible width that a width of our own choice stays below: where generators nearly cross, cells
+#: Largest default width, relative to the largest possible width: where generators nearly cross, cells
 #: degenerate. At .99 the narrowest cells of the branch (1, 2) are a hundredth of the others.
 _ROOM = 0.8
-#: Frames of a film: fewer than 2 show nothing move, and more than 2000 take minutes and hundreds of megabytes.
+#: Least and largest number of frames: fewer than 2 show no motion; more than 2000 take minutes and hundreds of megabytes.
 _FRAMES = (2, 2000)
 
 
 def arguments(argv=None):
-    """The command line, parsed."""
+    """Return the command line, parsed."""
     parser = Parser(
         prog="python -m branches.export",
         allow_abbrev=False,
@@ -46,20 +46,22 @@ def arguments(argv=None):
     parser.add_argument("--point", metavar="LABEL", help="number of a labelled point (its LAB), or its label, such as LP")
     parser.add_argument(
         "--out", metavar="NAME", action="append", default=[],
-        help=f"file to write, more than once if wanted; the ending says what: {', '.join((*SURFACES, '.csv'))}",
+        help=f"file to write; may be repeated; the ending chooses the format: {', '.join((*SURFACES, '.csv'))}",
     )  # fmt: skip
     parser.add_argument("--movie", metavar="NAME", help="film of the folding, .gif or (with ffmpeg) .mp4")
     parser.add_argument("--length", type=float, default=1.0, metavar="X", help="length of the strip in the files (default: 1)")
-    parser.add_argument("--width", type=float, metavar="X", help="width, in the same unit: of L, unless there is a --length")
-    parser.add_argument("--thickness", type=float, metavar="X", help="thickness, in the same unit; makes a closed solid")
-    parser.add_argument("--frames", type=int, default=60, metavar="N", help="frames of the film, at most (default: 60)")
+    parser.add_argument("--width", type=float, metavar="X", help="width, in the unit of --length (without it: relative to L)")
+    parser.add_argument("--thickness", type=float, metavar="X", help="thickness, in the unit of --length; makes a closed solid")
+    parser.add_argument(
+        "--frames", type=int, default=60, metavar="N", help="largest number of frames of the film (default: 60)"
+    )
     return parser.parse_args(argv)
 
 
 def main(argv=None) -> int:
-    """Run the command; the exit code."""
+    """Run the command; return the exit code."""
     survive_any_encoding()
-    with interrupt.unwinding():  # files that are begun are removed
+    with interrupt.unwinding():  # unfinished files are removed
         return _export(arguments(argv))
 
 
@@ -90,12 +92,12 @@ def _export(options) -> int:
 
 
 def check(options) -> None:
-    """Check what can be checked without the result.
+    """Check the options that can be checked without the result.
 
     Raises
     ------
     ConfigError
-        An option that cannot be used; the sentence names it, its value and what is allowed.
+        An invalid option; the message names it, its value and what is allowed.
     """
     from branches.config import ConfigError
 
@@ -129,12 +131,12 @@ def check(options) -> None:
 
 
 def labelled_point(branch: StoredBranch, text: str) -> int:
-    """The number, in the table of points, of a labelled point that is asked for by its LAB (from 1) or its label.
+    """Return the row of a labelled point in the table of points, from its LAB (from 1) or its label.
 
     Raises
     ------
     ConfigError
-        There is none, or there are several; the sentence lists what there is.
+        There is none, or there are several; the message lists the labelled points.
     """
     from branches.config import ConfigError
 
@@ -158,7 +160,7 @@ def labelled_point(branch: StoredBranch, text: str) -> int:
 
 
 def placed(branch: StoredBranch, point: int, length: float) -> tuple[Shape, ndarray]:
-    """The closed strip of a point, scaled and upright, and its strains (K, 3) in radians per unit of that length."""
+    """Return the closed strip of a point, scaled and upright, and its strains (K, 3) in radians per unit of that length."""
     from dataclasses import replace
 
     import numpy as np
@@ -173,7 +175,7 @@ def placed(branch: StoredBranch, point: int, length: float) -> tuple[Shape, ndar
 
 
 def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
-    """The content of all files of --out."""
+    """Return the content of all files of --out."""
     from branches.mesh_files import encode, library
 
     endings = {name: Path(name).suffix.lower() for name in options.out}
@@ -191,7 +193,7 @@ def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
 
 
 def _table(shape: Shape, strains) -> bytes:
-    """Arclength, centreline, directors and strains as comma-separated values with a line of names."""
+    """Return arclength, centreline, directors and strains as comma-separated values with a line of names."""
     import numpy as np
 
     names = ["s", "x", "y", "z", *(f"d{i}_{axis}" for i in (1, 2, 3) for axis in "xyz"), "omega_1", "omega_2", "omega_3"]
@@ -207,7 +209,7 @@ def _mesh(branch: StoredBranch, shape: Shape, options):
     width, most = _width(branch, options), solid.widest(shape)
     if width is None:
         width = min(_WIDTH * options.length, _ROOM * most)
-        write_output(f"width {width:.6g}: the result knows none; change it with --width\n")
+        write_output(f"width {width:.6g}: the default; change it with --width\n")
     if width >= most:
         raise ConfigError(f"--width {width:g}: must be below {most:.6g}, where generators of the surface begin to cross")
     if options.thickness is None:
@@ -221,7 +223,7 @@ def _mesh(branch: StoredBranch, shape: Shape, options):
 
 
 def _width(branch: StoredBranch, options) -> float | None:
-    """The width that is given, or that follows from the thickness and Gamma = w^2/(h L/2 pi) of the scene; None if neither."""
+    """Return the given width, or that from the thickness and Gamma = w^2/(h L/2 pi) of the scene, or None."""
     Gamma = branch.config["Gamma"]
     if options.width is not None or options.thickness is None or not Gamma:
         return options.width

@@ -1,4 +1,4 @@
-"""Files replaced whole: what is on disk is the old content or the new one, at any instant."""
+"""Write files as a whole: at any time the file on disk has its old content or its new one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from branches import interrupt
 from contin import temporary_name, write_whole
 
-#: Bytes that the smallest result takes, for a look at the disk before anything is computed.
+#: Bytes of the smallest result; as many are written to test the disk before a computation.
 _SMALLEST = 64 * 1024
 
 
@@ -25,7 +25,7 @@ class StoreError(Exception):
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Put a whole file in place of ``path`` (of what it links to), with its mode, or leave everything as it was.
+    """Replace the file ``path`` (or the file it links to) as a whole, with its mode, or leave it unchanged.
 
     Raises
     ------
@@ -42,17 +42,17 @@ def write_bytes(path: Path, data: bytes) -> None:
 #: Locks that this process holds, by the file locked.
 _held: dict[Path, FileLock] = {}
 
-#: Seconds until a run is refused. A run that is killed while it forks a worker keeps its lock for up to 11 ms (measured), and
-#: a run that ends may be removing its lock file. Ten times more: a refusal takes half a second.
+#: Seconds to wait for a lock. A run that is killed while it forks a worker keeps its lock for up to 11 ms (measured), and
+#: a run that ends may be removing its lock file. If it is ten times larger, a refusal takes half a second.
 _PATIENCE = 0.05
 
 
 @contextlib.contextmanager
 def only_run(path: Path) -> Iterator[None]:
-    """Be the only run that writes ``path``; another one, of this process or of any other that sees the folder, is refused.
+    """Lock ``path`` for this run; another run, of this process or of any other that uses the folder, is refused.
 
-    The lock is the operating system's, on a hidden file beside ``path``: it ends with the process, however that ends, and a
-    lock file left behind blocks nobody. Where there are no locks (a file system without them, say) nothing is locked.
+    The lock is the operating system's, on a hidden file beside ``path``. It ends with the process in all cases, and a
+    remaining lock file has no effect. On a file system without locks nothing is locked.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def _lock_file(path: Path) -> Path:
 
 
 def _lock(path: Path) -> bool:
-    """Take the lock; False if another run has it.
+    """Take the lock; return False if another run has it.
 
     Forked workers inherit the lock. Since version 3.30, filelock closes it in them, so that it ends with this process.
     """
@@ -93,14 +93,14 @@ def _lock(path: Path) -> bool:
 
 
 def _sign(descriptor: int) -> None:
-    """Write into the lock file who has the lock, behind its first byte: on Windows no other process can read that one."""
+    """Write the holder of the lock into the lock file, after its first byte, which Windows does not let others read."""
     with contextlib.suppress(OSError):  # a full disk
         os.ftruncate(descriptor, 0)
         os.write(descriptor, f"\nprocess {os.getpid()} on {platform.node()}".encode())
 
 
 def _holder(path: Path) -> str:
-    """Return who has the lock, as far as that is known."""
+    """Return the holder of the lock, or 'unknown'."""
     if path in _held:
         return "of this process"
     try:
@@ -122,13 +122,13 @@ def _unlock(path: Path) -> None:
 
 
 def unlock_all() -> None:
-    """Give up all locks, for a process that leaves without unwinding."""
+    """Release all locks, for a process that ends without unwinding."""
     for path in list(_held):
         _unlock(path)
 
 
 def prepare(path: Path) -> None:
-    """Make the folder of ``path``, see that a result can be written, and remove what killed runs left behind.
+    """Make the folder of ``path``, check that a result can be written, and remove files of killed runs.
 
     Raises
     ------
@@ -149,14 +149,14 @@ def prepare(path: Path) -> None:
             finally:
                 probe.unlink(missing_ok=True)
         for left in path.parent.glob(f".{glob.escape(path.name[:50])}.????????.part"):
-            if time.time() - left.stat().st_mtime > 60:  # not of a run that is writing right now
+            if time.time() - left.stat().st_mtime > 60:  # no run is writing it now
                 left.unlink()
     except OSError as error:
         raise StoreError(f"cannot write {str(path)!r}: {error.strerror}") from error
 
 
 def check_picture(path: Path) -> None:
-    """StoreError if ``path`` names no picture that can be written, before anything is drawn."""
+    """Raise StoreError if ``path`` is not a picture that can be written."""
     if path.suffix.lower() not in (".pdf", ".svg", ".png"):
         raise StoreError(f"--out {str(path)!r}: must end in .pdf, .svg or .png")
     if path.exists() and not path.is_file():
@@ -165,7 +165,7 @@ def check_picture(path: Path) -> None:
 
 
 def write_picture(figure, path: Path) -> None:
-    """Write a matplotlib figure; StoreError if it cannot be written."""
+    """Write a matplotlib figure; raise StoreError if it cannot be written."""
     picture = io.BytesIO()
     figure.savefig(picture, format=path.suffix[1:].lower(), dpi=160)
     write_bytes(path, picture.getvalue())

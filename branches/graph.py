@@ -1,4 +1,4 @@
-"""``python -m branches.graph DIR``: questions put to a bifurcation diagram (`branches.diagram_graph`)."""
+"""``python -m branches.graph DIR``: list branches, states and folds of a bifurcation diagram (`branches.diagram_graph`)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from contin import exact_text
 
 
 def read(path: str | Path):
-    """The diagram in a folder (or in a ``diagram.json``); of a scene, ``.yaml``, its instant preview (`branches.preview`).
+    """Return the diagram in a folder (or in a ``diagram.json``); for a scene, ``.yaml``, its preview (`branches.preview`).
 
     Raises
     ------
@@ -33,12 +33,18 @@ def read(path: str | Path):
 
 
 def main(argv=None) -> int:
-    """Answer questions; the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m branches.graph", description="Ask a bifurcation diagram.")
-    parser.add_argument("folder", help="folder of a diagram scene, or its diagram.json; or a scene (.yaml): exact preview")
-    parser.add_argument("--where", nargs=2, type=int, metavar=("M", "N"), help="where does the branch (M, N) go")
-    parser.add_argument("--at", type=float, metavar="KAPPA_N", help="which states exist at this natural curvature")
-    parser.add_argument("--folds", nargs=2, type=float, metavar=("LOW", "HIGH"), help="which folds lie in this window")
+    """Answer the queries; return the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m branches.graph", description="List branches, states and folds of a bifurcation diagram."
+    )
+    parser.add_argument(
+        "folder", help="folder of a diagram, or its diagram.json; or a scene (.yaml), for the exact solution without a run"
+    )
+    parser.add_argument("--where", nargs=2, type=int, metavar=("M", "N"), help="list the special points of the branch (M, N)")
+    parser.add_argument("--at", type=float, metavar="KAPPA_N", help="list the states at this natural curvature")
+    parser.add_argument(
+        "--folds", nargs=2, type=float, metavar=("LOW", "HIGH"), help="list the folds between these natural curvatures"
+    )
     options = parser.parse_args(argv)
     try:
         lines = list(_answers(read(options.folder), options))

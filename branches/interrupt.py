@@ -1,8 +1,8 @@
-"""Ctrl-C, answered in one way by all commands: one line that says what is kept, exit code 130, no half-written file.
+"""Handling of Ctrl-C by all commands: one line that says what is kept, exit code 130, no half-written file.
 
 A command calls `begin` before its heavy imports, so that Ctrl-C is answered from its first moments, and ends in
-``sys.exit(interrupt.run(main))``. While it computes, Ctrl-C ends the process at once: an exception amid a compilation or an
-import would end in noise. Two pieces of code need something else, `held` and `unwinding`.
+``sys.exit(interrupt.run(main))``. During the computation Ctrl-C ends the process at once: an exception inside a
+compilation or an import would print a traceback. `held` and `unwinding` change this for two kinds of code.
 """
 
 # Nothing heavy is imported here: this module is imported before all others.
@@ -23,9 +23,9 @@ NO_FILES = "this command writes no files"
 
 
 class _State:
-    """What Ctrl-C does now."""
+    """The current reaction to Ctrl-C."""
 
-    process = 0  # that called `begin`; a forked worker inherits the handler for its first moments
+    process = 0  # the one that called `begin`; a forked worker inherits the handler at its start
     line = "interrupted"
     held = 0
     unwinding = 0
@@ -33,7 +33,7 @@ class _State:
 
 
 def begin(kept: str = "") -> None:
-    """Answer Ctrl-C from now on; ``kept`` says what an interrupted command keeps. A shell's choice to ignore Ctrl-C stays."""
+    """Handle Ctrl-C from now on, unless the shell ignores it; ``kept`` says what an interrupted command keeps."""
     _State.process = os.getpid()
     change(kept)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -41,25 +41,25 @@ def begin(kept: str = "") -> None:
 
 
 def change(kept: str) -> None:
-    """Say something else from now on."""
+    """Change the line of an interrupted command."""
     _State.line = f"interrupted; {kept}" if kept else "interrupted"
 
 
 def run(main: Callable[[], int]) -> int:
-    """Call the ``main`` of a command; its exit code, or that of an interrupted command."""
+    """Call the ``main`` of a command; return its exit code, or that of an interrupted command."""
     try:
         return main()
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # no second line
         _say()
-        if os.getpid() == _State.process:  # where it passed through exec(), Python would end by the signal, not by the code
+        if os.getpid() == _State.process:  # after exec() Python would end by the signal, not with the code
             os._exit(EXIT_INTERRUPTED)
         return EXIT_INTERRUPTED
 
 
 @contextlib.contextmanager
 def held() -> Iterator[None]:
-    """Put Ctrl-C off until a file, or several that belong together, are whole."""
+    """Delay Ctrl-C until a file, or several that belong together, are complete."""
     _State.held += 1
     try:
         yield
@@ -72,7 +72,7 @@ def held() -> Iterator[None]:
 
 @contextlib.contextmanager
 def unwinding() -> Iterator[None]:
-    """Have Ctrl-C raise KeyboardInterrupt, for code that must end other programs; a second Ctrl-C is ignored."""
+    """Let Ctrl-C raise KeyboardInterrupt, for code that must end other programs; a second Ctrl-C is ignored."""
     _State.unwinding += 1
     try:
         yield
@@ -102,6 +102,6 @@ def _act() -> None:
 
 
 def _say() -> None:
-    moving = "\n" if sys.stderr is not None and sys.stderr.isatty() else ""  # a line of progress may be there
+    moving = "\n" if sys.stderr is not None and sys.stderr.isatty() else ""  # leave the line of progress
     with contextlib.suppress(OSError):  # a closed terminal
         os.write(2, f"{moving}{_State.line}\n".encode())

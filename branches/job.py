@@ -1,8 +1,9 @@
-"""One scene from config to file: the run between the command line and the engine."""
+"""Run one scene and write its result file."""
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import signal
 import time
 from pathlib import Path
@@ -12,11 +13,11 @@ from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
 from branches.start import UntilPrimary, seed, settings_of
 from branches.store import BranchWriter, open_branch, read_state
-from contin import Continuation, exact_text
+from contin import Continuation, Stop, exact_text
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 
-#: Fields that a resumed run may change: where to stop and what to label, nothing that alters the points.
+#: Fields that a resumed run may change: limits and labels, but no field that changes the points.
 _CHANGEABLE = ("title", "limits", "zeros", "stride", "steps.max_points")
 
 
@@ -31,27 +32,27 @@ def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=F
     Raises
     ------
     StoreError, ConfigError
-        A result file that cannot be written, that another run is writing, or that is not this scene's.
+        A result file that cannot be written, that another run is writing, or that belongs to another scene.
     """
     path = Path(path)
     if not path.exists():
         if resume:
             display.note(f"--resume: there is no file {str(path)!r}; the run starts from the beginning")
             resume = False
-        prepare(path)  # makes its folder, where the lock is to lie
+        prepare(path)  # makes its folder, which will contain the lock file
     with only_run(path):
         return _run_branch(config, path, display, resume, overwrite)
 
 
 def whole_branch(config: Config, path: Path, display) -> None:
-    """Follow the branch of ``config`` into the file ``path``, for a caller that has no use for a piece of it.
+    """Follow the branch of ``config`` into the file ``path``; an interrupted run raises KeyboardInterrupt.
 
     Raises
     ------
     KeyboardInterrupt
-        The run was asked to stop; the file holds what there is.
+        The run was interrupted; the file holds the points before.
     StoreError, ConfigError
-        As of `run_branch`.
+        See `run_branch`.
     """
     if run_branch(config, path, display, overwrite=True) == "interrupted":
         raise KeyboardInterrupt
@@ -69,14 +70,21 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
         display.begin(config, writer.count, len(writer.events()))
         outcome = _follow(config, run, writer, display, _Interruption())
         seconds = time.perf_counter() - began
-        display.summary(config, writer.events(), writer.count, seconds, path, outcome, run.stop)
+        display.summary(config, writer.events(), writer.count, seconds, path, outcome, _shown(run.stop))
     return outcome
 
 
-def compute_branch(config: Config, display) -> tuple[bytes, str]:
-    """The branch of ``config`` as the image of its file, and how it ended; nothing touches a disk here.
+def _shown(stop: Stop | None) -> Stop | None:
+    """Return why a run ended as people are told: a limit is one that the scene sets, not one of the strip."""
+    if stop is None or stop.reason != "limit":
+        return stop
+    return dataclasses.replace(stop, message=f"{stop.message}, the scene's own limit")
 
-    Ctrl-C does what it did before the call: a piece of a branch in memory is of no use.
+
+def compute_branch(config: Config, display) -> tuple[bytes, str]:
+    """Return the branch of ``config`` as the image of its file, and its outcome; no file is written.
+
+    Ctrl-C is not caught here: the points so far would be lost with the memory.
     """
     run, watch = begun(config)
     with contextlib.closing(_writer(None, config, run, watch)) as writer:
@@ -90,7 +98,7 @@ def _writer(path, config: Config, run: Continuation, watch, image=None) -> Branc
 
 
 def _watch(config: Config, system, x):
-    """What computes the index along the branch, where the scene asks for it."""
+    """Return the object that computes the index along the branch, or None without ``stability``."""
     if not config.stability:
         return None
     from branches.stability import Watch
@@ -99,24 +107,24 @@ def _watch(config: Config, system, x):
 
 
 def _kind(config: Config) -> type[Continuation]:
-    """What follows the branch."""
+    """Return the class of the run."""
     return Continuation if config.origin is None else UntilPrimary
 
 
-def _monitors(config: Config, watch) -> list:
-    """Events of the index, where it is watched, and the end of the law, where it has one."""
-    return [*(watch.monitors if watch else ()), *convexity.monitors(LAWS[config.law])]
+def _test_functions(config: Config, watch) -> list:
+    """Return the test functions of the index, if it is computed, and of the end of the law, if it has one."""
+    return [*(watch.monitors if watch else ()), *convexity.test_functions(LAWS[config.law])]
 
 
 def begun(config: Config):
-    """The run from the branch's first point, and its watch; its points are to pass `branches.ends.checked`."""
+    """Return the run from the branch's first point, and its watch; the caller passes its points to `branches.ends.checked`."""
     system, x, tangent = seed(config)
     watch = _watch(config, system, x)
-    return _kind(config)(system, x, settings_of(config, _monitors(config, watch)), tangent), watch
+    return _kind(config)(system, x, settings_of(config, _test_functions(config, watch)), tangent), watch
 
 
 def _resumed(config: Config, path: Path):
-    """The run that goes on where the file ends with its watch, and the image of the file."""
+    """Return the run that continues the file, with its watch, and the image of the file."""
     system, x, _ = seed(config)
     watch = _watch(config, system, x)
     state, start, last, image = read_state(path, system.problem, system.free)
@@ -125,22 +133,22 @@ def _resumed(config: Config, path: Path):
     for name, (low, high) in config.limits.items():
         if state.accepted and not low < last[name] < high:
             raise ConfigError(
-                f"limits: {name}: {exact_text(low)}, {exact_text(high)} must contain the place to go on from, "
+                f"limits: {name}: {exact_text(low)}, {exact_text(high)} must contain the last point of the file, "
                 f"{name} = {last[name]:.10g}"
             )
-    settings = settings_of(config, _monitors(config, watch))
+    settings = settings_of(config, _test_functions(config, watch))
     return (_kind(config)(state.system, state.x, settings, state=state, start=start), watch), image
 
 
 def _follow(config: Config, run: Continuation, writer: BranchWriter, display, interruption: _Interruption) -> str:
-    """Take all points of a run to the file; how it ended."""
+    """Write all points of a run to the file; return the outcome."""
     with interruption:
         for point in run:
             point, number = checked(point, run, config), writer.count
             writer.append(point)
             display.point(point, number, run.state.step)
             if point.label and point.name != "start":
-                continue  # inside a step: the run could not go on from here
+                continue  # inside a step: a run cannot be resumed from here
             writer.mark(run.state)
             if interruption.asked:
                 writer.checkpoint(run.start, "interrupted")
@@ -153,7 +161,7 @@ def _follow(config: Config, run: Continuation, writer: BranchWriter, display, in
 
 
 def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str | None:
-    """Whether what lies at ``path`` may be replaced or resumed; the stop of a run that needs no resuming."""
+    """Raise unless the file at ``path`` may be replaced or resumed; return its reason to stop if it is complete."""
     if not path.exists() or (overwrite and not resume):
         return None
     try:
@@ -163,21 +171,25 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
     except (StoreError, ConfigError) as error:
         if resume:
             raise
-        raise StoreError(f"{str(path)!r} exists and is no readable result of this program; --overwrite replaces it") from error
+        raise StoreError(
+            f"{str(path)!r} exists and is not a readable result of this program; --overwrite replaces it"
+        ) from error
     different = difference(stored, config, _CHANGEABLE if resume else ())
     if different:
         advice = "resume with the same config" if resume else "--overwrite replaces it, --out writes elsewhere"
         raise StoreError(f"{str(path)!r} holds another scene ({different}); {advice}")
     if not resume:
         if status in ("running", "interrupted"):
-            raise StoreError(f"{str(path)!r} holds an unfinished run of this scene; --resume goes on, --overwrite starts again")
+            raise StoreError(
+                f"{str(path)!r} holds an unfinished run of this scene; --resume continues it, --overwrite starts again"
+            )
         return None
     goes_on = reason in ("limit", "max points") and stored != config
     return stop if status == "complete" and not goes_on else None
 
 
 class _Interruption:
-    """Ctrl-C, SIGTERM or a closed terminal ask the run to stop after the current point; a second time, at once."""
+    """Stop the run after the current point on Ctrl-C, SIGTERM or a closed terminal; on the second signal, at once."""
 
     _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
@@ -187,11 +199,11 @@ class _Interruption:
 
     def __enter__(self):
         for number in self._signals:
-            if signal.getsignal(number) is signal.SIG_IGN:  # nohup, or a job in the background: to be left alone
+            if signal.getsignal(number) is signal.SIG_IGN:  # nohup, or a job in the background: it stays ignored
                 continue
             try:
                 self._before[number] = signal.signal(number, self._ask)
-            except ValueError:  # not in the main thread: nothing to catch there
+            except ValueError:  # signals reach the main thread only
                 break
         return self
 

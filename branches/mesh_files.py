@@ -1,4 +1,4 @@
-"""Meshes of a strip as the bytes of files that other programs open; the formats are those of trimesh and of meshio."""
+"""Write meshes of a strip as bytes of files for other programs, in the formats of trimesh and meshio."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from branches.solid import Mesh
 
 #: The library that writes each format, by the ending of the file's name.
 LIBRARIES = {".stl": "trimesh", ".obj": "trimesh", ".glb": "trimesh", ".gltf": "trimesh", ".vtk": "meshio", ".vtu": "meshio"}
-#: Colour of the strip where a format has one: the orange of the pictures (`branches.draw_branch.SHAPE`), from 0 to 255.
+#: Colour of the strip in formats with colours: the orange of the pictures (`branches.draw_branch.SHAPE`), from 0 to 255.
 _COLOUR = (232, 163, 61, 255)
 
 
 def library(ending: str):
-    """The library that writes files of this ending.
+    """Return the library that writes files with this ending.
 
     Raises
     ------
     StoreError
-        It is not installed; the sentence says what to install.
+        It is not installed; the message says what to install.
     """
     name = LIBRARIES[ending]
     try:
@@ -37,7 +37,7 @@ def library(ending: str):
 
 
 def encode(mesh: Mesh, ending: str, fields: Mapping[str, np.ndarray]) -> bytes:
-    """A mesh as the content of a file.
+    """Return a mesh as the content of a file.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def _by_trimesh(trimesh, mesh: Mesh, ending: str) -> bytes:
     from trimesh.visual.material import PBRMaterial
 
     vertices = mesh.vertices
-    if ending in (".glb", ".gltf"):  # there the second axis is up
+    if ending in (".glb", ".gltf"):  # in glTF the second axis is up
         vertices = vertices[:, [0, 2, 1]] * [1, 1, -1]
     result = trimesh.Trimesh(vertices, mesh.triangles, process=False)
     if ending in (".glb", ".gltf"):

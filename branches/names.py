@@ -1,24 +1,24 @@
-"""Names of result files. The one place."""
+"""Names of result files."""
 
 from __future__ import annotations
 
 from branches.config import Config
 from contin import exact_text
 
-#: A diagram in its folder, in two formats.
+#: The files of a diagram, in two formats.
 DIAGRAM, GRAPHML = "diagram.json", "diagram.graphml"
 
 
 def primary_file(config: Config) -> str:
-    """The file of a primary branch inside the folder of its diagram; different branches of a scene have different ones."""
+    """Return the file of a primary branch in the folder of its diagram; each branch of a scene has its own."""
     return f"{_stem(config)}.h5"
 
 
 def secondary_file(config: Config, taken: set[str]) -> str:
-    """The file of a secondary branch: that of its primary one, with the place and the domain.
+    """Return the file of a secondary branch: that of its primary branch, with the origin and the domain.
 
-    The place has six digits: it was computed, and the others may differ on another machine. It is told more exactly only where
-    another branch of the diagram has the name already.
+    kappa_n of the origin has six digits: it was computed, and further digits may differ on another machine. It has more if
+    another branch of the diagram already has this name.
     """
     kappa_n, kappa_star = exact_text(config.origin.kappa_n), exact_text(config.origin.kappa_star)
     places = (f"{config.origin.kappa_n:.6g}", kappa_n, f"{kappa_n}_{kappa_star}")

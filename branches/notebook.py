@@ -1,4 +1,4 @@
-"""What a notebook shows of a stored branch: its curve, and its labelled points."""
+"""The display of a stored branch in a notebook: its curve and its labelled points."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _COLUMNS = ("point", "label", "name", "kappa_n", "kappa_star", "energy")
 
 
 def to_html(branch) -> str:
-    """A `branches.read.StoredBranch` as a piece of HTML: what it is and why it ended, the picture, the labelled points."""
+    """Return a `branches.read.StoredBranch` as HTML: name, reason of its end, picture, labelled points."""
     config, picture = branch.config, io.StringIO()
     branch.plot(shapes=0).savefig(picture, format="svg")
     svg = picture.getvalue()[picture.getvalue().index("<svg") :]

@@ -1,6 +1,6 @@
-"""The instant preview: a diagram from the exact quadrature (`ribbon_model.exact`), nothing followed by continuation.
+"""The preview of a diagram: from the exact quadrature (`ribbon_model.exact`), without continuation.
 
-It has the form of a computed diagram (`branches.diagram_graph`), says in ``graph.graph["source"]`` what it is, and is never
+It has the form of a computed diagram (`branches.diagram_graph`); ``graph.graph["source"]`` names its source. It is never
 mixed with computed branches.
 """
 
@@ -21,7 +21,7 @@ SOURCE = "preview: exact quadrature"
 
 
 def preview(config: Config | DiagramConfig, step: float = 0.2):
-    """The diagram of a scene.
+    """Return the diagram of a scene.
 
     Parameters
     ----------
@@ -32,15 +32,15 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
     Returns
     -------
     networkx.MultiGraph
-        As of `branches.diagram.run_diagram`. Its edges' arclength is that in the plane of the quadrature's unknowns; a
-        branch whose quadrature fails is named, with the reason, in ``graph.graph["failed"]``.
+        As from `branches.diagram.run_diagram`. The arclength of its edges is that in the plane of the quadrature's unknowns. A
+        branch whose quadrature fails is listed, with the reason, in ``graph.graph["failed"]``.
     """
     single = isinstance(config, Config)
     graph, failed = diagram.new_graph(config.title), {}
     for one in sorted([config] if single else config.branches, key=lambda one: one.n * one.m):
         family = {"law": one.material, "nu": one.nu, "m": one.m, "n": one.n}
         if diagram.holds_circle(graph, one.material, one.nu, one.m, one.n):
-            continue  # there already, from its other end
+            continue  # a duplicate, from its other end
         try:
             points = exact.curve(
                 one.m, one.n, one.nu, one.limits.get("kappa_n", (-100.0, 100.0)), step, one.law, Gamma=one.Gamma

@@ -1,4 +1,4 @@
-"""Reading a branch file back: tables, and the solution of a point as a shape."""
+"""Read a branch file: tables, and the solution of a point as a shape."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from ribbon_model.solution import Solution
 
 @dataclass(frozen=True)
 class StoredBranch:
-    """A branch file in memory: the scene, the tables of points and events (structured arrays), the kept solutions.
+    """A branch file in memory: the scene, the tables of points and of labelled points (structured arrays), the kept solutions.
 
-    ``stop`` says in words why the run ended, ``reason`` in one or two ("trivial branch", "limit", ...).
+    ``stop`` is a sentence with the reason why the run ended, ``reason`` a key word ("trivial branch", "limit", ...).
     """
 
     config: dict
@@ -34,11 +34,11 @@ class StoredBranch:
     states: np.ndarray
 
     def kept(self) -> np.ndarray:
-        """Numbers of the points whose full solution is kept."""
+        """Return the numbers of the points whose full solution is kept."""
         return self.index["point"]
 
     def solution(self, point: int) -> Solution:
-        """The solution of a kept point.
+        """Return the solution of a kept point.
 
         Raises
         ------
@@ -56,7 +56,7 @@ class StoredBranch:
         return Solution(law, domain, self.t[here], self.states[here], int(row["degree"]), parameters)
 
     def shape(self, point: int) -> Shape:
-        """The closed strip at a kept point; see `solution`."""
+        """Return the closed strip at a kept point; see `solution`."""
         return self.solution(point).shape()
 
     def to_pandas(self):
@@ -68,7 +68,7 @@ class StoredBranch:
         return pandas.DataFrame(self.points).assign(label=[label.decode() for label in self.points["label"]])
 
     def to_xarray(self):
-        """Return the table of points as an ``xarray.Dataset`` along ``point``, with what each column means.
+        """Return the table of points as an ``xarray.Dataset`` along ``point``, with the meaning of each column.
 
         Each variable has its meaning as ``long_name``; the attributes of the dataset are the scene as YAML, ``status`` and
         ``stop``. ImportError says what to install if xarray is missing.
@@ -84,7 +84,7 @@ class StoredBranch:
         return xarray.Dataset(variables, {"point": self.points["point"]}, about)
 
     def plot(self, shapes: int = 6, width: float = 0.3):
-        """The branch as a matplotlib figure; see `branches.draw_branch.figure`."""
+        """Return the branch as a matplotlib figure; see `branches.draw_branch.figure`."""
         from branches.draw_branch import figure
 
         return figure(self, shapes, width)
@@ -96,12 +96,12 @@ class StoredBranch:
 
 
 def read_branch(path: str | Path) -> StoredBranch:
-    """The branch in a file.
+    """Return the branch in a file.
 
     Raises
     ------
     StoreError
-        See `branches.store.open_branch`; or its scene is none that this version knows.
+        See `branches.store.open_branch`; or this version does not know its scene.
     """
     with open_branch(Path(path)) as file:
         solutions, attributes = file["solutions"], file.attrs
@@ -116,7 +116,7 @@ def read_branch(path: str | Path) -> StoredBranch:
 
 
 def complete_run(path: Path, config: Config) -> StoredBranch | None:
-    """The branch of a scene in a file, if it is there and complete."""
+    """Return the branch of a scene in a file if it exists and is complete, otherwise None."""
     try:
         branch = read_branch(path)
     except StoreError:

@@ -1,4 +1,4 @@
-"""``python -m branches.run CONFIG``: follow a branch to its end, show it being computed, keep it in an HDF5 file."""
+"""``python -m branches.run CONFIG``: follow a branch to its end, show its points, and write it to an HDF5 file."""
 
 from __future__ import annotations
 
@@ -7,41 +7,49 @@ import sys
 
 from branches import interrupt
 
-# Nothing heavy is imported here: `--help` and mistakes in the command line answer at once.
+# Nothing heavy is imported here: `--help` and invalid command lines are answered at once.
 
 EXIT_BAD_INPUT, EXIT_STOPPED_SHORT = 2, 1
 
 
 def arguments(argv=None):
-    """The command line, parsed."""
+    """Return the parsed command line."""
     import argparse
 
     parser = argparse.ArgumentParser(
         prog="python -m branches.run",
         allow_abbrev=False,
         description="Follow one branch of buckled equilibria of a closed elastic strip and write it to an HDF5 file.",
-        epilog="Exit code: 0 done, 1 the branch was lost on the way (the file holds what there is), 2 bad input, "
+        epilog="Exit code: 0 done, 1 the run failed on the way (the file holds the points before), 2 bad input, "
         "130 interrupted.",
     )
     parser.add_argument("config", metavar="CONFIG", help="the scene, a YAML file such as configs/m1_n2.yaml")
-    parser.add_argument("--out", metavar="PATH", help="result file or folder (default: the config's name with .h5, here)")
+    parser.add_argument(
+        "--out", metavar="PATH", help="result file or folder (default: the name of the config with .h5, in this folder)"
+    )
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field, as in --set nu=0.2 --set mesh.degree=5"
     )
-    parser.add_argument("--workers", type=int, metavar="N", help="processes for a scene of many branches (default: one a core)")
     parser.add_argument(
-        "--time-limit", type=float, default=3600.0, metavar="S", help="seconds that one of many branches may take"
+        "--workers", type=int, metavar="N", help="number of processes for a scene of many branches (default: number of cores)"
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=3600.0,
+        metavar="S",
+        help="largest time in seconds for each branch of a scene of many branches",
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run a scene of many branches on a Dask cluster instead")
     parser.add_argument("--quiet", action="store_true", help="print the summary only")
     existing = parser.add_mutually_exclusive_group()
-    existing.add_argument("--resume", action="store_true", help="go on with an unfinished result file; without one, start")
+    existing.add_argument("--resume", action="store_true", help="continue an unfinished result file; start if there is none")
     existing.add_argument("--overwrite", action="store_true", help="replace a result file of another scene")
     return parser.parse_args(argv)
 
 
 def main(argv=None) -> int:
-    """Run the command; the exit code."""
+    """Run the command; return the exit code."""
     from branches.display import survive_any_encoding, write_output
 
     survive_any_encoding()
@@ -61,12 +69,13 @@ def _run(options) -> int:
         path = output_path(options)
     except ConfigError as error:
         return _refuse(error)
-    from branches.display import Display
+    from branches.progress import StartingDisplay
+
+    display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.files import StoreError
     from branches.job import run_branch
     from contin import ContinError
 
-    display = Display(quiet=options.quiet)
     try:
         outcome = run_branch(config, path, display, resume=options.resume, overwrite=options.overwrite)
     except (ConfigError, StoreError, ContinError) as error:
@@ -76,19 +85,16 @@ def _run(options) -> int:
 
 
 def _run_diagram(config, options) -> int:
-    """A scene of many branches, into a folder."""
+    """Run a scene of many branches; its folder gets one file per branch."""
     interrupt.change(interrupt.BRANCHES_KEPT)
     from pathlib import Path
 
     from branches.config import ConfigError
-    from branches.diagram import run_diagram
-    from branches.display import Display
-    from branches.executor import ExecutorError
-    from branches.files import StoreError
-    from contin import ContinError
 
     if options.resume:
-        raise ConfigError("--resume: a scene of many branches needs none; run it again and it computes what is missing")
+        raise ConfigError(
+            "--resume: is not for scenes of many branches; run the scene again, it computes the branches that are missing"
+        )
     if options.workers is not None and options.workers < 1:
         raise ConfigError(f"--workers {options.workers}: must be at least 1")
     if not options.time_limit > 0:
@@ -96,7 +102,14 @@ def _run_diagram(config, options) -> int:
     folder = Path(options.out or Path(options.config).stem)
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
-    display = Display(quiet=options.quiet)
+    from branches.progress import StartingDisplay
+
+    display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
+    from branches.diagram import run_diagram
+    from branches.executor import ExecutorError
+    from branches.files import StoreError
+    from contin import ContinError
+
     try:
         outcome = run_diagram(
             config, folder, display, scheduler=options.scheduler, workers=options.workers, time_limit=options.time_limit,
@@ -116,12 +129,12 @@ def _refuse(error: Exception) -> int:
 
 
 def output_path(options):
-    """The result file that the command line asks for.
+    """Return the result file of the command line.
 
     Raises
     ------
     ConfigError
-        There is something in its place that no result can replace.
+        A file or folder in its place that no result may replace.
     """
     from pathlib import Path
 
@@ -141,7 +154,7 @@ def output_path(options):
         if path.exists() and path.samefile(options.config):
             raise ConfigError(f"--out {str(path)!r}: is the config itself; name another file")
     except OSError as error:
-        raise ConfigError(f"--out {str(path)!r}: cannot be looked at: {error.strerror}") from error
+        raise ConfigError(f"--out {str(path)!r}: cannot be accessed: {error.strerror}") from error
     return path
 
 

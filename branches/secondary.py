@@ -1,7 +1,7 @@
-"""``python -m branches.secondary RESULT``: follow what leaves the primary branches where their index changes.
+"""``python -m branches.secondary RESULT``: follow the branches that leave primary branches where the index changes.
 
-A secondary branch is a scene of its own, with an ``origin``: `branches.run` computes it like any other. This program makes
-those scenes from the labelled points SB of a result, runs them, and puts the branches into the diagram.
+A secondary branch has its own scene, with an ``origin``; `branches.run` computes it like any other. This command makes
+these scenes from the labelled points SB of a result, runs them, and adds the branches to the diagram.
 """
 
 from __future__ import annotations
@@ -14,25 +14,27 @@ if __name__ == "__main__":  # before the imports below, which take a second
 import argparse
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from branches import diagram_graph as diagram
 from branches.config import Config, ConfigError, dump, parse
-from branches.display import Display, complain, write_output
+from branches.display import complain, write_output
 from branches.files import StoreError, prepare, write_bytes
 from branches.job import compute_branch
 from branches.names import DIAGRAM, secondary_file
+from branches.progress import Progress
 from branches.read import StoredBranch, complete_run, read_branch
 from contin import ContinError
 from ribbon_model.domains import CELL, HALF_LOOPS
 from ribbon_model.modes import Mode
 
-# --- all that leave the branches of a result ------------------------------------------------------------------------
+# --- all secondary branches of a result -----------------------------------------------------------------------------
 
 
-def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[dict]:
+def follow_all(result: Path, folder: Path, settings: list[str], progress: Progress) -> list[dict]:
     """Follow every secondary branch of a result, in the same folder as a diagram with the primary ones.
 
     Parameters
@@ -40,11 +42,11 @@ def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[di
     result : Path
         A branch file, or the folder of a diagram.
     folder : Path
-        Where files and diagram go.
+        The folder for files and diagram.
     settings : list of str
-        ``key=value`` over the scenes of the secondary branches, which otherwise take those of the primary ones.
-    tell : callable
-        Gets a line of text for every attempt.
+        ``key=value`` changes of the scenes of the secondary branches; other fields are those of the primary ones.
+    progress : Progress
+        Shows how far the work is, and a line of text for every attempt.
 
     Returns
     -------
@@ -54,7 +56,7 @@ def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[di
     Raises
     ------
     StoreError, ConfigError
-        A result that cannot be used; a setting that cannot be.
+        A result or a setting that cannot be used.
     """
     primaries = _primaries(result)
     prepare(folder / DIAGRAM)
@@ -65,19 +67,20 @@ def follow_all(result: Path, folder: Path, settings: list[str], tell) -> list[di
         write_bytes(folder / name, (result if result.is_file() else result / name).read_bytes())
         if name not in there:
             diagram.add_branch(graph, branch, name)
-    switches = []
-    for name, branch in primaries.items():
-        for event in branch.events[branch.events["label"] == b"SB"]:
-            for switch in _attempts(graph, branch, name, event, folder, settings):
-                switches.append(switch)
-                tell(_line(switch))
+    switches, events = [], [(name, event) for name, one in primaries.items() for event in one.events if event["label"] == b"SB"]
+    progress.expect(len(events))
+    for name, event in events:
+        for switch in _attempts(graph, primaries[name], name, event, _Place(folder, settings, progress)):
+            switches.append(switch)
+            progress.tell(_line(switch) + "\n")
+        progress.part_done()
     graph.graph["switches"] = json.dumps(old + switches)
     diagram.save(graph, folder)
     return switches
 
 
 def _primaries(result: Path) -> dict[str, StoredBranch]:
-    """The primary branches of a result that have the index along them, by file name.
+    """Return the primary branches of a result that have an index, by file name.
 
     Raises
     ------
@@ -97,12 +100,12 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
 
 
 def _diagram_in(folder: Path):
-    """The diagram of a folder, or a new one."""
+    """Return the diagram of a folder, or a new one."""
     return diagram.read(folder) if (folder / DIAGRAM).exists() else diagram.new_graph()
 
 
 def _remove_secondaries(graph, primaries) -> list[dict]:
-    """Take what this program added earlier for these primary branches out of a diagram; the attempts for others."""
+    """Remove the secondary branches of these primary branches from a diagram; return the attempts for other branches."""
     switches = json.loads(graph.graph.get("switches", "[]"))
     files = {switch["file"] for switch in switches if switch["primary"] in primaries and "file" in switch}
     edges = graph.edges(keys=True, data=True)
@@ -111,8 +114,17 @@ def _remove_secondaries(graph, primaries) -> list[dict]:
     return [switch for switch in switches if switch["primary"] not in primaries]
 
 
-def _attempts(graph, branch: StoredBranch, name: str, event, folder: Path, settings):
-    """Leave one bifurcation by every kind of branch, one after the other: records of what came of it."""
+@dataclass(frozen=True)
+class _Place:
+    """The folder of secondary branches, the changes of their scenes, and the line of progress."""
+
+    folder: Path
+    settings: list[str]
+    progress: Progress
+
+
+def _attempts(graph, branch: StoredBranch, name: str, event, place: _Place):
+    """Follow every kind of branch that leaves one bifurcation; yield a record of each attempt."""
     config = branch.config
     where = {column: float(event[column]) for column in ("kappa_n", "kappa_star")}
     about = {key: config[key] for key in ("law", "Gamma", "nu", "m", "n")} | where | {"mode": event["name"].decode()}
@@ -127,18 +139,19 @@ def _attempts(graph, branch: StoredBranch, name: str, event, folder: Path, setti
         yield record | {"outcome": "failed", "reason": "its modes keep no mirror and no axis: they need the whole loop"}
     for reversal in how.keeps:
         this = record | {"keeps": how.kept(reversal), "breaks": how.broken(reversal), "domain": HALF_LOOPS[reversal].name}
-        yield this | _attempt(graph, branch, event, reversal, folder, settings)
+        place.progress.part(f"({this['m']}, {this['n']}) at {where['kappa_n']:.6f}, {this['mode']}, keeps {this['keeps']}")
+        yield this | _attempt(graph, branch, event, reversal, place)
 
 
-def _attempt(graph, branch: StoredBranch, event, reversal: str, folder: Path, settings) -> dict:
-    """Follow one branch, put it into the diagram: how it ended."""
-    config = _scene(branch.config, event, reversal, settings)
+def _attempt(graph, branch: StoredBranch, event, reversal: str, place: _Place) -> dict:
+    """Follow one branch and add it to the diagram; return the outcome."""
+    config = _scene(branch.config, event, reversal, place.settings)
     file = secondary_file(config, {data["file"] for _, _, data in graph.edges(data=True)})
     known = _arrived_before(graph, config)
     if known:
         return {"outcome": "known", "reason": f"the other end of {known}", "file": known}
     try:
-        stored = _computed(folder / file, config)
+        stored = _computed(place.folder / file, config, place.progress)
     except (ConfigError, ContinError) as error:
         return {"outcome": "failed", "reason": str(error)}
     diagram.add_branch(graph, stored, file)
@@ -152,7 +165,7 @@ def _attempt(graph, branch: StoredBranch, event, reversal: str, folder: Path, se
 
 
 def _scene(primary: dict, event, reversal: str, settings: list[str]) -> Config:
-    """The scene of a secondary branch: as that of the primary one, where that makes sense on another domain."""
+    """Return the scene of a secondary branch: the fields of the primary one that are valid on another domain."""
     kept = {name: primary[name] for name in ("law", "nu", "Gamma", "m", "n", "steps", "stability", "stride")}
     kept["mesh"] = primary["mesh"]
     kept["limits"] = {name: list(ends) for name, ends in primary["limits"].items() if name not in ("M1", "M2")}
@@ -162,7 +175,7 @@ def _scene(primary: dict, event, reversal: str, settings: list[str]) -> Config:
 
 
 def _arrived_before(graph, config: Config) -> str:
-    """The file of a branch on this domain that begins or ends at the origin, if the diagram has it."""
+    """Return the file of a branch on this domain that begins or ends at the origin, if the diagram has one."""
     origin = config.origin.model_dump(exclude={"mode"})
     for branch in diagram.secondaries(graph, config.material, config.nu):
         ends = branch["nodes"][0], branch["nodes"][-1]
@@ -171,32 +184,34 @@ def _arrived_before(graph, config: Config) -> str:
     return ""
 
 
-def _computed(path: Path, config: Config) -> StoredBranch:
-    """The branch of a scene: the one in the file if it is complete, or computed."""
+def _computed(path: Path, config: Config, progress: Progress) -> StoredBranch:
+    """Return the branch of a scene: from the file if it is complete, otherwise computed."""
     stored = complete_run(path, config)
     if stored is None:
-        image, _ = compute_branch(config, Display(silent=True))
+        image, _ = compute_branch(config, progress)
         write_bytes(path, image)
         stored = read_branch(path)
     return stored
 
 
 def _goes(graph, file: str) -> str:
-    """Where a branch of the diagram ends, in words."""
+    """Return the end of a branch of the diagram in words."""
     (branch,) = (branch for branch in diagram.secondaries(graph) if branch["file"] == file)
     end = branch["nodes"][-1]
     if end["kind"] == "secondary bifurcation":
         return f"the branch ({end['m']}, {end['n']}) at {end['kappa_n']:.8f}"
     if end["kind"] == "primary branch":
         return f"a primary branch that the diagram does not hold, at {end['kappa_n']:.8f}"
-    return f"the limit {end['what']}" if end["kind"] == "leaves" else f"its end, {end['what']}, at {end['kappa_n']:.6f}"
+    if end["kind"] == "leaves":
+        return f"the scene's own limit, {end['what']}"
+    return f"its end, {end['what']}, at {end['kappa_n']:.6f}"
 
 
 # --- command line ---------------------------------------------------------------------------------------------------
 
 
 def _line(switch: dict) -> str:
-    """An attempt in words."""
+    """Return an attempt in words."""
     start = f"({switch['m']}, {switch['n']}) at {switch['kappa_n']:.8f}, {switch['mode']}"
     if "keeps" not in switch:
         return f"{start}: {switch['outcome']}: {switch['reason']}"
@@ -209,26 +224,29 @@ def _line(switch: dict) -> str:
 
 
 def main(argv=None) -> int:
-    """Run the command; the exit code."""
+    """Run the command; return the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m branches.secondary", allow_abbrev=False,
-        description="Follow the branches that leave a primary branch at its secondary bifurcations, and put them in a diagram.",
+        description="Follow the branches that leave a primary branch at its secondary bifurcations, and add them to a diagram.",
         epilog="Exit code: 0 done, 1 some branch could not be followed to its end (the diagram says why), 2 bad input, "
         "130 interrupted.",
     )  # fmt: skip
     parser.add_argument("result", help="file of a primary branch with its index (stability: true), or a diagram's folder")
-    parser.add_argument("--out", metavar="DIR", help="folder (default: the diagram's own; NAME_secondary beside a file)")
+    parser.add_argument(
+        "--out", metavar="DIR", help="folder for the results (default: the folder of the diagram; for a file NAME_secondary)"
+    )
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="change a field of the scenes of secondary branches"
     )
-    parser.add_argument("--quiet", action="store_true", help="print where the result is only")
+    parser.add_argument("--quiet", action="store_true", help="print only the last line")
     options = parser.parse_args(argv)
     result = Path(options.result)
     folder = Path(options.out) if options.out else result if result.is_dir() else result.with_name(f"{result.stem}_secondary")
     try:
         if folder.exists() and not folder.is_dir():
             raise ConfigError(f"--out {str(folder)!r}: must be a folder")
-        switches = follow_all(result, folder, options.set, lambda text: options.quiet or write_output(text + "\n"))
+        with Progress("secondary bifurcations", quiet=options.quiet) as progress:
+            switches = follow_all(result, folder, options.set, progress)
     except (ConfigError, StoreError, ContinError) as error:
         complain(f"error: {error}")
         return 2

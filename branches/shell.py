@@ -1,6 +1,6 @@
-"""``python -m branches.shell --out FILE``: the unfolding strip as a solid, by CalculiX; what is there is not computed twice.
+"""``python -m branches.shell --out FILE``: compute the unfolding strip as a solid with CalculiX; finished cases are kept.
 
-A check of one-dimensional theory by finite elements: for each `Case` the first xi at which the planar strip has an unstable
+This checks the one-dimensional theory: for each `Case`, the first xi at which the planar strip has an unstable
 out-of-plane vibration. `branches.shell_deck` writes the decks and reads the answers.
 """
 
@@ -31,11 +31,12 @@ from pathlib import Path
 from branches.display import complain, survive_any_encoding, write_output
 from branches.executor import cores, run_jobs
 from branches.files import StoreError, only_run, prepare, write_bytes
+from branches.progress import Progress
 from contin import exact_text
 
 PROGRAM = "ccx"
 INSTALL = "CalculiX (the program ccx) is not installed; on Debian and Ubuntu: apt-get install calculix-ccx"
-#: Seconds for one run of CalculiX: one state, or all states of a path.
+#: Largest time in seconds of one run of CalculiX: one state, or all states of a path.
 TIME_LIMITS = {"thermal": 120.0, "direct": 600.0}
 #: Width in xi of the bracket in which a root is interpolated.
 BRACKET = 1e-3
@@ -51,7 +52,7 @@ class Unusable(Exception):
 
 @dataclass(frozen=True)
 class Case:
-    """A strip, the way it is computed (`branches.shell_deck`), and the xi between which its first instability is looked for."""
+    """A strip, its method (``way``, see `branches.shell_deck`), and the interval of xi that is searched."""
 
     way: str
     nu: float
@@ -70,7 +71,7 @@ class Case:
         if not (0 < self.first < self.last and self.step > 0):
             raise ValueError(f"{search}: must be positive, ascending")
         if self.way == "thermal" and self.last >= 1:
-            raise ValueError(f"last = {exact_text(self.last)}: the thermal way is for xi < 1")
+            raise ValueError(f"last = {exact_text(self.last)}: the thermal method is for xi < 1")
         _ = self.strip
 
     @property
@@ -92,17 +93,17 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out of a case.
+    """The result of a case.
 
     Attributes
     ----------
     root : float or None
-        The first xi with a marginal vibration, to about `BRACKET`; None if there is none, or where ``problem`` says
+        The first xi with a marginal vibration, to about `BRACKET`; None if there is none, or if ``problem`` says
         why it is not known.
     samples : tuple of (xi, omega**2)
         Ascending; omega**2 of the lowest out-of-plane vibration in units of D/(rho h R**4).
     problem : str
-        Why the search ended early, or ''.
+        The reason why the search ended early, or ''.
     version : str
         Of CalculiX.
     """
@@ -119,7 +120,7 @@ class Outcome:
 
 
 def version() -> str:
-    """Of CalculiX, as it says itself.
+    """Return the version of CalculiX.
 
     Raises
     ------
@@ -138,14 +139,14 @@ def version() -> str:
 
 
 def run_ccx(deck: str, time_limit: float, stopped: Callable[[], bool] = lambda: False) -> tuple[str, str]:
-    """Run CalculiX on a deck in a folder of its own, on one core.
+    """Run CalculiX on a deck in a temporary folder, on one core.
 
     Returns
     -------
     answer : str
-        The ``.dat`` file; as much of it as there is, if the run failed.
+        The ``.dat`` file; incomplete if the run failed.
     problem : str
-        What went wrong, or ''.
+        The reason of a failure, or ''.
     """
     with tempfile.TemporaryDirectory(prefix="ccx-") as name:
         folder = Path(name)
@@ -178,19 +179,19 @@ def run_ccx(deck: str, time_limit: float, stopped: Callable[[], bool] = lambda: 
 
 
 def _complaint(log: Path) -> str:
-    """The first error that CalculiX wrote into its log, in brackets."""
+    """Return the first error in the log of CalculiX, in brackets."""
     lines = (line.strip() for line in log.read_text(errors="replace").splitlines())
     return next((f" ({line.removeprefix('*ERROR').lstrip(': ')[:80]})" for line in lines if line.startswith("*ERROR")), "")
 
 
 class _States:
-    """omega**2 of a case at any xi, by runs of CalculiX; each once. All states of a path come from its first run."""
+    """omega**2 of a case at any xi, from runs of CalculiX; each state is computed once, all states of a path in one run."""
 
     def __init__(self, case: Case, stopped):
         self.case, self.stopped, self.known = case, stopped, {}
 
     def __call__(self, xi: float) -> float:
-        """Raises `Unusable`."""
+        """Return omega**2 at xi; raise `Unusable` if CalculiX gave no planar state."""
         if xi not in self.known:
             self._compute([xi])
         found = self.known[xi]
@@ -220,22 +221,22 @@ class _States:
 
 
 def grid(first: float, last: float, step: float) -> list[float]:
-    """From first to last by steps; the last one may be shorter."""
+    """Return the grid from first to last; its last step may be shorter."""
     count = math.ceil((last - first) / step - 1e-9)
     return [round(first + step * i, 9) for i in range(count)] + [last]
 
 
 def first_root(function: Callable[[float], float], first: float, last: float, step: float) -> float | None:
-    """The first zero of a function that begins positive and cannot be had everywhere: it may raise `Unusable`.
+    """Return the first zero of a function that is positive at ``first``; where it has no value, it raises `Unusable`.
 
-    Going up by steps until the sign changes, hardly farther than to where a straight line through the last two points vanishes:
-    beyond the zero CalculiX is slow or fails. Then false position or, where that is lopsided, halving, until the bracket is no
-    wider than `BRACKET`. Where the function cannot be had, points ever nearer to the last one where it could are tried.
+    Steps are taken until the sign changes, but hardly beyond the zero of the straight line through the last two points, because
+    CalculiX is slow or fails beyond the zero. Then false position, or halving where that is one-sided, until the bracket is not
+    wider than `BRACKET`. Where the function has no value, points nearer to the last value are tried.
 
     Raises
     ------
     Unusable
-        At the first point, which may also be negative, or where no zero was found before the function could not be had.
+        There is no positive value at the first point, or no zero before the function has no value any more.
     """
     low, at_low, falls_to_zero = first, function(first), math.inf
     if at_low <= 0:
@@ -268,7 +269,7 @@ def first_root(function: Callable[[float], float], first: float, last: float, st
 
 
 def solve(case: Case, stopped: Callable[[], bool] = lambda: False) -> Outcome:
-    """Find the first instability of a case. What CalculiX fails at is in the outcome, nothing is raised for it."""
+    """Find the first instability of a case. Failures of CalculiX are in the outcome and raise nothing."""
     began, states, root, problem = time.monotonic(), _States(case, stopped), None, ""
     try:
         root = first_root(states, case.first, case.last, case.step)
@@ -278,18 +279,21 @@ def solve(case: Case, stopped: Callable[[], bool] = lambda: False) -> Outcome:
     return Outcome(case, root, samples, problem, time.monotonic() - began, version())
 
 
-# --- many cases, kept -------------------------------------------------------------------------------------------------
+# --- many cases ------------------------------------------------------------------------------------------------------
 
 
-def compute(cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], None] = lambda outcome, left: None) -> None:
-    """Compute what the file at ``path`` does not hold yet, a case on each core, and keep each when it is done.
+def compute(
+    cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], None] = lambda outcome, left: None, quiet: bool = False
+) -> None:
+    """Compute the cases that the file at ``path`` does not hold yet, one on each core, and keep each when it is finished.
 
-    A case that failed before is tried again. ``report(outcome, left)`` is called after each.
+    A case that failed before is tried again. ``report(outcome, left)`` is called after each. Unless ``quiet``, a line of
+    progress is shown.
 
     Raises
     ------
     ShellError
-        CalculiX is missing, and something is to be computed.
+        CalculiX is not installed, and there are cases to compute.
     StoreError
         The file cannot be read or written.
     """
@@ -300,7 +304,12 @@ def compute(cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], 
     version()
     prepare(path)
     stop, waiting, count = threading.Event(), iter(missing), len(missing)
-    with interrupt.unwinding(), only_run(path), ThreadPoolExecutor(cores()) as pool:
+    with (
+        interrupt.unwinding(),
+        only_run(path),
+        Progress("cases", count, quiet) as progress,
+        ThreadPoolExecutor(cores()) as pool,
+    ):
         try:
             jobs = run_jobs(lambda running: next(waiting, None), lambda case: solve(case, stop.is_set), pool.submit, cores())
             for number, (_, outcome) in enumerate(jobs, 1):
@@ -308,21 +317,23 @@ def compute(cases: Sequence[Case], path: Path, report: Callable[[Outcome, int], 
                     raise outcome
                 kept[outcome.case] = outcome
                 _write(path, kept.values())
+                progress.clear()
                 report(outcome, count - number)
+                progress.part_done()
         finally:
-            stop.set()  # an interrupt leaves no CalculiX behind
+            stop.set()  # after an interrupt no CalculiX keeps running
 
 
 _FIELDS = ("way", "nu", "slenderness", "thinness", "along", "across", "first", "last", "step")
 
 
 def read(path: Path) -> list[Outcome]:
-    """All outcomes that a file holds; none if there is no file.
+    """Return all outcomes of a file; none if there is no file.
 
     Raises
     ------
     StoreError
-        It is no file of this kind.
+        It is not a file of shell results.
     """
     if not path.exists():
         return []
@@ -366,19 +377,19 @@ def _write(path: Path, outcomes: Iterable[Outcome]) -> None:
 
 # --- the command ------------------------------------------------------------------------------------------------------
 
-#: The dimensions of section 5.4, directly: R = 100 mm, w = 5 mm.
+#: The dimensions of section 5.4 of the paper by the direct method: R = 100 mm, w = 5 mm.
 PAPER = tuple(Case("direct", nu, 20.0, thinness, 60, 4, 0.1, 0.95, 0.1) for nu in (0.1, 0.3) for thinness in (5.0, 20.0, 50.0))
 #: w**2/(R h) of the thin strips, by R/w, and the elements along them.
 WIDTHS = {4.0: (36.0, 50.0, 75.0, 100.0, 125.0, 150.0, 200.0, 250.0), 8.0: (75.0, 100.0, 125.0, 150.0)}
 ALONG = {4.0: 60, 8.0: 90}
-#: From rod to ribbon, the thermal way.
+#: From rod to ribbon, by the thermal method.
 WIDE = tuple(
     Case("thermal", 0.3, slenderness, slenderness * number, ALONG[slenderness])
     for slenderness, numbers in WIDTHS.items()
     for number in numbers
 )
 DEFAULT = PAPER + WIDE
-#: Besides: a finer mesh; strips at which CalculiX is slow, or gives up; another nu.
+#: Further cases: a finer mesh; strips for which CalculiX is slow or fails; another nu.
 FULLER = (
     Case("thermal", 0.3, 4.0, 300.0, 90, 10),
     Case("thermal", 0.3, 8.0, 600.0, 120, 10),
@@ -388,27 +399,28 @@ FULLER = (
 
 
 def describe(outcome: Outcome) -> str:
-    """One line."""
+    """Return an outcome as one line."""
     case = outcome.case
     root = f"first instability at xi = {outcome.root:.4f}" if outcome.root else f"none in {case.first:g} ... {case.last:g}"
     return f"{case}: {'FAILED: ' + outcome.problem if outcome.problem else root} ({outcome.seconds:.0f} s)"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Compute what is missing and list everything; the exit code: 0, 1 if a case failed, 2 for a request that cannot be met."""
+    """Compute the missing cases and list all; return the exit code: 0, 1 if a case failed, 2 for bad input."""
     parser = argparse.ArgumentParser(
         prog="python -m branches.shell",
         description="The unfolding semicircle by finite elements (CalculiX), for fig7 of branches.paper. What the file holds "
         "already is not computed again.",
     )
     parser.add_argument("--out", required=True, metavar="FILE", type=Path, help="HDF5 file; fig7 looks for DIR/shell.h5")
-    parser.add_argument("--full", action="store_true", help="the fuller set: finer meshes, other strips")
+    parser.add_argument("--full", action="store_true", help="compute further cases: finer meshes, other strips")
+    parser.add_argument("--quiet", action="store_true", help="show no line of progress")
     options = parser.parse_args(argv)
     survive_any_encoding()
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # unwinds, and so ends CalculiX too
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # unwinding also ends CalculiX
     cases = DEFAULT + FULLER if options.full else DEFAULT
     try:
-        compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"))
+        compute(cases, options.out, lambda outcome, left: write_output(f"{describe(outcome)}, {left} to go\n"), options.quiet)
         outcomes = read(options.out)
     except (ShellError, StoreError) as error:
         complain(f"error: {error}")

@@ -1,15 +1,15 @@
-"""The unfolding strip as a three-dimensional body: input decks for CalculiX, and what is read from its answers.
+"""The unfolding strip as a three-dimensional body: input decks for CalculiX, and the evaluation of its output.
 
 The strip is naturally an arc of radius R in the plane (x, y), wide along z; its ends are turned by pi xi / 2 each, its plane of
-symmetry is x = 0. Two ways to the same planar state:
+symmetry is x = 0. Two methods compute the same planar state:
 
 - 'direct', as in section 5.4 of Audoly & Seffen (2015): the stress-free arc is meshed, its rigid end faces are turned step by
   step, and may approach each other along x.
-- 'thermal', for thin strips, where the direct way is slow or fails: the arc of radius R/(1 - xi) is meshed, both end faces are
-  held, and expansion along the strip, linear through the thickness, gives it the natural curvature 1/R. Its ends cannot
-  approach each other, so in-plane vibrations would mean nothing; only the others are computed. It is for 0 < xi < 1.
+- 'thermal', for thin strips, for which the direct method is slow or fails: the arc of radius R/(1 - xi) is meshed, both
+  end faces are held, and expansion along the strip, linear through the thickness, gives it the natural curvature 1/R. The
+  ends cannot approach each other, so in-plane vibrations have no meaning; only the others are computed. It is for 0 < xi < 1.
 
-Each state is followed by the lowest vibrations about it. omega**2 comes with its sign: it is negative where the state is
+For each state the lowest vibrations about it are computed. omega**2 has its sign: it is negative if the state is
 unstable. Lengths in mm, steel; results do not depend on either.
 """
 
@@ -23,20 +23,20 @@ from dataclasses import dataclass
 import numpy as np
 
 RADIUS, YOUNG, DENSITY = 100.0, 210e3, 7.8e-9  # mm, MPa, t/mm^3
-#: Spacing of the states that the direct way passes through.
+#: Spacing of the states that the direct method passes through.
 STEP = 0.1
-#: Vibrations looked for at a state; directly so many that out-of-plane ones are among them where they are stiff.
+#: Number of vibrations computed for a state; for the direct method so many that stiff out-of-plane ones are among them.
 _MODES = {"thermal": 4, "direct": 12}
 #: Motion of the centre line in the plane over that of the edge, squared: near 1 for in-plane vibrations, 0 for the others.
-#: Where the two kinds have nearly the same frequency they may mix, directly, and then neither is taken.
+#: If the two kinds have nearly the same frequency, they may mix in the direct method; then neither is taken.
 _IN_PLANE = 0.02
-#: Beyond this part of the width the centre line of a state has left the plane.
+#: If the centre line of a state moves by more than this part of the width, the state is not planar.
 _OUT = 0.01
 #: Twenty-node bricks: corners, then the middles of these edges.
 _CORNERS = np.array([(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)])
 _EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
 _BRICK = np.vstack([_CORNERS, [(_CORNERS[a] + _CORNERS[b]) // 2 for a, b in _EDGES]])
-#: Newton's method on thin strips converges slowly and not steadily: patience, and a force residual of half a per cent.
+#: Newton's method on thin strips converges slowly: many iterations, and a force residual of half a per cent.
 _PATIENCE = "*CONTROLS,PARAMETERS=TIME INCREMENTATION\n40,60,9,200,10,4,,5\n*CONTROLS,PARAMETERS=FIELD\n5e-3"
 
 
@@ -52,7 +52,7 @@ class Strip:
     thinness : float
         w/h.
     along, across : int
-        Elements; one through the thickness. ``across`` is even: the centre of an end has a node then.
+        Numbers of elements; one through the thickness. ``across`` is even, so that the centre of an end is a node.
     """
 
     nu: float
@@ -79,7 +79,7 @@ class Strip:
 
     @property
     def number(self) -> float:
-        """w**2/(R h), the one number of the law 'finite width'."""
+        """w**2/(R h), the parameter of the law 'finite width'."""
         return self.thinness / self.slenderness
 
     @property
@@ -90,7 +90,7 @@ class Strip:
 
 @dataclass(frozen=True)
 class State:
-    """What CalculiX found at one xi: the lowest out-of-plane omega**2, in units of D/(rho h R**4); is the state planar?"""
+    """The result at one xi: the lowest out-of-plane omega**2, in units of D/(rho h R**4), and whether the state is planar."""
 
     omega_squared: float
     planar: bool
@@ -100,7 +100,7 @@ class State:
 
 
 class _Mesh:
-    """Nodes on a grid of half elements, i along (counterclockwise about z), j across, k through the thickness."""
+    """Return the nodes on a grid of half elements, i along (counterclockwise about z), j across, k through the thickness."""
 
     def __init__(self, strip: Strip, radius: float, angle: float):
         self.strip, self.nodes = strip, {}
@@ -116,7 +116,7 @@ class _Mesh:
         self.points = np.array(points)
 
     def text(self) -> Iterator[str]:
-        """Nodes, elements and the sets that results are wanted for."""
+        """Return nodes, elements and the sets for the results."""
         yield "*NODE,NSET=ALL"
         yield from (f"{number},{_real(x)},{_real(y)},{_real(z)}" for number, (x, y, z) in enumerate(self.points, 1))
         yield "*ELEMENT,TYPE=C3D20R,ELSET=STRIP"
@@ -131,12 +131,12 @@ class _Mesh:
         yield from _set("EDGE", [node for (i, j, k), node in self.nodes.items() if (j, k) == (last, 1)])
 
     def end(self, i: int, k: int | None = None) -> list[int]:
-        """Nodes of an end face, of one layer of it if k is given."""
+        """Return the nodes of an end face, or of its layer k."""
         return [node for (a, _, c), node in self.nodes.items() if a == i and k in (None, c)]
 
 
 def _real(value: float) -> str:
-    """CalculiX reads no more than 20 characters of a field."""
+    """Return a number as text; CalculiX reads at most 20 characters of a field."""
     return f"{value:.12e}"
 
 
@@ -165,13 +165,13 @@ def _vibrations(way: str, *conditions: str) -> list[str]:
 
 
 def thermal_deck(strip: Strip, xi: float) -> str:
-    """The deck of one state, 0 < xi < 1, the thermal way.
+    """Return the deck of one state, 0 < xi < 1, for the thermal method.
 
     By symmetry the centre line of the state does not move along z, and that of an out-of-plane vibration along z only. Both are
     prescribed: near the instability round-off would drive Newton's method out of the plane, and vibrations would mix.
     """
     if not 0 < xi < 1:
-        raise ValueError(f"xi = {xi:g}: the thermal way is for 0 < xi < 1")
+        raise ValueError(f"xi = {xi:g}: the thermal method is for 0 < xi < 1")
     mesh = _Mesh(strip, RADIUS / (1 - xi), math.pi * (1 - xi))
     lines = [*mesh.text(), *_set("ENDS", mesh.end(0) + mesh.end(2 * strip.along)), *_material(strip)]
     lines += ["*EXPANSION,TYPE=ORTHO\n0,1,0", "*ORIENTATION,NAME=O,SYSTEM=CYLINDRICAL\n0,0,0,0,0,1"]
@@ -184,7 +184,7 @@ def thermal_deck(strip: Strip, xi: float) -> str:
 
 
 def direct_deck(strip: Strip, xis: Sequence[float]) -> str:
-    """The deck of several states, xi ascending, the direct way; on the way there it passes through multiples of `STEP`."""
+    """Return the deck of several states, xi ascending, for the direct method, which also passes through multiples of `STEP`."""
     if not (xis and xis[0] > 0 and all(a < b for a, b in zip(xis, xis[1:]))):
         raise ValueError(f"xi = {', '.join(f'{xi:g}' for xi in xis)}: must be positive and ascending")
     mesh = _Mesh(strip, RADIUS, math.pi)
@@ -192,7 +192,7 @@ def direct_deck(strip: Strip, xis: Sequence[float]) -> str:
     inner, outer = (
         len(mesh.points) + 1,
         len(mesh.points) + 2,
-    )  # carry u_x of two layers of the end that moves, less that of its centre
+    )  # these carry u_x of two layers of the moving end, minus that of its centre
     lines.append(f"*NODE\n{inner},0,-10,0\n{outer},0,-20,0")
     right, left = 0, 2 * strip.along
     centre = mesh.nodes[right, strip.across, 1]
@@ -209,7 +209,7 @@ def direct_deck(strip: Strip, xis: Sequence[float]) -> str:
 
 
 def _turned(mesh: _Mesh, left: int, right: int, inner: int, outer: int, angle: float) -> Iterator[str]:
-    """Displacements of the two end faces, rigid, turned by ``angle`` each towards the flat strip."""
+    """Return the displacements of the two rigid end faces, each rotated by ``angle`` towards the flat strip."""
     fall, rise = math.cos(angle) - 1, math.sin(angle)
     for k in range(3):
         y = (k - 1) * mesh.strip.thickness / 2  # outwards, that is along -x on the left and along x on the right
@@ -221,7 +221,7 @@ def _turned(mesh: _Mesh, left: int, right: int, inner: int, outer: int, angle: f
     yield f"{inner},1,1,{_real(-half * fall)}\n{inner},2,3,0.\n{outer},1,1,{_real(half * fall)}\n{outer},2,3,0."
 
 
-# --- answers ----------------------------------------------------------------------------------------------------------
+# --- output -----------------------------------------------------------------------------------------------------------
 
 _NUMBER = r"\s+([-+]?\d\.\d+E[-+]\d+)"
 _DISPLACEMENT = re.compile(rf"\s*\d+{_NUMBER * 3}\s*$")
@@ -230,7 +230,7 @@ _TABLE, _BLOCK = "E I G E N V A L U E   O U T P U T", re.compile(r"\s*displaceme
 
 
 def states(text: str, strip: Strip) -> list[State]:
-    """The states of a ``.dat`` file, in the order of the deck; complete ones only, as a run that failed leaves them.
+    """Return the complete states of a ``.dat`` file, in the order of the deck; a failed run has fewer.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def states(text: str, strip: Strip) -> list[State]:
 
 
 def _tables(text: str) -> Iterator[tuple[str, np.ndarray]]:
-    """('eigenvalues', (modes,)) and ('CENTRE' or 'EDGE', (nodes, 3)), as they stand in the file."""
+    """Yield ('eigenvalues', (modes,)) and ('CENTRE' or 'EDGE', (nodes, 3)), in the order of the file."""
     kind, rows = "", []
     for line in text.splitlines():
         block = _BLOCK.match(line)
@@ -269,7 +269,7 @@ def _tables(text: str) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _state(shape, values, modes, strip: Strip) -> State:
-    """Out of the plane the centre line moves along z only, and the edge also where the strip merely twists."""
+    """Return the state. In out-of-plane vibrations the centre line moves along z only; in pure twist only the edge moves."""
     out = [
         value
         for value, edge, centre in zip(values, modes[::2], modes[1::2])

@@ -8,14 +8,14 @@ import numpy as np
 
 from ribbon_model.shape import Shape
 
-#: Cells across the width. The surface is ruled, so they add nothing to its accuracy; ten times more make files ten times
-#: larger, and one alone gives cells that are fifty times longer than wide, which viewers shade badly.
+#: Cells across the width. The surface is ruled, so more cells do not improve it; ten times more make files ten times
+#: larger. A single one gives cells that are fifty times longer than wide, which viewers shade badly.
 _ACROSS = 8
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """Quadrilaterals in space.
+    """A mesh of quadrilaterals in space.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Mesh:
     quads : ndarray of int, shape (Q, 4)
         Counterclockwise, seen from the side of d2 (surface) or from outside (solid).
     stations : ndarray of int, shape (V,)
-        The node of the centreline that each vertex belongs to.
+        The node of the centreline for each vertex.
     """
 
     vertices: np.ndarray
@@ -32,7 +32,7 @@ class Mesh:
 
     @property
     def triangles(self) -> np.ndarray:
-        """Each quadrilateral as two triangles, shape (2 Q, 3)."""
+        """Return the mesh as triangles, two for each quadrilateral, shape (2 Q, 3)."""
         return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
 
 
@@ -43,7 +43,7 @@ def widest(shape: Shape) -> float:
 
 
 def thickest(shape: Shape, width: float) -> float:
-    """Return the thickness at which the inner side of the most strongly bent place becomes a point.
+    """Return the thickness at which the inner side becomes a point where the surface is bent most strongly.
 
     It is 2 over the largest curvature of the surface. Across a generator that is omega_1 (1 + eta^2)/(1 + v eta') at a distance
     v along d1 from the centreline; between nodes, omega_1 is the angle between neighbouring d2.
@@ -57,7 +57,7 @@ def thickest(shape: Shape, width: float) -> float:
 
 
 def surface(shape: Shape, width: float) -> Mesh:
-    """The middle surface of a closed strip."""
+    """Return the middle surface of a closed strip."""
     points = shape.surface(width, _ACROSS + 1)[:-1]
     here, beyond = _rings(*points.shape[:2])
     quads = np.stack([here[:, :-1], beyond[:, :-1], beyond[:, 1:], here[:, 1:]], axis=-1)
@@ -65,7 +65,7 @@ def surface(shape: Shape, width: float) -> Mesh:
 
 
 def solid(shape: Shape, width: float, thickness: float) -> Mesh:
-    """A closed strip as a closed solid; its volume is length * width * thickness, except for the discretization.
+    """Return a closed strip as a closed solid; its volume is length * width * thickness, except for the discretization.
 
     d2 is the normal of the surface along a whole generator, so both faces are the middle surface moved along d2::
 
@@ -82,6 +82,6 @@ def solid(shape: Shape, width: float, thickness: float) -> Mesh:
 
 
 def _rings(count: int, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the vertices at each node, and at the next one; after the last comes the first. Shapes (count, size)."""
+    """Return the numbers of the vertices at each node and at the next one (cyclic). Shapes (count, size)."""
     here = np.arange(count * size).reshape(count, size)
     return here, np.roll(here, -1, axis=0)

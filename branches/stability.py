@@ -1,4 +1,4 @@
-"""The index along a branch: a column, and the events where it changes other than at a fold."""
+"""The index along a branch: a column, and test functions of secondary bifurcations."""
 
 from __future__ import annotations
 
@@ -15,47 +15,47 @@ from ribbon_model.secondary import force
 from ribbon_model.solution import Solution
 from ribbon_model.stability import Stability
 
-#: Label of a secondary bifurcation: one that breaks a symmetry of the domain, which its own equations cannot see.
+#: Label of a secondary bifurcation. It breaks a symmetry of the domain, so the equations of the domain do not detect it.
 LABEL = "SB"
-#: The column's value where the index could not be decided (on a bifurcation, an eigenvalue is zero).
+#: The value of an index that could not be decided (on a bifurcation, an eigenvalue is zero).
 UNDECIDED = -1
 _ON_CIRCLE = 1e-6
-#: Beside a primary branch, with less force than this, ...
+#: Near a primary branch, with less force than this, ...
 _LITTLE_FORCE = 0.5
-#: ... an eigenvalue below this may be one that vanishes there, and its sign says nothing.
+#: ... an eigenvalue below this may be one that vanishes there, and its sign has no meaning.
 _ZERO_BESIDE = 1e-8
-#: The class that keeps all symmetry: an eigenvalue of it passes zero at folds, which the engine finds by itself.
+#: The class that keeps all symmetry. One of its eigenvalues passes zero at a fold, which the engine detects.
 _FULL = (0, "even")
-#: A strain energy with a smaller margin of convexity is at its end: there is no index.
+#: With a smaller margin of convexity the law ends, and there is no index.
 _CONVEX = 1e-6
-#: Places inside a step where the sign is looked at: two secondary bifurcations in one step leave it as it was at the ends.
-#: Pairs closer than a quarter of a step pass unseen.
+#: Number of points inside a step where the sign is evaluated: two secondary bifurcations in one step leave it unchanged.
+#: Pairs closer than a quarter of a step are missed.
 _LOOKS = 3
-#: The known zero, of the shift of phase, comes out as the error of the eigenvalues. Where it is larger than this, the mesh of
-#: the state is too coarse for its index, and is halved so often at most. (It happens to strips of finite width that are nearly
-#: folded: the zero is 1e-2 there, and an eigenvalue of 1e-3 changed its sign twice.)
+#: The computed value of the known zero, that of the shift of phase, is the error of the eigenvalues. If it is larger, the mesh
+#: of the state is too coarse for its index, and is halved at most so often. (Strips of finite width that are nearly
+#: folded need this: the zero was 1e-2, and an eigenvalue of 1e-3 changed its sign twice.)
 _RESOLVED, _HALVINGS = 1e-6, 4
-#: A point with a larger residual is a guess beside the branch, whose known zero is none.
+#: A point with a larger residual is not on the branch, and the shift of phase is not a zero there.
 _ON_BRANCH = 1e-7
-#: Points whose stability is kept: the looks of all symmetry classes are at the same places of a step.
+#: Number of points whose stability is kept: all symmetry classes are evaluated at the same points of a step.
 _KEPT = 2 * _LOOKS + 4
-#: Distance along the branch at which the index beside a bifurcation is taken, relative to 1 + |x|.
+#: Distance from a bifurcation, along the branch, at which the index is computed, relative to 1 + |x|.
 _BESIDE = 1e-3
 
 
 @dataclass(frozen=True)
 class Change:
-    """How the index changes at a labelled point.
+    """The change of the index at a labelled point.
 
     Attributes
     ----------
     before, after : int
-        The index on either side, in the direction of travel; `UNDECIDED` elsewhere than at folds and secondary bifurcations.
+        The index before and after folds and secondary bifurcations, along the run; at other points `UNDECIDED`.
     kernel : int
         Number of modes that are neutral there.
     breaks : str
-        The symmetries of the branch that its neutral modes break, '' at a fold: what a branch that leaves there has lost. A
-        pair of modes may have two kinds of branches, 'or' between them.
+        The symmetries of the branch that its neutral modes break, '' at a fold. A branch that leaves there does not have them.
+        A pair of modes may have two kinds of branches, separated by 'or'.
     """
 
     before: int = UNDECIDED
@@ -65,15 +65,15 @@ class Change:
 
 
 class Watch:
-    """Evaluates the index of points of one branch, each once.
+    """Compute the index of points of one branch, each once.
 
     Parameters
     ----------
     law : Law
     system, x :
-        The first point: what symmetry the branch has.
+        The first point, which determines the symmetry of the branch.
     from_circle : bool
-        Whether the branch comes from a circle, and may end on one.
+        The branch begins on a circle, and may end on one.
     """
 
     def __init__(self, law: Law, system, x, from_circle: bool = True):
@@ -85,17 +85,17 @@ class Watch:
         self.monitors = [self._monitor(name) for name in names if name != _FULL]
 
     def at(self, system, x, point=None) -> Stability:
-        """The stability of a state; on the mesh that its index needs, if a ``point`` is given whose tangent is the branch's."""
+        """Return the stability of a state; for a ``point`` of the branch (with tangent) on the mesh that the index needs."""
         key = id(system), x.tobytes()
         if key not in self._known:
             result = self._resolved(system, x, point)
             while len(self._known) >= _KEPT:
                 self._known.pop(next(iter(self._known)))
-            self._known[key] = system, result  # the system, lest another one should get its id
+            self._known[key] = system, result  # keep the system, so that no other object gets its id
         return self._known[key][1]
 
     def _resolved(self, system, x, point) -> Stability:
-        """The stability on the system's mesh; on a finer one where a state of the branch has a known zero that is not small."""
+        """Return the stability on the system's mesh, or on a finer one if the known zero of a point is not small."""
         result = self._evaluated(system, x)
         if point is None or result.residual <= _RESOLVED or np.abs(system.residual(x)).max() > _ON_BRANCH:
             return result
@@ -114,28 +114,28 @@ class Watch:
         return result
 
     def _evaluated(self, system, x) -> Stability:
-        """The stability on the system's mesh."""
+        """Return the stability on the system's mesh."""
         with self._blas.limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
             return Solution.at(system, x).index()
 
     def _within_law(self, system, x, point) -> Stability | None:
-        """The stability of a state; None at the end of a law whose energy is convex no further, where there is no index."""
+        """Return the stability of a state; None where the energy is not convex and there is no index."""
         if self._margin is None:
             return self.at(system, x, point)
         if not self._margin(system, x) > _CONVEX:
             return None
         try:
             return self.at(system, x, point)
-        except ValueError:  # not convex somewhere between the places where the margin was looked at
+        except ValueError:  # not convex between the points where the margin was computed
             return None
 
     def index(self, point) -> int:
-        """The index of a point, or `UNDECIDED`."""
+        """Return the index of a point, or `UNDECIDED`."""
         result = self._within_law(point.system, point.x, point)
         return result.index if result is not None and result.decided else UNDECIDED
 
     def change(self, point) -> Change:
-        """The index on both sides of a fold or secondary bifurcation, from two points close by on the branch."""
+        """Return the index on both sides of a fold or secondary bifurcation, from two nearby points on the branch."""
         if point.label not in ("LP", LABEL):
             return Change()
         before, after = (self._beside(point, side) for side in (-1, 1))
@@ -144,32 +144,34 @@ class Watch:
         return Change(before, after, *_broken(point))
 
     def _beside(self, point, side: int) -> int:
-        """The index at a small distance along the branch."""
+        """Return the index at a small distance along the branch."""
         tangent = point.tangent / np.linalg.norm(point.tangent)
         distance = side * _BESIDE * (1 + np.linalg.norm(point.x))
         try:
             there = correct(point.system, point.x + distance * tangent, tangent, tangent @ point.x + distance)
-        except ConvergenceError:  # at a bifurcation that could not be located, say
+        except ConvergenceError:  # for example at a bifurcation that was not located
             return UNDECIDED
         result = self._within_law(point.system, there.x, point)
         return result.index if result is not None and result.decided else UNDECIDED
 
     def _monitor(self, name) -> TestFunction:
-        """The determinant of one symmetry class, whose zeros are bifurcations that break the symmetry."""
+        """Return the test function of one symmetry class: its determinant, which is zero where the symmetry is broken."""
 
         def determinant(trial):
             try:
                 result = self._within_law(trial.system, trial.x, trial)
-            except ValueError:  # a guess too far beside the branch: no closed loop, or no convex energy
+            except ValueError:  # too far from the branch: no closed loop, or no convex energy
                 return np.nan
             if result is None:
-                return np.nan  # no event: the run ends before
+                return np.nan  # no zero: the run ends before
             entry = result[name]
             values = entry.eigenvalues
             if not self._from_circle:
                 beside = force(trial) < _LITTLE_FORCE and abs(values[entry.nearest]) < _ZERO_BESIDE
                 return np.nan if beside else float(np.prod(values))
-            if name[0] == 0 and abs(trial["M2"]) < _ON_CIRCLE:  # of a circle, rotations that the branch's own phase replaces
+            if (
+                name[0] == 0 and abs(trial["M2"]) < _ON_CIRCLE
+            ):  # zeros of rotations of a circle, in place of the phase of the branch
                 values = values[np.abs(values) > _ON_CIRCLE]
             return float(np.prod(values))
 
@@ -178,9 +180,9 @@ class Watch:
 
 
 def _broken(point) -> tuple[int, str]:
-    """Dimension of the kernel of a secondary bifurcation, and the symmetries that it breaks."""
+    """Return the dimension of the kernel of a secondary bifurcation, and the symmetries that it breaks."""
     reversal, how = point.system.problem.on.reversal, point.details
-    if reversal:  # a half loop: its one reversal is all that there is
+    if reversal:  # a half loop has only one reversal
         return 1, REVERSALS[reversal]
     n = how.n
     if not how.keeps:

@@ -1,4 +1,4 @@
-"""Where the branch of a scene starts, and how the engine follows it."""
+"""The start of the branch of a scene, and the settings of its run."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from ribbon_model.solution import Solution
 
 #: The first points of primary branches, by domain.
 _SEEDS = {CELL.name: primary_branch, HALF_LOOP.name: half_loop_branch}
-#: A force below this is none: what branches from a primary one has |R| of order one.
+#: A smaller force counts as zero: on branches that leave a primary branch |R| is of order one.
 _NO_FORCE = 1e-7
-#: Closer than this to a primary branch, kappa_n turns because the bifurcation is a pitchfork.
+#: With less force than this, an extremum of kappa_n belongs to the pitchfork on the primary branch and is not a fold.
 _BESIDE = 1e-2
-#: Two values of kappa* closer than this, relative to 1 + their size, are the same place at the same kappa_n.
+#: Two points with the same kappa_n are equal if kappa* differs by less than this, relative to 1 + its size.
 _SAME_PLACE = 1e-6
 
 
-def settings_of(config: Config, monitors=()) -> Settings:
-    """The engine's settings for a scene, with further events."""
+def settings_of(config: Config, test_functions=()) -> Settings:
+    """Return the engine's settings for a scene, with further test functions."""
     mesh, steps = config.mesh, config.steps
-    # beside a bifurcation that the branch leaves slowly, round-off moves solutions by as much along its kernel
+    # near a bifurcation that the branch leaves slowly, round-off moves solutions by this much along the kernel
     newton = Newton(1e-8) if config.origin else Newton()
     return Settings(
         primary="kappa_n", step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
         max_points=steps.max_points, angle=steps.angle, limits=config.limits, zeros=config.zeros, errors=True,
-        trivial=None if config.origin else "M2", monitors=monitors, newton=newton,
+        trivial=None if config.origin else "M2", test_functions=test_functions, newton=newton,
         mesh=MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every),
     )  # fmt: skip
 
 
 def seed(config: Config):
-    """System, first point and tangent of a scene's branch.
+    """Return system, first point and tangent of a scene's branch.
 
     Raises
     ------
     ConfigError
-        The first mesh is too coarse to see the mode, or sees another one in its place; an origin that is none.
+        The first mesh is too coarse to resolve the mode, or resolves another one; or the origin is invalid.
     """
     if config.origin:
         return _leave_primary(config)
@@ -65,7 +65,7 @@ def seed(config: Config):
 
 
 class UntilPrimary(Continuation):
-    """A run along a secondary branch that ends where it comes to a primary one: at a branch point with R = 0.
+    """A run along a secondary branch that ends where it meets a primary branch: at a branch point with R = 0.
 
     Beyond it the branch would be its own image.
     """
@@ -75,7 +75,7 @@ class UntilPrimary(Continuation):
             if point.label == "LP" and force(point) < _BESIDE:
                 continue
             if point.name != "start" and isinstance(point.details, BranchPoint) and force(point) < _NO_FORCE:
-                self.stop = Stop("primary branch", "came to a primary branch, where R = 0")
+                self.stop = Stop("primary branch", "reached a primary branch, where R = 0")
                 point = dataclasses.replace(point, label="EP", name="primary branch")
             yield point
             if self.stop is not None:
@@ -83,12 +83,12 @@ class UntilPrimary(Continuation):
 
 
 def _leave_primary(config: Config):
-    """System, first point and tangent of the scene of a secondary branch; the primary one is followed to its origin.
+    """Return system, first point and tangent of a secondary branch; the primary branch is followed to the origin.
 
     Raises
     ------
     ConfigError
-        The primary branch does not pass there, or nothing leaves it there.
+        The primary branch does not pass through the origin, or no branch leaves it there.
     """
     solution = Solution.of(_at_origin(config))
     try:
@@ -98,7 +98,7 @@ def _leave_primary(config: Config):
 
 
 def _at_origin(config: Config):
-    """The point of the primary branch."""
+    """Return the point of the primary branch."""
     origin = config.origin
     primary = Config(law=config.law, nu=config.nu, Gamma=config.Gamma, m=config.m, n=config.n, mesh=config.mesh)
     reach = 10 * (1 + max(abs(origin.kappa_n), abs(primary.at_bifurcation()["kappa_n"])))
@@ -109,6 +109,6 @@ def _at_origin(config: Config):
         if point.label == "UZ" and same:
             return point
     raise ConfigError(
-        f"origin: kappa_n = {origin.kappa_n:.10g}, kappa_star = {origin.kappa_star:.10g} is no point of the branch "
+        f"origin: kappa_n = {origin.kappa_n:.10g}, kappa_star = {origin.kappa_star:.10g} is not on the branch "
         f"(m, n) = ({config.m}, {config.n})"
     )

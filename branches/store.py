@@ -1,7 +1,7 @@
-"""Branches in HDF5: rows appended as a run goes, the file on disk replaced whole so that it is valid at any instant.
+"""Branches in HDF5: a run appends rows; the file on disk is replaced as a whole, so that it is valid at any time.
 
 The layout is described in docs/file-format.md. The file grows in memory; a checkpoint writes its image beside the final name
-and renames it, so a killed run, a full disk or a power cut leave the last checkpoint, never half a file.
+and renames it. After a kill, a full disk or a power cut, the last checkpoint remains.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from branches.files import StoreError, write_bytes
 from branches.layout import FORMAT, FORMAT_VERSION, check, damage_told, vector
 from contin import Collocation, Point, State, Stop
 
-#: HDF5's format from its version 1.10 on: what is damaged in it is found by checksums.
+#: HDF5's format since version 1.10, which has checksums.
 _LIBRARY = "v110"
 
 #: Columns of /points and /events that are not parameters or functionals: name, type, meaning.
@@ -57,13 +57,13 @@ MEANINGS = {
 
 
 def meaning_of(column: str) -> str:
-    """Return what a column of the table of points is; its name where that is all that is known."""
+    """Return the meaning of a column of the table of points; its name if the meaning is not known."""
     told = {name: meaning for name, _, meaning in _BOOKKEEPING} | MEANINGS
     return told.get(column, column)
 
 
 def versions() -> dict[str, str]:
-    """Versions of everything a result depends on."""
+    """Return the versions of everything that a result depends on."""
     result = {"python": platform.python_version()}
     for package in ("ribbon-continuation", "numpy", "scipy", "numba", "llvmlite", "h5py"):
         with contextlib.suppress(PackageNotFoundError):
@@ -72,16 +72,16 @@ def versions() -> dict[str, str]:
 
 
 def _columns(problem, free, watched: bool) -> dict[str, tuple]:
-    """Name, type and meaning of the columns of both tables."""
+    """Return name, type and meaning of the columns of both tables."""
     watch = [("index", "i4", "number of negative directions of the energy; -1 where one is neutral (undecided)")] * watched
     values = [(name, "f8", MEANINGS.get(name, name)) for name in (*problem.parameters, *problem.functionals)]
     errors = [(f"error_{name}", "f8", f"estimated discretization error of {name}") for name in free]
-    named = [("name", "S64", "what the label refers to")]
+    named = [("name", "S64", "the subject of the label")]
     changes = [
-        ("index_before", "i4", "the index just before this point; -1 elsewhere than at LP and SB"),
+        ("index_before", "i4", "the index just before this point, at LP and SB; otherwise -1"),
         ("index_after", "i4", "the index just after it"),
         ("kernel", "i4", "number of neutral modes: 1 at LP, 1 or 2 at SB"),
-        ("breaks", "S128", "symmetries that the modes break, which a branch that leaves here has lost; empty at LP"),
+        ("breaks", "S128", "symmetries that the modes break, and that a branch which leaves here does not have; empty at LP"),
     ] * watched
     events = (*_BOOKKEEPING, *named, *values, *errors, *watch, *changes)
     return {"points": (*_BOOKKEEPING, *values, *watch), "events": events}
@@ -92,28 +92,28 @@ def _kind(columns) -> np.dtype:
 
 
 class BranchWriter:
-    """One branch on its way to disk.
+    """Write one branch to disk while it is computed.
 
     Parameters
     ----------
     path : Path or None
         The final name. It is replaced at every checkpoint. None keeps the file in memory, for `image`.
     config_text : str
-        The scene, as text; also of a run resumed, which may stop elsewhere.
+        The scene, as text. A resumed run may have other limits.
     problem : BoundaryValueProblem
-        Gives the names of columns.
+        The problem, for the names of columns.
     free : sequence of str
         Free parameters.
     stride : int
-        The full solution is kept of every stride-th point, and of labelled ones.
+        Full solutions are kept of every stride-th point and of labelled points.
     image : bytes, optional
-        An unfinished file to go on with.
+        An unfinished file to continue.
     watch : optional
-        ``watch.index(point)`` is the value of the column of that name, ``watch.change(point)`` what the events have besides
-        (`branches.stability.Watch`); no such columns without.
+        ``watch.index(point)`` is the value of the column of that name, ``watch.change(point)`` holds the further columns of
+        labelled points (`branches.stability.Watch`). Without it there are no such columns.
     """
 
-    #: Seconds between checkpoints while a run goes.
+    #: Seconds between checkpoints of a run. A kill loses the points of this time; ten times less would slow short steps.
     INTERVAL = 0.5
 
     def __init__(self, path: Path | None, config_text: str, problem, free, stride: int, image: bytes | None = None, watch=None):
@@ -124,7 +124,7 @@ class BranchWriter:
             self._file = h5py.File.in_memory(image, libver=_LIBRARY)
             self.count = self._create(problem) if image is None else self._rewind(problem)
         self._file.attrs["config"] = config_text
-        # asking HDF5 for the columns again for each row would take longer than computing the row
+        # reading the columns from HDF5 for each row would take longer than computing the row
         self._types = {table: self._file[table].dtype for table in ("points", "events")}
         self._saved = time.monotonic()
         self._spent = 0.0
@@ -152,37 +152,37 @@ class BranchWriter:
         states.attrs["columns"] = list(problem.states)
         return 0
 
-    # --- while the run goes --------------------------------------------------------------------------------------
+    # --- during the run ------------------------------------------------------------------------------------------
 
     def append(self, point: Point) -> None:
-        """Take one more point; it reaches the disk with the next checkpoint."""
+        """Append a point; it reaches the disk with the next checkpoint."""
         self._buffer.append((point, self.count))
         self.count += 1
 
     def mark(self, state: State) -> None:
-        """Say that the run can go on from ``state``, which follows the point appended last."""
+        """Record that the run can be resumed from ``state``, which follows the last point."""
         self._mark = (state, self.count)
 
     def due(self) -> bool:
-        """Whether a checkpoint is due: they take no more than a tenth of the run's time."""
+        """Return whether a checkpoint is due: checkpoints take at most a tenth of the run's time."""
         return time.monotonic() - self._saved > max(self.INTERVAL, 10 * self._spent)
 
     def checkpoint(self, start, status: str, stop: Stop | None = None) -> None:
-        """Write everything so far, and what a resumed run starts from.
+        """Write all points so far, and the state for a resumed run.
 
         Parameters
         ----------
         start : tuple (system, x, tangent)
-            Where the run began.
+            The first point of the run.
         status : str
             "running", "complete", "interrupted" or "lost".
         stop : Stop, optional
-            Why it ended.
+            The reason why it ended.
 
         Raises
         ------
         StoreError
-            The file cannot be written; the one on disk is as it was.
+            The file cannot be written; the file on disk is unchanged.
         """
         began = time.monotonic()
         self._flush()
@@ -198,11 +198,11 @@ class BranchWriter:
         self._spent = self._saved - began
 
     def image(self) -> bytes:
-        """The file as of the last checkpoint."""
+        """Return the content of the file at the last checkpoint."""
         return self._file.id.get_file_image()
 
     def events(self) -> np.ndarray:
-        """The rows of labelled points written so far."""
+        """Return the rows of labelled points written so far."""
         return self._file["events"][:]
 
     def _flush(self):
@@ -238,7 +238,7 @@ class BranchWriter:
                 values["breaks"] = change.breaks.encode()
         return tuple(values[name] for name in self._types[table].names)
 
-    # --- what a resumed run needs --------------------------------------------------------------------------------
+    # --- the state of a resumed run ------------------------------------------------------------------------------
 
     def _write_state(self, state: State, points: int, start):
         if "resume" in self._file:
@@ -253,13 +253,13 @@ class BranchWriter:
         _write_vectors(group.create_group("start"), start[0], x=start[1], tangent=start[2])
 
     def _rewind(self, problem) -> int:
-        """Cut the tables back to the points that the saved state follows; how many.
+        """Truncate the tables to the points before the saved state; return their number.
 
-        What came after them is computed again: a limit that ended the run, say, need not end the one resumed.
+        Later points are computed again: a limit that ended the run need not end the resumed run.
         """
         for table, columns in _columns(problem, self._free, self._watch is not None).items():
             if self._file[table].dtype != _kind(columns):
-                raise StoreError(f"cannot go on with {str(self.path)!r}: its columns are not those of this version")
+                raise StoreError(f"cannot resume {str(self.path)!r}: this version has other columns")
         points, solutions = int(self._file["resume"].attrs["points"]), self._file["solutions"]
         index = solutions["index"][:]
         index = index[index["point"] < points]
@@ -272,7 +272,7 @@ class BranchWriter:
         return points
 
     def close(self) -> None:
-        """Release the memory."""
+        """Close the file in memory."""
         self._file.close()
 
 
@@ -301,12 +301,12 @@ def _extend(dataset, rows):
 
 @contextlib.contextmanager
 def open_branch(path: Path):
-    """The open HDF5 file of a branch, for reading.
+    """Open the HDF5 file of a branch for reading.
 
     Raises
     ------
     StoreError
-        Not there, not HDF5, or not a branch that this version reads.
+        The file does not exist, is not HDF5, or is not a branch that this version reads.
     """
     try:
         file = h5py.File(path, "r")
@@ -319,12 +319,12 @@ def open_branch(path: Path):
 
 
 def read_state(path: Path, problem, free):
-    """The saved state of a run, its first point (system, x, tangent), the row before the state, and the file's image.
+    """Return the saved state of a run, its first point (system, x, tangent), the row before the state, and the file's image.
 
     Raises
     ------
     StoreError
-        The file holds no state to go on from.
+        The file holds no saved state.
     """
     with open_branch(path) as file:
         if "resume" not in file:
@@ -332,18 +332,18 @@ def read_state(path: Path, problem, free):
         try:
             return *_read_state(file, problem, free), Path(path).read_bytes()
         except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
-            raise StoreError(f"cannot go on with {str(path)!r}: the file is damaged") from error
+            raise StoreError(f"cannot resume {str(path)!r}: the file is damaged") from error
 
 
 def _read_state(file, problem, free):
-    """State, first point, last row."""
+    """Return state, first point and last row."""
     group = file["resume"]
     system, here = _read_vectors(group["here"], problem, free)
     first, start = _read_vectors(group["start"], problem, free)
     a, last = group.attrs, file["points"][int(group.attrs["points"]) - 1]
     numbers = {name: float(a[name]) for name in ("previous_step", "step", "arclength")}
     if not all(map(np.isfinite, numbers.values())) or not 0 <= int(a["accepted"]) < int(a["points"]) <= len(file["points"]):
-        raise ValueError("a state that no run was in")
+        raise ValueError("an impossible state of a run")
     state = State(
         system, here["x"], here["tangent"], here.get("previous"), numbers["previous_step"], numbers["step"], float(a["sign"]),
         numbers["arclength"], int(a["accepted"]), bool(a["singular"]),

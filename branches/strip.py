@@ -1,4 +1,4 @@
-"""``python -m branches.strip --width ...``: what a closed strip of given dimensions does, in millimetres and joules."""
+"""``python -m branches.strip --width ...``: the states of a closed strip of given dimensions, in SI units."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from branches.display import Parser, complain, survive_any_encoding, write_output
+from branches.progress import Progress
 from ribbon_model.strip import NAMES, Strip
 
-#: Covering indices looked at: odd ones, which a loop can be folded into; up to the second beyond the natural curvature.
+#: Covering indices considered: odd ones, as a loop can be folded into these; up to the second beyond the natural curvature.
 _COVERINGS, _MOST_COVERINGS = 7, 15
-#: How far from the natural curvature branches are followed, over 2 pi/L.
+#: Branches are followed to this distance from the natural curvature, over 2 pi/L.
 _REACH = 40.0
-#: Differences of thresholds up to which a limit law holds, and the parts of the assumptions that are called small.
+#: Largest difference of thresholds for which a limit law holds, and largest ratio that counts as small.
 _AGREES, _SMALL = 0.01, 0.1
-#: Energies and conjugate curvatures closer than this belong to one state.
+#: States whose energies and conjugate curvatures differ by less are the same.
 _SAME = 1e-8
 _UNITS = {"poisson_ratio": "", "youngs_modulus": "Pa"}
 
@@ -38,7 +39,7 @@ class State:
     m : int
         Covering index of a circle; 0 for a buckled state.
     index : int or float
-        Negative directions of the energy, 0 if stable; nan where undecided.
+        Number of negative directions of the energy, 0 if stable; nan if undecided.
     moment, energy, strain : float
         Magnitude of the internal moment in N m, energy above the natural state in J, largest strain at the surface.
     """
@@ -52,20 +53,20 @@ class State:
 
     @property
     def stable(self) -> bool:
-        """Is it a minimum of the energy?"""
+        """Return whether the state is a minimum of the energy."""
         return self.index == 0
 
 
-# --- what there is ----------------------------------------------------------------------------------------------------
+# --- the states ------------------------------------------------------------------------------------------------------
 
 
 def coverings(strip: Strip) -> range:
-    """The covering indices of the circles that are looked at."""
+    """Return the covering indices of the circles that are considered."""
     return range(1, max(_COVERINGS, min(_MOST_COVERINGS, 2 * int(strip.kappa_n / 2) + 5)) + 1, 2)
 
 
 def circles(strip: Strip) -> list[State]:
-    """The planar circles."""
+    """Return the planar circles."""
     from ribbon_model import linear
     from ribbon_model.laws import FINITE_WIDTH
 
@@ -80,27 +81,31 @@ def circles(strip: Strip) -> list[State]:
 
 
 def _energy(strip: Strip, values) -> float:
-    """Above the natural state; the energies of this package leave kappa_n**2/2 out."""
+    """Return the energy above the natural state; the other energies of this package leave kappa_n**2/2 out."""
     return (values["energy"] + strip.kappa_n**2 / 2) * strip.energy_unit
 
 
-def buckled(strip: Strip) -> tuple[list[State], list[tuple[str, float]]]:
-    """States on the primary branches at the strip's natural curvature; and the folds on the branch (1, 2), (name, kappa_n)."""
+def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[str, float]]]:
+    """Return the states on the primary branches at the strip's natural curvature, and the folds on the branch (1, 2).
+
+    A fold is a pair (name, kappa_n). Unless ``quiet``, a line of progress is shown.
+    """
     states, folds, seen = [], [], []
-    for m in coverings(strip):
-        for n in range(1, coverings(strip)[-1] + 2):
-            if n == m:
-                continue
+    modes = [(m, n) for m in coverings(strip) for n in range(1, coverings(strip)[-1] + 2) if n != m]
+    with Progress("branches", len(modes), quiet) as progress:
+        for m, n in modes:
+            progress.part(f"({m}, {n})")
             for point, equilibrium in _at_natural_curvature(strip, m, n, folds if (m, n) == (1, 2) else []):
                 place = point["energy"], point["kappa_star"]
                 if not any(n == other and np.allclose(place, there, rtol=_SAME, atol=_SAME) for other, there in seen):
                     seen.append((n, place))
                     states.append(_state(strip, f"buckled ({m}, {n})", point, equilibrium))
+            progress.part_done()
     return states, folds
 
 
 def _at_natural_curvature(strip: Strip, m: int, n: int, folds: list) -> Iterator[tuple]:
-    """Points of a branch at kappa_n, with their equilibria; kappa_n of its folds is added to ``folds``."""
+    """Yield the points of a branch at kappa_n, with their equilibria; kappa_n of its folds is added to ``folds``."""
     from contin import Settings, follow
     from ribbon_model import convexity
     from ribbon_model.laws import FINITE_WIDTH
@@ -115,8 +120,8 @@ def _at_natural_curvature(strip: Strip, m: int, n: int, folds: list) -> Iterator
         return  # no such bifurcation
     limits = {"kappa_n": (min(start, kappa_n) - _REACH, max(start, kappa_n) + _REACH)}
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 8, 7, Gamma=Gamma)
-    monitors = convexity.monitors(FINITE_WIDTH)
-    run = follow(system, x, Settings(trivial="M2", limits=limits, zeros={"kappa_n": [kappa_n]}, monitors=monitors), tangent)
+    ends = convexity.test_functions(FINITE_WIDTH)
+    run = follow(system, x, Settings(trivial="M2", limits=limits, zeros={"kappa_n": [kappa_n]}, test_functions=ends), tangent)
     for point in run:
         if point.label == "LP":
             folds.append((f"fold of ({m}, {n})", point["kappa_n"]))
@@ -136,11 +141,11 @@ def _state(strip: Strip, name: str, point, equilibrium) -> State:
     return State(name, 0, stability.index if stability.decided else math.nan, moment, _energy(strip, point), strain)
 
 
-# --- which law --------------------------------------------------------------------------------------------------------
+# --- the law ----------------------------------------------------------------------------------------------------------
 
 
 def deviations(strip: Strip) -> dict[str, float]:
-    """By how much the thresholds n = m +- 1 of the two limits differ from the strip's, at most, over |threshold| + m."""
+    """Return the largest difference between the thresholds n = m +- 1 of a limit law and the strip's, over |threshold| + m."""
     from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
     from ribbon_model.linear import thresholds
 
@@ -158,7 +163,7 @@ def deviations(strip: Strip) -> dict[str, float]:
 
 
 def _law(strip: Strip) -> str:
-    """Which law holds, in words."""
+    """Return the law that holds, in words."""
     off = deviations(strip)
     nearer = min(off, key=off.get)
     others = ", ".join(
@@ -171,10 +176,10 @@ def _law(strip: Strip) -> str:
 # --- the answer -------------------------------------------------------------------------------------------------------
 
 
-def answer(strip: Strip, yield_strain: float | None = None) -> str:
-    """One screen."""
+def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) -> str:
+    """Return what the command prints, one screen; unless ``quiet``, a line of progress is shown meanwhile."""
     rings = circles(strip)
-    others, folds = buckled(strip)
+    others, folds = buckled(strip, quiet)
     lines = [
         f"Gamma = w^2/(h L/2pi) = {strip.Gamma:.4g}, natural curvature kappa_n L/2pi = {strip.kappa_n:.4g}",
         f"law: {_law(strip)}",
@@ -194,7 +199,7 @@ def answer(strip: Strip, yield_strain: float | None = None) -> str:
 
 
 def assumptions(strip: Strip, rings: list[State], yield_strain: float | None = None) -> Iterator[str]:
-    """A caution for each assumption that fails, or whose error is not small, with its size."""
+    """Yield a caution for each assumption that fails, or whose error is not small, with its size."""
     if strip.torsion_excess > _SMALL / 2:
         ratio, excess = strip.thickness / strip.width, 100 * strip.torsion_excess
         yield f"caution: h/w = {ratio:.3g} is not thin: a plate's torsional stiffness is too large by about {excess:.0f} %"
@@ -214,7 +219,7 @@ def _circle_line(strip: Strip, ring: State, yield_strain) -> str:
 
 
 def _natural_radii(strip: Strip, m: int) -> str:
-    """The natural radii for which the m-fold circle is stable."""
+    """Return the natural radii for which the m-fold circle is stable."""
     from ribbon_model.laws import FINITE_WIDTH
     from ribbon_model.linear import energy_interval
 
@@ -243,7 +248,7 @@ def _buckled_lines(others: list[State], yield_strain) -> Iterator[str]:
 
 
 def _fate(rings: list[State], stable_others: list[State]) -> Iterator[str]:
-    """What the single loop can fold into: stable states of less energy."""
+    """Yield the states into which the single loop can fold: stable states of less energy."""
     single = rings[0]
     below = sorted(
         (state for state in (*rings[1:], *stable_others) if state.stable and state.energy < single.energy),
@@ -266,7 +271,7 @@ def _millimetres(metres: float) -> str:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print the answer; the exit code: 0, or 2 for a strip that cannot be."""
+    """Print the answer; return the exit code: 0, or 2 for an invalid strip."""
     parser = Parser(
         prog="python -m branches.strip",
         description="A strip whose ends are joined: which circles are stable, what else there is, moments, energies, strains. "
@@ -277,10 +282,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         more = ", inf for a straight strip" if name == "natural_radius" else ""
         help_text = f"{unit}{more}" if unit else "Poisson's ratio"
         parser.add_argument(f"--{name.replace('_', '-')}", type=float, required=True, metavar="X", help=help_text)
-    parser.add_argument("--yield-strain", type=float, metavar="X", help="states strained beyond it are marked")
+    parser.add_argument("--yield-strain", type=float, metavar="X", help="mark states with a larger strain")
+    parser.add_argument("--quiet", action="store_true", help="show no line of progress")
     options = vars(parser.parse_args(argv))
     survive_any_encoding()
-    yield_strain = options.pop("yield_strain")
+    yield_strain, quiet = options.pop("yield_strain"), options.pop("quiet")
     try:
         if yield_strain is not None and not 0 < yield_strain < math.inf:
             raise ValueError(f"yield_strain: {yield_strain:g} must be positive and finite")
@@ -291,7 +297,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, "blas"):  # the matrices are small
-        write_output(answer(strip, yield_strain))
+        write_output(answer(strip, yield_strain, quiet))
     return 0
 
 

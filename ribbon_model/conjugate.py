@@ -1,6 +1,6 @@
 """The index of an equilibrium by conjugate points: Jacobi fields integrated along the loop, no basis functions.
 
-Rigid motions do not matter, so E = (theta, w) may be fixed to zero at S = 0, and then also at S = L: what is left is the index
+Rigid motions have no effect, so E = (theta, w) may be fixed to zero at S = 0, and then also at S = L. This leaves the index
 of a problem with fixed ends, which is the number of conjugate points in (0, L) (Morse). With p the momentum of E, Jacobi fields
 obey the Hamiltonian system
 
@@ -32,12 +32,12 @@ class ConjugatePoints:
     ----------
     index : int
     distance : float
-        How far alpha_k(L) stays from a multiple of pi, the shift of phase left out: zero where a further mode is neutral.
+        Distance of alpha_k(L) from a multiple of pi, without the shift of phase: zero if a further mode is neutral.
     defect : float
         The largest of: distance of the count from a whole number, of the shift of phase from the plane of Jacobi fields, gaps
         of the frame between segments and of the centreline at the end.
     decided : bool
-        Whether ``distance`` exceeds a hundred times the defect.
+        True if ``distance`` exceeds a hundred times the defect.
     """
 
     index: int
@@ -47,10 +47,10 @@ class ConjugatePoints:
 
 
 def conjugate_index(equilibrium: Equilibrium, tolerance: float = 1e-10) -> ConjugatePoints:
-    """Number of negative directions of the energy of a closed equilibrium, by conjugate points.
+    """Return the number of negative directions of the energy of a closed equilibrium, by conjugate points.
 
-    The equilibrium is integrated along with the Jacobi fields, in segments that begin with its own frame, lest the instability
-    of the initial value problem should carry it away.
+    The equilibrium is integrated together with the Jacobi fields, in segments that begin with its own frame, because the
+    initial value problem is unstable.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class _Flow:
 
 
 def _count(plane, angle, shift, gap):
-    """The index from the plane at S = L and the sum of the angles alpha there."""
+    """Return the index from the plane at S = L and the sum of the angles alpha there."""
     E, p = plane[:6], plane[6:]
     unitary = np.linalg.solve((p - 1j * E).T, (p + 1j * E).T).T
     defect, size, known = gap, np.linalg.norm(shift), 0

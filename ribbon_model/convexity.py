@@ -1,6 +1,6 @@
-"""Where a law that is given by its strain energy ends: U must be convex at every strain along the strip.
+"""The end of a law that is given by its strain energy: U must be convex at every strain along the strip.
 
-Beyond, H = max(M.omega - U) has several values or none. A branch comes there either smoothly, with strains that grow like a
+Beyond that, H = max(M.omega - U) has several values or none. A branch reaches the end smoothly, with strains that grow like a
 square root, or through a jump: two neighbouring places of the strip take different minima of U - M.omega.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contin import Batch, Monitor
+from contin import Batch, TestFunction
 from ribbon_model.laws import Law
 from ribbon_model.shape import frames
 from ribbon_model.solution import Solution
@@ -21,8 +21,8 @@ NAME = "the end of the convex strain energy"
 def margin(law: Law) -> Callable | None:
     """``margin(system, x)``: the least det D2U / (U_11 U_33) along the strip, 1 on planar circles, -1 without a response.
 
-    It is looked at for the strains at the nodes and halfway between those of neighbours, which finds jumps. None for a law
-    whose H is a closed expression: its domain is known without.
+    It is computed for the strains at the nodes and halfway between neighbouring nodes, which detects jumps. None for a law
+    whose H is a closed expression, because its domain is known.
     """
     response, curvatures = law.response_at, law.curvatures_at
     if curvatures is None:
@@ -57,14 +57,14 @@ def _values(batch, u, p):
 
 
 def _moments(solution: Solution):
-    """Components of M on the directors at the nodes, shape (K, 3)."""
+    """Return the components of M on the directors at the nodes, shape (K, 3)."""
     states, moment = solution.states, solution.moment
     if states.shape[1] > 4:
         moment = moment - np.cross(states[:, 4:7], solution.force)
     return np.einsum("kij,kj->ki", frames(states), np.broadcast_to(moment, (len(states), 3)))
 
 
-def monitors(law: Law) -> list[Monitor]:
-    """The event that ends a run where the law ends; none for a law with a closed expression for H."""
+def test_functions(law: Law) -> list[TestFunction]:
+    """Return the test function that ends a run where the law ends; none for a law with a closed expression for H."""
     least = margin(law)
-    return [Monitor("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []
+    return [TestFunction("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []

@@ -1,15 +1,15 @@
-"""Down from an unstable state: a closed strip follows its energy downhill until it rests, and what it rests at is identified.
+"""Snapping: an unstable closed strip follows its energy downhill until it rests; the state at rest is identified.
 
 The strip is one of segments (`ribbon_model.segments`). A gradient flow in a metric G is G d(omega)/dt = -gradient, on closed
-strips; the implicit steps of `descend` follow it with the exact Hessian and end as Newton's method. Where it ends may depend
-on the metric, that is on how the strip is damped:
+strips; the implicit steps of `descend` follow it with the exact Hessian and end as Newton's method. The end may depend on
+the metric, that is on the damping of the strip:
 
 - ``strain``: G is the mean of the squared rate of the strains;
 - ``velocity``: G is the mean of the squared velocity of the material points, the rigid motion taken out (a drag), and of the
   spin times a radius of gyration `GYRATION`, without which a pure twist would meet no resistance.
 
-There is no inertia: a strip that overshoots may end elsewhere. It may pass through itself, as in all of this package. What no
-path of closed strips changes is the parity of the covering index: the frame's quaternion comes back to itself or to its
+There is no inertia: a strip that overshoots may reach another state. It may pass through itself, as in all of this package. No
+path of closed strips changes the parity of the covering index: over the loop the frame's quaternion returns to itself or to its
 negative (1, 3, 5 ... coverings are one class).
 """
 
@@ -40,7 +40,7 @@ _FASTEST = 1e8  # largest time step: Newton's method
 _ROUND_OFF = 1e-14  # of the energy
 _PLANAR = 1e-6  # difference of strains from those of a circle
 _SAME = 1e-6  # of energy and kappa*: the same equilibrium
-_COVERINGS = range(1, 10, 2)  # of the primary branches that an equilibrium is looked for on
+_COVERINGS = range(1, 10, 2)  # of the primary branches on which an equilibrium is searched
 
 
 # --- downhill -----------------------------------------------------------------------------------------------------------
@@ -74,7 +74,7 @@ class Descent:
 
     @property
     def energies(self) -> np.ndarray:
-        """Energy of each state; it falls at every step."""
+        """Energy of each state; it decreases at every step."""
         return np.array([strip.energy for strip in self.strips])
 
     @property
@@ -88,7 +88,7 @@ def _strain_metric(strip: Strip) -> np.ndarray:
 
 
 def _velocity_metric(strip: Strip) -> np.ndarray:
-    """Squares of velocity and spin at the ends of the segments, less those of the rigid motion nearest to it."""
+    """Return the squares of velocity and spin at the ends of the segments, less those of the rigid motion nearest to it."""
     count, x = len(strip.strains), strip.centreline[1:]
     turning = strip.turning[:, :, strip.free]
     shift = strip.own[:, :, strip.free] - np.cross(turning, x[:, :, None], axis=1)
@@ -105,7 +105,7 @@ def _velocity_metric(strip: Strip) -> np.ndarray:
     return rates.T @ rates - along.T @ along
 
 
-#: What resists the motion: function(strip) -> matrix (n, n), a multiple of the squared rate per segment.
+#: Metrics: function(strip) -> matrix (n, n), a multiple of the squared rate per segment.
 METRICS: dict[str, Callable[[Strip], np.ndarray]] = {"strain": _strain_metric, "velocity": _velocity_metric}
 
 
@@ -120,7 +120,7 @@ class _Tangent:
         self.size = float(np.linalg.norm(self.gradient) / math.sqrt(len(strip.strains)))
 
     def projected(self, matrix) -> np.ndarray:
-        """A form (n, n) on the closed strips; across them, its largest diagonal element."""
+        """Return a form (n, n) on the closed strips; across them, its largest diagonal element."""
         image = matrix @ self._across
         inner = self._across.T @ image + np.abs(np.diag(matrix)).max() * np.eye(6)
         half = (image - self._across @ (inner / 2)) @ self._across.T
@@ -128,11 +128,11 @@ class _Tangent:
 
 
 def descend(strip: Strip, metric: str = "strain", longest: float = 0.1, tolerance: float = 1e-9, steps: int = 500) -> Descent:
-    """Follow the gradient flow of the energy from a closed strip to where it rests.
+    """Follow the gradient flow of the energy from a closed strip to a state at rest.
 
     Linearly implicit steps, (G/dt + Hessian) change = -gradient. A step is shortened until G/(2 dt) + Hessian is positive, so
-    that no growth is passed over and none can be reversed, until the strains change by ``longest`` at most, and until the
-    energy falls, by what the quadratic model says within a factor of two.
+    that no unstable direction is missed or reversed, until the strains change by ``longest`` at most, and until the
+    energy decreases as the quadratic model predicts, within a factor of two.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def descend(strip: Strip, metric: str = "strain", longest: float = 0.1, toleranc
 
 
 def _step(strip: Strip, tangent: _Tangent, metric, dt: float, longest: float) -> tuple[Strip, float] | None:
-    """The next state and the time to it; None where no step lowers the energy."""
+    """Return the next state and the time to it; None where no step lowers the energy."""
     resistance, count = tangent.projected(metric), len(strip.strains)
     for _ in range(60):
         if not _positive(tangent.hessian + resistance / (2 * dt)):
@@ -201,7 +201,7 @@ def _positive(matrix) -> bool:
 
 
 def modes(strip: Strip, number: int = 8) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest eigenvalues of the Hessian of the energy on the closed strips, per unit of mean squared change of strain.
+    """Return the lowest eigenvalues of the Hessian of the energy on the closed strips, over the mean squared change of strain.
 
     A negative one is a direction in which an equilibrium is unstable; a shift of phase has one near zero.
 
@@ -216,8 +216,9 @@ def modes(strip: Strip, number: int = 8) -> tuple[np.ndarray, np.ndarray]:
 
 
 def perturbed(strip: Strip, amplitude: float) -> Strip:
-    """The strip kicked along its lowest mode, by the root mean square ``amplitude`` (of either sign) of the strains, and by a
-    tenth of it along a fixed mixture of waves that has no symmetry.
+    """Return the strip perturbed along its lowest mode, with root mean square ``amplitude`` (of either sign) of the strains.
+
+    A tenth of it is added along a fixed mixture of waves without symmetry.
     """
     phase = LENGTH * (np.arange(len(strip.strains)) + 0.5) / len(strip.strains)
     random, free = np.random.default_rng(0), len(strip.free)
@@ -227,7 +228,7 @@ def perturbed(strip: Strip, amplitude: float) -> Strip:
     return strip.moved(amplitude * modes(strip, 1)[1][:, 0] + mixture)
 
 
-# --- where it came to rest ------------------------------------------------------------------------------------------------
+# --- the state at rest ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -237,11 +238,11 @@ class Rest:
     Attributes
     ----------
     kind : str
-        'circle', 'primary branch', or 'unknown' (none that was looked for).
+        'circle', 'primary branch', or 'unknown' (none of these).
     m, n : int
         Covering index, negative if curled against the natural sense, and wavenumber (0 on a circle).
     energy, kappa_star : float
-        As everywhere: mean of U, and (28).
+        Mean of U, and (28).
     error : float
         Largest change of the two when the collocation's mesh was halved; 0 on a circle, which is known in closed form.
     difference : float
@@ -267,19 +268,19 @@ class Rest:
 
 
 def identify(strip: Strip) -> Rest:
-    """What a strip at rest is an approximation of; its index by the second variation of the continuous strip.
+    """Return the equilibrium that a strip at rest approximates, with its index by the second variation of the continuous strip.
 
     Raises
     ------
     ConvergenceError
         No equilibrium of the continuous strip close to it.
     ValueError
-        At that equilibrium the energy is not convex in the strains: it has no index.
+        The energy is not convex in the strains at that equilibrium, so there is no index.
     """
     law, nu, kappa_n, strains, Gamma = strip.law, strip.nu, strip.kappa_n, strip.strains, strip.Gamma
     if np.abs(strains - [strains[:, 0].mean(), 0, 0]).max() < _PLANAR:
         m = round(strains[:, 0].mean())
-        # one that is turned inside out is, seen from the other side, one with the opposite natural curvature
+        # a strip that is turned inside out is, seen from the other side, one with the opposite natural curvature
         sense = math.copysign(1, m)
         stability = index(second_variation.circle(law, nu, abs(m), sense * kappa_n, Gamma))
         values = law.circle(abs(m), sense * kappa_n, nu, Gamma)
@@ -298,7 +299,7 @@ def identify(strip: Strip) -> Rest:
 
 
 def polished(strip: Strip, intervals: int = 24, degree: int = 7):
-    """The equilibrium next to a strip at rest, by collocation on the whole loop (`domains.LOOP`) at the same kappa_n.
+    """Return the equilibrium next to a strip at rest, by collocation on the whole loop (`domains.LOOP`) at the same kappa_n.
 
     Returns
     -------
@@ -308,7 +309,7 @@ def polished(strip: Strip, intervals: int = 24, degree: int = 7):
     Raises
     ------
     ConvergenceError
-        There is none close by. (A circle cannot be polished: it has no phase to fix.)
+        There is none nearby. (A circle cannot be corrected: it has no phase to fix.)
     """
     twist = strip.density[1][:, 2]
     start = int(np.argmax(np.abs(twist - np.roll(twist, 1))))  # M3 at S = 0 fixes the phase
@@ -325,14 +326,14 @@ def polished(strip: Strip, intervals: int = 24, degree: int = 7):
 
 
 def _on_primary_branches(strip: Strip, n: int):
-    """(m, point) wherever a primary branch of wavenumber n passes the strip's kappa_n, by quadrature."""
+    """Yield (m, point) for every point on a primary branch of wavenumber n with the strip's kappa_n, by quadrature."""
     law, nu, kappa_n, Gamma = strip.law, strip.nu, strip.kappa_n, strip.Gamma
     for m in (m for m in _COVERINGS if n and m != n and m % (2 * n)):
         try:
             first = thresholds(law, m, n, nu, Gamma)[0]
             limits = min(first, kappa_n) - 1, max(first, kappa_n) + 1
             points = exact.curve(m, n, nu, limits, law=law.name, Gamma=Gamma)
-        except (ValueError, RuntimeError):  # no such branch, or none that can be left from its circle
+        except (ValueError, RuntimeError):  # no such branch, or none with a regular start on its circle
             continue
         for one, other in itertools.pairwise(points):
             if (one.kappa_n - kappa_n) * (other.kappa_n - kappa_n) <= 0:

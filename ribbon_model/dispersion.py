@@ -4,7 +4,7 @@ Lengths are in units of the radius r0 of the circle and moments in units of B / 
 moment = 1 - kappa_n r0 (17a). A mode of wavenumber n on the m-covered circle has k = n / m (22). Everything but the matrix is
 plain arithmetic: floats, or numpy arrays that broadcast.
 
-Two corrections of the printed text are built in, both without effect on the roots: det A is MINUS the product (25a); and the
+Two misprints are corrected here, both without effect on the roots: det A is MINUS the product (25a); and the
 scale of Omega in (17b) is sqrt(B / rho) / r0**2 (rho is a mass per length; with the printed E its units do not match).
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 
 
 def mode_matrix(moment: float, g: float, t: float, k: float, omega_squared: float) -> np.ndarray:
-    """The matrix A of (24), shape (12, 12), complex; unknowns x, psi, R, M, each by its components on d1, d2, d3.
+    """Return the matrix A of (24), shape (12, 12), complex; unknowns x, psi, R, M, each by its components on d1, d2, d3.
 
     Row 11 is the law of M_2. For g infinite it is divided by g, which leaves the constraint omega_2 = 0, i k psi_2 = psi_3;
     det A is then the limit of det A / g.
@@ -38,14 +38,14 @@ def mode_matrix(moment: float, g: float, t: float, k: float, omega_squared: floa
 
 
 def coefficients(moment, g, t, k) -> tuple:
-    """b and c of (25b), (25c); arrays broadcast. For g infinite, b = t (1 - k**2) - moment and c = 1."""
+    """Return b and c of (25b), (25c); arrays broadcast. For g infinite, b = t (1 - k**2) - moment and c = 1."""
     if math.isinf(g):
         return t * (1 - k**2) - moment, 1 + 0 * moment * k
     return moment**2 / g - (1 + t / g) * moment + t * (1 - k**2), 1 + (k**2 * t - moment) / g
 
 
 def determinant(moment, g, t, k, omega_squared):
-    """det A by its factors, (25a) with the sign corrected; for g infinite the limit of det A / g, as `mode_matrix`."""
+    """Return det A from its factors, (25a) with the sign corrected; for g infinite the limit of det A / g, as `mode_matrix`."""
     b, c = coefficients(moment, g, t, k)
     in_plane = (1 + k**2) * omega_squared - k**2 * (1 - k**2) ** 2
     out_of_plane = c * omega_squared - b * k**2 * (1 - k**2)
@@ -53,9 +53,9 @@ def determinant(moment, g, t, k, omega_squared):
 
 
 def squared_frequencies(moment, g, t, k) -> tuple:
-    """The roots Omega**2 of (26): the in-plane one, never negative, and the one that decides on stability.
+    """Return the roots Omega**2 of (26): the in-plane root, never negative, and the root that determines stability.
 
-    Where c = 0 the second is infinite: a pure twist, to which the model gives no inertia (with floats: ZeroDivisionError).
+    If c = 0, the second one is infinite: a pure twist has no inertia in the model (with floats: ZeroDivisionError).
     """
     b, c = coefficients(moment, g, t, k)
     return k**2 * (1 - k**2) ** 2 / (1 + k**2), b * k**2 * (1 - k**2) / c

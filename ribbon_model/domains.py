@@ -1,9 +1,9 @@
-"""The domains on which an equilibrium is computed: a part of the loop, and what its symmetry says at the ends.
+"""The domains on which an equilibrium is computed: parts of the loop, with end conditions from its symmetry.
 
 - `CELL`: a quarter wave [0, L/4n] of a primary branch, between a mirror at S = 0 (normal to d3) and a two-fold axis along
-  d2 at the other end; R = 0. The smallest, and the default.
-- `HALF_LOOP`: [0, L/2] between two mirrors: every wavenumber at once, each as a simple bifurcation.
-- `HALF_LOOP_BETWEEN_AXES`: [0, L/2] between two-fold axes along d2: what breaks the mirrors and keeps an axis.
+  d2 at the other end; R = 0. This is the smallest domain, and the default.
+- `HALF_LOOP`: [0, L/2] between two mirrors. It has all wavenumbers, each as a simple bifurcation.
+- `HALF_LOOP_BETWEEN_AXES`: [0, L/2] between two-fold axes along d2, for branches that break the mirrors and keep an axis.
 - `LOOP`: [0, L] closed, gauge and phase fixed, the redundancy of closure unfolded by a parameter that stays zero.
 
 A domain states its boundary value problem for a law, and unfolds a solution on it to the whole strip by its symmetries. The
@@ -24,7 +24,7 @@ from ribbon_model.equilibrium import LENGTH, directors, with_force, without_forc
 from ribbon_model.laws import Law
 from ribbon_model.shape import Shape
 
-#: Below this |sin| of half the angle between two waves they are not turned against each other, and there is no centre.
+#: With a smaller |sin| of half the angle between two waves, these are not rotated against each other, and there is no centre.
 _NO_TURN = 1e-9
 
 
@@ -43,19 +43,19 @@ class Domain:
     Attributes
     ----------
     name : str
-        As in scenes and files.
+        The name in scenes and files.
     free : tuple of str
-        The parameters that are free on a branch, kappa_n first.
+        The free parameters on a branch, kappa_n first.
     boundary : callable
         ``boundary(u0, u1, p)``: the conditions at the ends.
     parameters : mapping of str to float
-        Those of the domain, ``length`` first, with their values.
+        The parameters of the domain, ``length`` first, with their values.
     unfold : callable
         ``unfold(part)`` is the closed strip from the part of it that was computed, a `Shape`.
     reversal : str
         The symmetry at both ends of a half loop, 'mirror' or 'axis'; '' on other domains.
     quarters : int
-        Where it begins on the closed strip of a cell, in quarter waves.
+        The place on the closed strip where the domain begins, in quarter waves of the cell.
     equations : callable
         ``equations(law)``, see `ribbon_model.equilibrium`.
     """
@@ -71,30 +71,30 @@ class Domain:
 
     @functools.cache  # noqa: B019 - the domains are constants of this module; what is compiled for a problem is found again
     def problem(self, law: Law) -> StripProblem:
-        """The problem of a law: one object for each law."""
+        """Return the problem of a law: one object for each law."""
         rhs, states, loads, functionals = self.equations(law)
         values = {"kappa_n": 0.0, **law.defaults, **loads, **self.parameters}
         return StripProblem(rhs, self.boundary, states, values, functionals=functionals, law=law, on=self)
 
     def parts(self, n: int) -> int:
-        """How many such parts the loop of a wave of wavenumber n consists of."""
+        """Return the number of such parts in the loop of a wave of wavenumber n."""
         return round(LENGTH / self.parameters["length"])
 
     def wavenumber(self, parameters: Mapping[str, float]) -> int:
-        """n of the primary branch that a solution is on; 0 where the domain does not tell."""
+        """Return n of the primary branch of a solution; 0 if the domain does not determine it."""
         return 0
 
     def whole(self, part: Shape, parameters: Mapping[str, float]) -> Shape:
-        """The closed strip from the part of it that was computed, and the parameters of the solution."""
+        """Return the closed strip from the part of it that was computed, and the parameters of the solution."""
         return self.unfold(part)
 
     def stretch(self, period: int, quarter: int) -> tuple[int, int]:
-        """First and last node of this domain on the closed strip, 0 to ``period``, of a cell with nodes 0 to ``quarter``."""
+        """Return the first and last node of this domain on the closed strip, 0 to ``period``; a cell has 0 to ``quarter``."""
         first = self.quarters * quarter
         return first, first + period // self.parts(1)
 
     def discretize(self, law: Law, intervals: int, degree: int, parameters: Mapping[str, float]) -> Collocation:
-        """The collocation system on a uniform mesh."""
+        """Return the collocation system on a uniform mesh."""
         return Collocation(self.problem(law), np.linspace(0, 1, intervals + 1), degree, self.free, parameters)
 
     def circle(self, system: Collocation, m: int, kappa_n: float, moment: float | None = None) -> np.ndarray:
@@ -121,7 +121,7 @@ class Cell(Domain):
         return 4 * n
 
     def wave(self, m: int, n: int, kappa_n: float) -> dict[str, float]:
-        """The parameters that tell the branch of the mode n on the m-covered circle, which it leaves at kappa_n."""
+        """Return the parameters of the cell for the branch of the mode n, which leaves the m-covered circle at kappa_n."""
         sense = math.copysign(1.0, m - kappa_n)
         return {"length": LENGTH / (4 * n), "turn": math.pi * m / (2 * n), "sense": sense}
 
@@ -140,7 +140,7 @@ class Cell(Domain):
 
 
 def _ends_of_cell(u0, u1, p):
-    """A mirror at S = 0, a two-fold axis along d2 at the other end."""
+    """Return the boundary conditions of the cell: a mirror at S = 0, a two-fold axis along d2 at the other end."""
     d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
     moment = p.sense * math.sqrt(p.M1 * p.M1 + p.M2 * p.M2)
     return (
@@ -151,19 +151,19 @@ def _ends_of_cell(u0, u1, p):
 
 
 def _mirrors(u0, u1, p):
-    """Mirrors normal to d3: M3 = R1 = R2 = 0 at both ends follows from d3 being parallel there."""
+    """Return the conditions of mirrors normal to d3: d3 is parallel at both ends, which implies M3 = R1 = R2 = 0."""
     d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
     return u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, d31, d32, u1.x3
 
 
 def _axes(u0, u1, p):
-    """Two-fold axes along d2: M2 = R2 = 0 at both ends follows from both axes being one line."""
+    """Return the conditions of two-fold axes along d2: both axes are one line, which implies M2 = R2 = 0 at both ends."""
     d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u1.q0, u1.q1, u1.q2, u1.q3)
     return u0.q0 - 1, u0.q1, u0.q2, u0.q3, u0.x1, u0.x2, u0.x3, d21, d23, u1.x1, u1.x3
 
 
 def _closed(u0, u1, p):
-    """The frame and the centreline come back.
+    """Return the boundary conditions of the loop: the frame and the centreline are periodic.
 
     H(M) + R3 is constant along the strip, so one of the six conditions of closure follows from the others; a dissipative term
     ``unfold`` (M × omega + R × e3), which would change that constant, makes the count regular.

@@ -1,4 +1,4 @@
-"""Half a closed strip stated by its energy alone: equations, multipliers and index are derived by `contin.VariationalProblem`.
+"""Half a closed strip, stated by its energy alone: `contin.VariationalProblem` derives equations, multipliers and index.
 
 The state is the quaternion of the frame and the centreline, the Hamiltonian that of the law, H(M), plus n . d3 for the growth
 of the centreline: the multipliers of the quaternion carry the moment, 2 M_i = lambda_q . (q e_i), and those of the centreline
@@ -18,12 +18,12 @@ from ribbon_model.laws import Law
 
 @functools.cache
 def variational_problem(law: Law, domain: Domain) -> VariationalProblem:
-    """The half loop as a variational problem, on S in (0, L/2); its parameters are kappa_n and the law's own.
+    """Return the half loop as a variational problem, on S in (0, L/2); its parameters are kappa_n and the law's own.
 
     Parameters
     ----------
     law : Law
-        One whose H is a closed expression.
+        A law whose H is a closed expression.
     domain : Domain
         `domains.HALF_LOOP` or `domains.HALF_LOOP_BETWEEN_AXES`.
 

@@ -1,7 +1,7 @@
 """Equilibrium of an elastic strip: the equations along the centreline, the same on every domain.
 
 The force R and the moment about the origin M + x × R are constant in space, so the state is the frame (a unit quaternion)
-and, where R may differ from zero, the centreline x. Lengths run over the unit interval: S = length * t. The lab axes are the
+and, if R may differ from zero, the centreline x. Lengths run over the unit interval: S = length * t. The lab axes are the
 directors at S = 0, the origin is x(0): M1, M2, M3 and R1, R2, R3 are the moment and force there (equations (1)-(4) of Audoly
 & Seffen 2015). `ribbon_model.domains` adds the conditions at the ends.
 """
@@ -20,7 +20,7 @@ LOADS = ("M1", "M2", "M3", "R1", "R2", "R3", "unfold")
 
 
 def directors(q0, q1, q2, q3):
-    """Components of d1, d2, d3 on the lab axes (nine numbers, director by director) from the quaternion."""
+    """Return the components of d1, d2, d3 on the lab axes (nine numbers, director by director) from the quaternion."""
     return (
         q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, 2 * (q1 * q2 + q0 * q3), 2 * (q1 * q3 - q0 * q2),
         2 * (q1 * q2 - q0 * q3), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, 2 * (q2 * q3 + q0 * q1),
@@ -29,7 +29,7 @@ def directors(q0, q1, q2, q3):
 
 
 def spin(q0, q1, q2, q3, w1, w2, w3, length):
-    """Rate of the quaternion of a frame that turns with the body components w of the rotation gradient (3)."""
+    """Return the rate of the quaternion of a frame that turns with the body components w of the rotation gradient (3)."""
     h = length / 2
     return (
         -h * (q1 * w1 + q2 * w2 + q3 * w3), h * (q0 * w1 + q2 * w3 - q3 * w2),
@@ -38,7 +38,7 @@ def spin(q0, q1, q2, q3, w1, w2, w3, length):
 
 
 def on_directors(q0, q1, q2, q3, a1, a2, a3):
-    """Components on the directors of the vector that has components a on the lab axes."""
+    """Return the components on the directors of the vector that has components a on the lab axes."""
     d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(q0, q1, q2, q3)
     return (
         d11 * a1 + d12 * a2 + d13 * a3, d21 * a1 + d22 * a2 + d23 * a3, d31 * a1 + d32 * a2 + d33 * a3,
@@ -46,9 +46,9 @@ def on_directors(q0, q1, q2, q3, a1, a2, a3):
 
 
 def without_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float], dict[str, Callable]]:
-    """Right-hand side, states, loads (parameters, zero) and functionals where R = 0, and M3 = 0 at S = 0.
+    """Return the right-hand side, states, loads (parameters, zero) and functionals where R = 0, and M3 = 0 at S = 0.
 
-    Of parameters the equations also take ``length``, and those of the law.
+    The equations also have the parameters ``length`` and those of the law.
     """
     response = law.response_at
 
@@ -64,7 +64,7 @@ def without_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float]
 
 
 def with_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float], dict[str, Callable]]:
-    """The same with a force: the centreline is a state, moment and force at S = 0 are loads.
+    """Return the same with a force: the centreline is a state, moment and force at S = 0 are loads.
 
     ``unfold`` multiplies the dissipative term M × omega + R × e3, which is zero on a closed solution (see `domains.LOOP`).
     """
@@ -91,7 +91,7 @@ def with_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float], d
 
 
 def _functionals(response, moment):
-    """kappa* of equation (28) and the energy (1/2 pi) * (integral of U), as means over the domain."""
+    """Return kappa* of equation (28) and the energy (1/2 pi) * (integral of U), as means over the domain."""
 
     def kappa_star(t, u, p):
         M1, M2, M3 = moment(u, p)

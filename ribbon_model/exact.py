@@ -1,4 +1,4 @@
-"""The exact (quadrature) solution of the primary branches: a yardstick, independent of any collocation.
+"""The exact (quadrature) solution of the primary branches, independent of any collocation.
 
 Audoly & Seffen (2015) follow these branches numerically; they are integrable. On the branch born from the m-covered
 circle with wavenumber n the internal force vanishes, and |M| = |mu| and the ribbon's complementary energy c**2/2 are
@@ -68,14 +68,14 @@ class ExactPoint:
 
     @property
     def coordinates(self) -> np.ndarray:
-        """Where the point lies in the plane of the unknowns, shape (2,), in which the branch is a smooth curve."""
+        """The point in the plane of the unknowns, shape (2,), in which the branch is a smooth curve."""
         return np.array([np.log1p(self.eta_max_squared), np.log(self.q) / 2])
 
 
 def bifurcation(m, n, nu):
-    """kappa_n = m K^{m,n} at which the branch leaves the m-covered circle, eq. (27), regular at nu = 0.
+    """Return kappa_n = m K^{m,n} at which the branch leaves the m-covered circle, eq. (27), regular at nu = 0.
 
-    Raises ValueError if (m, n) is no buckling mode or nu is outside (-1, 1), and ZeroDivisionError if the branch starts
+    Raises ValueError if (m, n) is not a buckling mode or nu is outside (-1, 1), and ZeroDivisionError if the branch starts
     at infinite kappa_n (some nu < 0).
     """
     _check_mode(m, n, nu)
@@ -83,9 +83,9 @@ def bifurcation(m, n, nu):
 
 
 def residuals(c, A, kappa_n, m, n, nu):
-    """Defects of closure of a quarter wave of the ribbon: shape (2,), length minus pi/2n, azimuth minus pi m/2n (mod pi).
+    """Return the defects of closure of a quarter wave of the ribbon: (length minus pi/2n, azimuth minus pi m/2n (mod pi)).
 
-    Raises ValueError as `bifurcation`, if m is a multiple of 2n (the centreline would stay open), and if A < 0,
+    Raises ValueError as `bifurcation`, if m is a multiple of 2n (the centreline would not close), and if A < 0,
     c = nu kappa_n or q <= 0 (eta would not oscillate through zero).
     """
     _check(m, n, nu)
@@ -94,20 +94,20 @@ def residuals(c, A, kappa_n, m, n, nu):
 
 
 def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0):
-    """The point of the branch with given kappa_n, or given amplitude, nearest a guess in the sense of Newton's method.
+    """Return the point of the branch with given kappa_n, or given amplitude, nearest a guess in the sense of Newton's method.
 
     Parameters
     ----------
     guess : ExactPoint, RodPoint, FiniteWidthPoint, or for the ribbon (c, A, kappa_n)
     kappa_n, amplitude : float
-        Exactly one of them: what the point must have. The amplitude is A: max(eta**2) for the ribbon.
+        The given value, exactly one of the two. The amplitude is A: max(eta**2) for the ribbon.
     law, root :
         As for `curve`.
 
     Raises
     ------
     ValueError
-        On several targets or none, or where `residuals` raises it.
+        None or both are given, or `residuals` raises it.
     RuntimeError
         If Newton does not converge. Near a fold of kappa_n prescribe the amplitude, and conversely.
     """
@@ -135,7 +135,7 @@ def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0
 
 
 def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", root=0, Gamma=None):
-    """The branch from the m-covered circle to the one where it ends, or to a limit of kappa_n.
+    """Return the branch from the m-covered circle to the one where it ends, or to a limit of kappa_n.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
     law : str
         'ribbon', 'flat rod', 'isotropic rod', or 'finite width': see `ribbon_model.exact_finite_width`.
     root : int
-        Which of the thresholds on the m-covered circle: 0, or for the isotropic rod also 1.
+        Number of the threshold on the m-covered circle: 0, or for the isotropic rod also 1.
     Gamma : float, optional
         For the law 'finite width'.
 
@@ -196,9 +196,9 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
 
 
 def initial_slope(m, n, nu, law="ribbon", root=0):
-    """d kappa_n / dA where the branch leaves the m-covered circle, A the squared amplitude: its sign is the pitchfork's sense.
+    """Return d kappa_n / dA at the start of the branch, with the squared amplitude A: its sign is the pitchfork's sense.
 
-    Zero where a fold is born out of the pitchfork. Raises as `curve` does.
+    It is zero if a fold is born from the pitchfork. Raises as `curve` does.
     """
     family = _family(law, m, n, nu, root)
     defect, numerator, denominator = FLOAT.gradients(family.parts, family.circle(m))
@@ -207,12 +207,12 @@ def initial_slope(m, n, nu, law="ribbon", root=0):
 
 
 def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0, Gamma=None):
-    """The points of `curve` at which kappa_n is stationary, in order. Raises as `curve` does."""
+    """Return the points of `curve` at which kappa_n is stationary, in order. Raises as `curve` does."""
     return [point for point in curve(m, n, nu, kappa_limits, law=law, root=root, Gamma=Gamma) if point.label == "LP"]
 
 
 def end(m, n, nu, law="ribbon", root=0):
-    """(covering index, kappa_n) of the circle where the branch ends, or None. Raises as `curve`.
+    """Return (covering index, kappa_n) of the circle where the branch ends, or None. Raises as `curve`.
 
     None if the branch never returns to a circle (2n < m, except for the isotropic rod), or has infinite kappa_n somewhere on
     the way. The index is kappa_star there: negative, on some branches of the isotropic rod, if omega_1 is.
@@ -229,9 +229,9 @@ def end(m, n, nu, law="ribbon", root=0):
 
 
 def refine(point, digits):
-    """kappa_n and kappa_star of a point of `curve`, to many digits.
+    """Return kappa_n and kappa_star of a point of `curve`, to many digits.
 
-    A fold is located anew and a circle is kept a circle; every other point keeps its kappa_n. nu, and that kappa_n, are taken
+    A fold is located again, and a circle stays a circle; every other point keeps its kappa_n. nu, and that kappa_n, are taken
     as the decimal numbers that Python prints (0.3 is 3/10).
 
     Parameters
@@ -249,7 +249,7 @@ def refine(point, digits):
     RuntimeError
         If the iteration does not converge.
     """
-    import mpmath  # of no use to anything else
+    import mpmath  # only this function needs it
 
     coarse = _family(point.law, point.m, point.n, point.nu, point.root)
 
@@ -296,7 +296,7 @@ def _check(m, n, nu, root=0):
 
 def _check_mode(m, n, nu, root=0):
     if min(m, n) < 1 or (m == n and root == 0):  # K = 1 is the motion; K = -1/(1 + nu), the isotropic rod's other root, is not
-        raise ValueError(f"(m, n) = ({m}, {n}) is no buckling mode: need m, n >= 1 and n != m (a rigid motion)")
+        raise ValueError(f"(m, n) = ({m}, {n}) is not a buckling mode: need m, n >= 1 and n != m (a rigid motion)")
     if not -1 < nu < 1:
         raise ValueError(f"nu = {nu} is outside (-1, 1)")
 
@@ -311,7 +311,7 @@ def _q(c, A, kappa_n, nu):
 
 
 def _quadratures(A, q, numerics=FLOAT):
-    """Means over theta of |azimuth|/pi, 1/sqrt(eta^2 + q), eta^2/sqrt(eta^2 + q); and |mu/a|. A, q of one shape."""
+    """Return means over theta of |azimuth|/pi, 1/sqrt(eta^2 + q), eta^2/sqrt(eta^2 + q); and |mu/a|. A, q of one shape."""
     A, q = A[..., None], q[..., None]
     amplitude, size = (float(numerics.real(value).flat[0]) for value in (A, q))
     v = numerics.nodes(0.5 * np.log(size / amplitude) if amplitude > max(size, 0.0) else 0.0, 0.0)
@@ -326,7 +326,7 @@ def _quadratures(A, q, numerics=FLOAT):
 
 
 def _defect(azimuth, m, n, numerics=FLOAT):
-    """Azimuth of a quarter wave minus that of a closed loop, both over pi, modulo 1. sign(mu/a) = sign(m - n)."""
+    """Return the azimuth of a quarter wave minus that of a closed loop, both over pi, modulo 1. sign(mu/a) = sign(m - n)."""
     defect = ((1 if m > n else -1) * azimuth * 2 * n - m) / (2 * n)
     return defect - np.round(np.asarray(numerics.real(defect)).astype(float))
 
@@ -347,14 +347,14 @@ class _Ribbon:
         return np.array([0.0, np.log(2 * self.n / index)])
 
     def parts(self, x, y, numerics=FLOAT):
-        """Defect of the azimuth over pi, c (1 - beta) and 1 - nu beta, of the shape of x, y; kappa_n is their ratio."""
+        """Return the defect of the azimuth over pi, c (1 - beta) and 1 - nu beta, shaped like x, y; kappa_n is their ratio."""
         A, q = numerics.expm1(x), numerics.exp(2 * y)
         azimuth, mean, mean_squared, _ = _quadratures(A, q, numerics)
         beta = (A + 4 - q) / 2
         return _defect(azimuth, self.m, self.n, numerics), 2 * self.n * (mean + mean_squared) * (1 - beta), 1 - self.nu * beta
 
     def values(self, z, numerics=FLOAT):
-        """kappa_n, kappa_star, c, mu at z."""
+        """Return kappa_n, kappa_star, c, mu at z."""
         n, nu = self.n, self.nu
         A, q = numerics.expm1(z[:1]), numerics.exp(2 * z[1:])
         _, mean, mean_squared, mu = _quadratures(A, q, numerics)
@@ -372,7 +372,7 @@ class _Ribbon:
         return point.coordinates
 
 
-#: The branches of a law, by its name: those that the follower below walks, and those that are followed by another.
+#: The branches of a law, by its name: those for the follower below, and those with a follower of their own.
 _FAMILIES = {ExactPoint.law: _Ribbon, **RODS}
 _FOLLOWERS = {exact_finite_width.LAW: exact_finite_width.curve}
 
@@ -387,14 +387,14 @@ def _tangent(family, z):
 
 
 def _turning(family, z, numerics=FLOAT):
-    """Defect; d kappa_n/ds times denominator^2 and a factor of constant sign: zero at a fold, finite where kappa_n is not."""
+    """Return the defect, and d kappa_n/ds times denominator^2 and a factor of constant sign: zero at a fold, always finite."""
     (defect, across), numerator, denominator = numerics.gradients(family.parts, z)
     gradient = numerator[1] * denominator[0] - numerator[0] * denominator[1]
     return defect, gradient[0] * across[1] - gradient[1] * across[0]
 
 
 def _correct(family, z, tangent):
-    """The curve's point on the normal to `tangent` through z (Newton), or None if there is none nearby."""
+    """Return the curve's point on the normal to `tangent` through z (Newton), or None if there is none nearby."""
     normal = np.array([-tangent[1], tangent[0]])
     for _ in range(7):
         value, gradient = FLOAT.gradients(family.parts, z)[0]
@@ -402,13 +402,13 @@ def _correct(family, z, tangent):
         if not abs(update) < 0.5:
             return None
         z = z + update * normal
-        if abs(update) < 1e-10:  # convergence is quadratic: what is left is round-off
+        if abs(update) < 1e-10:  # convergence is quadratic: the remaining error is round-off
             return z
     return None
 
 
 def _segments(family, step):
-    """Walk from the m-covered circle: yield (line, length, ahead), with line(s) the curve at 0 <= s <= length.
+    """Follow the curve from the m-covered circle: yield (line, length, ahead), with line(s) the curve at 0 <= s <= length.
 
     Ends with the first `ahead` at negative A, or nearly homoclinic.
     """
@@ -430,7 +430,7 @@ def _segments(family, step):
 
 
 def _root(function, line, lower, upper):
-    """s in [lower, upper] at which function(line(s)) changes sign (Illinois false position)."""
+    """Return s in [lower, upper] at which function(line(s)) changes sign (Illinois false position)."""
     ends = [lower, upper]
     values = [function(line(s)) for s in ends]
     last = None
@@ -441,7 +441,7 @@ def _root(function, line, lower, upper):
             break
         side = int(value * values[1] > 0)
         ends[side], values[side] = s, value
-        if side == last:  # the other end has stayed twice: halve its weight, or convergence is linear
+        if side == last:  # the other end was kept twice: halve its weight, otherwise convergence is linear
             values[1 - side] /= 2
         last = side
     return s

@@ -1,4 +1,4 @@
-"""The exact (quadrature) solution of the primary branches of the law 'finite width': a yardstick, independent of collocation.
+"""The exact (quadrature) solution of the primary branches of the law 'finite width', independent of collocation.
 
 With R = 0, |M| = mu and H = omega.grad U - U are constant along the strip: omega = rho (cos phi, sin phi) runs along a level
 curve of H, which meets every ray once where U is convex (dH/drho = omega.D2U.omega/rho). A quarter wave runs from the mirror,
@@ -57,13 +57,13 @@ class FiniteWidthPoint:
 
     @property
     def coordinates(self) -> np.ndarray:
-        """Where the point lies in the space of the unknowns, shape (3,), kappa_n counting a fifth."""
+        """The point in the space of the unknowns, shape (3,), with kappa_n divided by five."""
         return np.array([self.kappa_n / 5, self.omega, math.sqrt(self.amplitude)])
 
 
 @functools.cache
 def _energy():
-    """U and its derivatives, compiled for many strains."""
+    """Return U and its derivatives, compiled for many strains."""
     from contin import Batch
 
     def function(w, p):
@@ -73,12 +73,12 @@ def _energy():
 
 
 def _derivatives(w, kappa_n, nu, Gamma):
-    """(U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k), shape (9, nodes), at strains (nodes, 2)."""
+    """Return (U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k), shape (9, nodes), at strains (nodes, 2)."""
     return _energy().values(np.zeros(len(w)), np.ascontiguousarray(w), np.empty((0, 2)), np.array([kappa_n, nu, Gamma])).T
 
 
 def _level(direction, omega, kappa_n, nu, Gamma):
-    """Strains (nodes, 2) on rays (nodes, 2), on the level curve of H through (omega, 0); and the derivatives there; or nan."""
+    """Return strains (nodes, 2) on rays (nodes, 2), on the level curve of H through (omega, 0), and derivatives; or nan."""
     U, U1 = _derivatives(np.array([[omega, 0.0]]), kappa_n, nu, Gamma)[:2, 0]
     level, rho = omega * U1 - U, np.full(len(direction), float(omega))
     for _ in range(60):
@@ -93,9 +93,9 @@ def _level(direction, omega, kappa_n, nu, Gamma):
 
 
 def quadratures(kappa_n, omega, root_A, nu, Gamma) -> np.ndarray:
-    """Length, precession of d_1, kappa* and U (both integrated over S) of a quarter wave, shape (4,).
+    """Return length, precession of d_1, kappa* and U (both integrated over S) of a quarter wave, shape (4,).
 
-    Not a number outside the convex domain. Nodes are doubled until that changes nothing.
+    Not a number outside the convex domain. The number of nodes is doubled until the result stays the same.
     """
     nodes, before = _FEWEST, None
     while nodes <= _MOST:
@@ -127,7 +127,7 @@ def _quadratures(kappa_n, omega, root_A, nu, Gamma, nodes):
 
 
 def _integral_to_the_end(values, theta):
-    """Integral from theta to pi/2 of a series of sin(2 k theta) given at midpoints, accurate near pi/2 as well."""
+    """Return the integral from theta to pi/2 of a series of sin(2 k theta) given at midpoints, accurate near pi/2 as well."""
     k = np.arange(1, len(theta))
     coefficients = 2 / len(theta) * (np.sin(2 * np.outer(k, theta)) @ values)
     return (np.sin(np.outer(math.pi / 2 - theta, k)) ** 2 / k) @ (coefficients * (-1.0) ** (k + 1))
@@ -144,7 +144,7 @@ class _Branch:
         return np.array([length * 2 * self.n / math.pi - 1, precession * 2 / math.pi - abs(self.m - self.n) / self.n])
 
     def slopes(self, v):
-        """Derivatives of the defects, shape (2, 3)."""
+        """Return the derivatives of the defects, shape (2, 3)."""
         steps = _DIFFERENCE * np.eye(3)
         return np.array([(self.defects(v + e) - self.defects(v - e)) / (2 * _DIFFERENCE) for e in steps]).T
 
@@ -154,7 +154,7 @@ class _Branch:
         return tangent / np.linalg.norm(tangent)
 
     def correct(self, v, normal):
-        """The curve's point in the plane through v with this normal, or None."""
+        """Return the curve's point in the plane through v with this normal, or None."""
         start = v
         for _ in range(12):
             matrix = np.vstack([self.slopes(v), normal])
@@ -175,32 +175,32 @@ class _Branch:
         return FiniteWidthPoint(self.m, self.n, self.nu, self.Gamma, *map(float, values), label)
 
     def circle(self, index):
-        """The circle where the branch begins or ends."""
+        """Return the circle where the branch begins or ends."""
         kappa_n = linear.thresholds(FINITE_WIDTH, index, self.n, self.nu, self.Gamma)[0]
         values = linear.circle(FINITE_WIDTH, index, kappa_n, self.nu, self.Gamma)
         place = (kappa_n, float(index), 0.0, float(values["kappa_star"]), float(values["energy"]))
         return FiniteWidthPoint(self.m, self.n, self.nu, self.Gamma, *place, "BP")
 
     def first(self):
-        """The point with the smallest sqrt(A) that is looked at, from the circle."""
+        """Return the first point after the circle, with the smallest sqrt(A)."""
         begin = self.circle(self.m)
         return self.correct(np.array([begin.kappa_n, begin.omega, _FIRST]), np.array([0.0, 0.0, 1.0]))
 
 
 def curve(m, n, nu, Gamma, kappa_limits=(-100.0, 100.0), step=0.1) -> list[FiniteWidthPoint]:
-    """The branch from the m-covered circle to the one where it ends, to a limit of kappa_n, or to where it is lost.
+    """Return the branch from the m-covered circle to the one where it ends, to a limit of kappa_n, or to where it is lost.
 
     Parameters
     ----------
     step : float
-        Largest distance between points in (kappa_n, omega, sqrt(A)), kappa_n counting a fifth.
+        Largest distance between points in (kappa_n / 5, omega, sqrt(A)).
 
     Raises
     ------
     ValueError
-        As `linear.thresholds`, or where m is a multiple of 2n (the centreline stays open).
+        See `linear.thresholds`; or m is a multiple of 2n (the centreline does not close).
     RuntimeError
-        The branch cannot be left from its circle.
+        No point beside the circle is found.
     """
     if m % (2 * n) == 0:
         raise ValueError(f"branch ({m}, {n}) does not close with R = 0, because m is a multiple of 2n")
@@ -232,7 +232,7 @@ def curve(m, n, nu, Gamma, kappa_limits=(-100.0, 100.0), step=0.1) -> list[Finit
 
 
 def solve(guess: FiniteWidthPoint, *, kappa_n: float | None = None, amplitude: float | None = None) -> FiniteWidthPoint:
-    """The point of a branch with given kappa_n, or given amplitude, nearest a point of it; see `exact.solve`.
+    """Return the point of a branch with given kappa_n, or given amplitude, nearest a point of it; see `exact.solve`.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def solve(guess: FiniteWidthPoint, *, kappa_n: float | None = None, amplitude: f
 
 
 def _fold(branch, v, tangent, ahead):
-    """Where kappa_n is stationary between two points; kappa_n is then known to the square of the place's error."""
+    """Return the point between two others where kappa_n is stationary; the error of kappa_n is the square of the point's."""
     from scipy.optimize import brentq
 
     def place(s):

@@ -1,4 +1,4 @@
-"""The quadratures of the primary branches of the two rods, for `ribbon_model.exact`, whose follower walks them.
+"""The quadratures of the primary branches of the two rods, for `ribbon_model.exact`, which follows them.
 
 Both rods have H = (M_1 + kappa_n)**2/2 + alpha M_2**2/2 + beta M_3**2/2 with (alpha, beta) = (0, (1 + nu)/2) for the flat one
 and (1, 1 + nu) for the isotropic one. With R = 0, M' = M x omega keeps |M| and H: M runs along the intersection of a sphere
@@ -11,8 +11,8 @@ The length gives C. The precession about M is that of d_1: its azimuth, at the r
 
     |M| (alpha M_2**2 + beta M_3**2)/(M_2**2 + M_3**2) = |M| (alpha + (beta - alpha) s/(s + (1 - s) (p (1 - s) + q s))),
 
-is the one that is never singular, since M_2 and M_3 do not vanish together, and not even on a circle, where the ratio stays:
-no jump to take out. d_1 is normal to d_3 at the mirror and to d_2 at the axis; so, d_2 being turned by pi m/2n, d_1 is by
+is never singular, since M_2 and M_3 do not vanish together; on a circle their ratio stays finite. So there is no jump to
+correct. d_1 is normal to d_3 at the mirror and to d_2 at the axis; so, d_2 being turned by pi m/2n, d_1 is by
 pi m/2n - pi/2, up to the sense, and the loop closes if
 
     C = n mean(1/sqrt(p (1 - s) + q s)),      |M|/C mean((alpha + (beta - alpha) s/(...))/sqrt(...)) = |m -+ n|/n,
@@ -30,7 +30,7 @@ Isotropic rod: M_3 = sqrt(A) kappa_n sin(theta), M_1 = kappa_n (U - nu A s/2), C
 
     p = 1 - nu U + nu**2 A/4,      q = p + nu**2 A/4,      (|M|/C)**2 = U**2 + A p.
 
-A and U are the unknowns. kappa_n never changes sign. All these branches come back to a circle: A and U are bounded because
+A and U are the unknowns. kappa_n never changes sign. All these branches end on a circle: A and U are bounded because
 the precession is, and p = 0 would need an infinite one.
 
 Source of the quadratures: M' = M x omega and the two invariants, as above. Units: B = 1, L = 2 pi.
@@ -66,13 +66,13 @@ class Numerics:
             setattr(self, name, wrap(getattr(functions, name)))
 
     def nodes(self, lower, upper):
-        """Nodes v, for integrands that have decayed a tail's length outside [lower, upper], shape (nodes,)."""
+        """Return the nodes v, for integrands that have decayed a tail's length outside [lower, upper], shape (nodes,)."""
         spacing = float(self.spacing)
         count = np.arange((lower - self.tail) // spacing, (upper + self.tail) // spacing)
         return self.spacing * self.array(count)
 
     def gradients(self, function, z):
-        """(value, gradient (2,)) of every result of function(x, y, numerics), by complex steps: exact to round-off."""
+        """Return (value, gradient (2,)) of every result of function(x, y, numerics), by complex steps: exact to round-off."""
         steps = self.array(np.eye(2)) * (1j * self.tiny)
         results = function(*(z[:, None] + steps), self)
         return [(self.real(result)[0], self.imag(result) / self.tiny) for result in results]
@@ -106,7 +106,7 @@ class RodPoint:
 
     @property
     def coordinates(self) -> np.ndarray:
-        """Where the point lies in the plane of the unknowns, shape (2,), in which the branch is a smooth curve."""
+        """The point in the plane of the unknowns, shape (2,), in which the branch is a smooth curve."""
         return RODS[self.law](self.m, self.n, self.nu, self.root).coordinates(self)
 
 
@@ -118,7 +118,7 @@ class Rod:
     finish : int or None
         The covering index of the circle where the branch may end, negative if omega_1 < 0 there.
     roots : int
-        How many thresholds there are on a circle.
+        Number of thresholds on a circle.
     """
 
     roots = 1
@@ -132,14 +132,14 @@ class Rod:
         self.finish = self.covering()
 
     def parts(self, x, y, numerics=FLOAT):
-        """Defect of the azimuth over pi, numerator and denominator of kappa_n; x, y and the results of one shape."""
+        """Return the defect of the azimuth over pi, numerator and denominator of kappa_n, all shaped like x, y."""
         A, p, q, moment, k = self.constants(x, y, numerics)
         inverse, ratio, _ = self._means(A, p, q, y, numerics)
         turn = self.n * moment * (self.alpha * inverse + (self.beta - self.alpha) * ratio)
         return (turn - abs(self.sense * self.m - self.n)) / (2 * self.n), self.n * inverse * k, 1 + 0 * x
 
     def values(self, z, numerics=FLOAT):
-        """kappa_n, kappa_star, H, mu at z."""
+        """Return kappa_n, kappa_star, H, mu at z."""
         x, y = z[:, None]
         A, p, q, moment, k = self.constants(x, y, numerics)
         inverse, _, strain = self._means(A, p, q, y, numerics)
@@ -165,7 +165,7 @@ class Rod:
         """Means over theta of 1/sqrt, s/(...)/sqrt, omega_1/C/sqrt, of the arguments' shape."""
         A, p, q, y = A[..., None], p[..., None], q[..., None], y[..., None]
         low, high = (float(numerics.real(value).flat[0]) for value in (p, q))
-        if not min(low, high) > 0:  # a trial step out of the domain: the corrector refuses it
+        if not min(low, high) > 0:  # a trial step out of the domain: the corrector rejects it
             return ((A + np.nan).sum(-1),) * 3
         middle = 0.5 * np.log(low / high)
         v = numerics.nodes(min(middle, 0.0), max(middle, 0.0))

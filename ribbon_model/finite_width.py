@@ -11,12 +11,12 @@ modulus times w,
     Q = omega_3**2 + nu omega_1 (omega_1 - kappa_n),    C = 3 (1 - nu**2) Gamma**2,    omega_2 = 0,
     g(x**4) = (1 - G)/x**4,    G = 2 (cosh x - cos x) / (x (sinh x + sin x)):
 
-the flat rod, and a penalty on Q, the Gaussian curvature that the section would have to carry. U is even in omega_3 and smooth
+the flat rod, and a penalty on Q, the Gaussian curvature of the section. U is even in omega_3 and smooth
 for every omega_1, zero included. g falls from 1/180 to 1/x**4.
 
 Normalisation: B is the modulus of the PLATE times w, for every Gamma. Then Gamma -> infinity is the ribbon (7) as it stands,
 and Gamma = 0 is the flat rod (11) with all moments and energies times 1 - nu**2, the ratio of a beam's to a plate's modulus.
-Equilibria do not feel that factor: kappa_n and the strains agree as they are. kappa* = -dU/dkappa_n is (1 - nu**2) times the
+This factor does not change equilibria: kappa_n and the strains are the same. kappa* = -dU/dkappa_n is (1 - nu**2) times the
 flat rod's, plus nu**2 kappa_n.
 
 H is the Legendre transform of U. Where D2U is not positive definite it has several values or none: the law ends there, and
@@ -36,7 +36,7 @@ _TOLERANCE = 1e-6
 
 
 def _series(terms: int) -> tuple[float, ...]:
-    """Coefficients of g(z) about z = 0: 1 - G by division of power series in z = x**4, exact until rounded."""
+    """Return the coefficients of g(z) about z = 0: 1 - G by division of power series in z = x**4, exact until rounded."""
     numerator = [Fraction(4, math.factorial(4 * k + 2)) for k in range(terms + 1)]
     denominator = [Fraction(2, math.factorial(4 * k + 1)) for k in range(terms + 1)]
     quotient = []
@@ -97,7 +97,7 @@ def on_circle(ratio, nu, width) -> tuple:
 
 
 def convex_limits(nu, width) -> list[float]:
-    """The values of kappa_n r0 where the torsional or the tangent bending modulus of a planar circle vanishes, in any order."""
+    """Return the kappa_n r0 where the torsional or the tangent bending modulus of a planar circle vanishes, in any order."""
     t0, slope = on_circle(1.0, nu, width)[1], on_circle(0.0, nu, width)[1] - on_circle(1.0, nu, width)[1]
     zeros = [-float(t0 / slope)] if slope else []
     b0, b1, b2 = (on_circle(1 - y, nu, width)[2] for y in (0.0, 1.0, -1.0))
@@ -147,7 +147,7 @@ def strain_energy(w1, w3, kappa_n, nu, Gamma):
 
 
 def first_zero_of_t(nu: float, width: float) -> float | None:
-    """The smallest xi in (0, 1) where the torsional modulus t of the unfolding arc vanishes, or None; width is w**2/(R h)."""
+    """Return the smallest xi in (0, 1) where the modulus t of the unfolding arc vanishes, or None; width is w**2/(R h)."""
     import numpy as np
     from scipy.optimize import brentq
 
@@ -160,15 +160,15 @@ def first_zero_of_t(nu: float, width: float) -> float | None:
 
 
 def _region(nu, Gamma):
-    """The |omega_1| up to which the strip is like a flat rod, x < 1."""
+    """Return the |omega_1| up to which the strip is like a flat rod, x < 1."""
     return 1 / (math.sqrt(3 * (1 - nu * nu)) * Gamma + 1e-100)
 
 
 def _start(M1, M3, kappa_n, nu, Gamma):
-    """Strains to start from: the ribbon's or the flat rod's closed form, whichever makes U - M.omega smaller.
+    """Return the strains to start from: the ribbon's or the flat rod's closed form, whichever makes U - M.omega smaller.
 
-    Not the flat rod's where that lies beyond the concave region along omega_1 = 0: there is another minimum there. And out of
-    that region towards omega_1 > 0, on which side the branches begin.
+    The flat rod's is not taken if it lies beyond the concave region along omega_1 = 0, where there is another minimum. A start
+    inside that region is moved towards omega_1 > 0, the side on which branches begin.
     """
     flat1, flat3 = kappa_n + M1 / (1 - nu * nu), M3 / (2 * (1 - nu))
     p = M1 + (1 - nu) * kappa_n
@@ -198,7 +198,7 @@ def _start(M1, M3, kappa_n, nu, Gamma):
 def _strains(M1, M3, kappa_n, nu, Gamma):
     """omega_1 and omega_3 at a moment, all real: a minimum of U - M.omega, by Newton's method; nan where none is found.
 
-    Steps are halved until they go down, and never leave the convex region once they are in it (a concave one lies along
+    Steps are halved until U - M.omega decreases, and they do not leave the convex region again (a concave one lies along
     omega_1 = 0 at large twist, and another minimum beyond). Where D2U is indefinite, it is shifted.
     """
     w1, w3 = _start(M1, M3, kappa_n, nu, Gamma)
@@ -242,5 +242,5 @@ def response(M1, M2, M3, kappa_n, nu, Gamma):
 
 
 def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
-    """H alone."""
+    """Return H alone."""
     return response(M1, M2, M3, kappa_n, nu, Gamma)[0]

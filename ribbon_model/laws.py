@@ -1,8 +1,8 @@
-"""Material laws. Everything that depends on which law it is, is here; the rest of the package asks the law.
+"""Material laws. All that depends on the law is in this module; the rest of the package calls the law's methods.
 
 A law is one scalar function, the complementary energy H(M1, M2, M3; kappa_n, nu); the strains, the conjugate curvature kappa*,
-the tangent moduli and every Jacobian follow from its derivatives. (Or it is given by its strain energy, with H as Legendre
-transform: `ribbon_model.finite_width`. Nothing else need know which.) `Law` is enough for branches of any such function; the
+the tangent moduli and every Jacobian follow from its derivatives. (A law can also be given by its strain energy, with H as
+Legendre transform: `ribbon_model.finite_width`.) `Law` is enough for branches of any such function; the
 classes below it add what is known in closed form: circles, their thresholds, the unfolding arc, the strain energy.
 
 Units: bending modulus B = 1, total length L = 2 pi (so kappa_n stands for the paper's kappa_n L / 2 pi). The strain
@@ -23,14 +23,14 @@ from typing import ClassVar
 
 from ribbon_model import finite_width
 
-#: Of parameters in a problem's statement; a run states them, so that nothing depends on these.
+#: Defaults of parameters in a problem's statement. Every run gives its own values, so these have no effect.
 _DEFAULTS = {"nu": 0.3, "Gamma": 1.0}
-#: What a message says of Gamma.
+#: The end of messages about Gamma.
 _WHOSE = "it is a parameter of the law 'finite width', and of no other"
 
 
 class NoThreshold(ValueError):
-    """A mode that leaves no circle on which the law is regular."""
+    """A mode without a bifurcation on a circle on which the law is regular."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,11 @@ class Law:
     hamiltonian : callable
         H(M1, M2, M3, kappa_n, *parameters), with arithmetic and ``math`` only, unless ``gradient`` is given.
     constrained : bool
-        Whether omega_2 = 0 (then H does not depend on M2, which is a reaction).
+        True if omega_2 = 0 (then H does not depend on M2, which is a reaction).
     parameters : tuple of str
         The law's own parameters, in the order in which they are passed: ``nu``, and for some laws more.
     gradient : callable, optional
-        The response, where H is no expression that can be differentiated; made for compilation by `contin`.
+        The response, if H cannot be differentiated symbolically; prepared for compilation by `contin`.
     """
 
     name: str
@@ -56,12 +56,12 @@ class Law:
     parameters: tuple[str, ...] = ("nu",)
     gradient: Callable[..., tuple] | None = None
 
-    #: Whether Gamma is a parameter.
+    #: True if Gamma is a parameter.
     has_width: ClassVar[bool] = False
-    #: Whether the surface is ruled along d1 + eta d3, eta = omega_3/omega_1 (6a).
+    #: True if the surface is ruled along d1 + eta d3, eta = omega_3/omega_1 (6a).
     has_rulings: ClassVar[bool] = False
-    #: ``curvatures_at(omega_1, omega_3, p)`` = (U_11, U_13, U_33) for a law that ends where U is convex no further; None for
-    #: one whose H is a closed expression: its domain is known without.
+    #: ``curvatures_at(omega_1, omega_3, p)`` = (U_11, U_13, U_33) for a law that ends where U loses convexity; None for
+    #: a law whose H is a closed expression, because its domain is known.
     curvatures_at: ClassVar[Callable[..., tuple] | None] = None
 
     # --- parameters -------------------------------------------------------------------------------------------------------
@@ -72,7 +72,7 @@ class Law:
         return {name: _DEFAULTS[name] for name in self.parameters}
 
     def values(self, nu: float, Gamma: float | None = None) -> dict[str, float]:
-        """The law's parameters by name.
+        """Return the law's parameters by name.
 
         Raises
         ------
@@ -80,7 +80,7 @@ class Law:
             Gamma is missing, negative, or given to a law that has none.
         """
         if Gamma is not None:
-            raise ValueError(f"Gamma = {Gamma:g} stands beside a law without it: {_WHOSE}")
+            raise ValueError(f"Gamma = {Gamma:g} is given to a law without it: {_WHOSE}")
         return {"nu": nu}
 
     # --- strains ----------------------------------------------------------------------------------------------------------
@@ -90,7 +90,7 @@ class Law:
         """``response(M1, M2, M3, kappa_n, *parameters)`` = (H, omega_1, omega_2, omega_3, dH/dkappa_n), plain Python."""
         if self.gradient:
             return self.gradient
-        from contin import gradient  # loads numba (.3 s): a law can be had without its derivatives
+        from contin import gradient  # loads numba (.3 s), which a law without its derivatives does not need
 
         return gradient(self.hamiltonian, ("M1", "M2", "M3", "kappa_n"))
 
@@ -101,14 +101,14 @@ class Law:
         return lambda M1, M2, M3, p: response(M1, M2, M3, p.kappa_n, p.nu)
 
     def linearized(self, moments, kappa_n: float, *parameters: float):
-        """Strains (K, 3) and compliance D2H (K, 3, 3) at components of the moment on the directors (K, 3), by complex steps."""
+        """Return strains (K, 3) and compliance D2H (K, 3, 3) at moments on the directors (K, 3), by complex steps."""
         import numpy as np
 
         step = 1e-30
         arguments = np.repeat(np.asarray(moments).T[:, None].astype(complex), 3, axis=1)  # component, direction, place
         arguments[range(3), range(3)] += 1j * step
         shape = arguments.shape[1:]
-        if self.gradient:  # has loops and decisions: a place at a time
+        if self.gradient:  # it has loops and decisions: one place at a time
             places = [self.response(*moment, kappa_n, *parameters)[1:4] for moment in arguments.reshape(3, -1).T]
             strain = np.array(places, dtype=complex).T.reshape(3, *shape)
         else:  # the same code as plain Python's, on arrays
@@ -119,7 +119,7 @@ class Law:
     def strain_energy(self, strain, kappa_n: float, *parameters: float) -> tuple:
         """U, the moment dU/d(omega) and the stiffness D2U at strains (..., 3), for the descents of `ribbon_model.descent`.
 
-        A component omega_2 that a law has not is passed over; its moment here is 0.
+        If the law has omega_2 = 0, omega_2 is ignored and its moment is 0.
 
         Returns
         -------
@@ -128,7 +128,7 @@ class Law:
         Raises
         ------
         ValueError
-            A law that does not say.
+            A law without a strain energy.
         """
         raise ValueError(f"law {self.name!r} has no strain energy for descents")
 
@@ -139,7 +139,7 @@ class Law:
         return {"M1": m - kappa_n, "kappa_star": m, "energy": m * m / 2 - m * kappa_n}
 
     def prestress(self, ratio, nu, width=None):
-        """Moment of the circle in units of B / r0: 1 - kappa_n r0 (17a)."""
+        """Return the moment of the circle in units of B / r0: 1 - kappa_n r0 (17a)."""
         return 1 - ratio
 
     def tangent_moduli(self, ratio, nu, width=None) -> tuple:
@@ -163,7 +163,7 @@ class Law:
         raise ValueError(f"the law {self.name!r} has no closed formula here")
 
     def convex_limits(self, m: int, nu: float, Gamma: float | None = None) -> list[float]:
-        """The kappa_n r0 of m-covered circles where the law is regular no further, in any order."""
+        """Return the kappa_n r0 of m-covered circles at the limits where the law is regular, in any order."""
         return []
 
     # --- the unfolding arc ------------------------------------------------------------------------------------------------
@@ -178,11 +178,11 @@ class Law:
         return g, -xi, t * kappa, 1 / t + 0 * kappa
 
     def arc_end(self, nu: float, width: float | None = None) -> float | None:
-        """The smallest xi in (0, 1) where t vanishes, or None."""
+        """Return the smallest xi in (0, 1) where t vanishes, or None."""
         return None
 
     def passes_flat(self, nu: float) -> bool:
-        """Whether t is positive beyond the flat state, xi > 1."""
+        """Return whether t is positive beyond the flat state, xi > 1."""
         return True
 
 
@@ -255,7 +255,7 @@ class Ribbon(Law):
         return (m * (1 + 2 * s) / (1 + 2 * nu * s),)
 
     def convex_limits(self, m: int, nu: float, Gamma: float | None = None) -> list[float]:
-        """Where t = 0."""
+        """Return the ratio with t = 0."""
         return [1 / nu] if nu != 0 else []
 
     def arc(self, xi, nu, width=None) -> tuple:
@@ -274,7 +274,7 @@ class Rod(Law):
     """A rod: U is quadratic, with constant moduli."""
 
     def strain_energy(self, strain, kappa_n: float, nu: float) -> tuple:
-        """The inverse of the compliances, which are those at any moment."""
+        """Return the inverse of the compliances, which are those at any moment."""
         import numpy as np
 
         strain = np.asarray(strain)
@@ -303,7 +303,7 @@ class IsotropicRod(Rod):
         return 1.0, 1 / (1 + nu)
 
     def thresholds(self, m: int, n: int, nu: float, Gamma: float | None = None) -> tuple[float, ...]:
-        """M**2 - (1 + t) M - t s = 0."""
+        """Solve M**2 - (1 + t) M - t s = 0."""
         s, t = (n / m) ** 2 - 1, 1 / (1 + nu)
         root = math.sqrt((1 + t) ** 2 + 4 * t * s)
         values = (m * (1 - (1 + t - root) / 2), m * (1 - (1 + t + root) / 2))
@@ -387,7 +387,7 @@ class FiniteWidth(Law):
         return finite_width.convex_limits(nu, m * Gamma)
 
     def arc(self, xi, nu, width=None) -> tuple:
-        """A circle of curvature kappa that is naturally of curvature 1."""
+        """Return the values of a circle of curvature kappa whose natural curvature is 1."""
         import numpy as np
 
         kappa = 1 - xi
@@ -413,11 +413,11 @@ LAWS = PAPER_LAWS | {FINITE_WIDTH.name: FINITE_WIDTH}
 
 
 def label(law: str, Gamma: float | None = None) -> str:
-    """A law with its Gamma, if it has one, as one name."""
+    """Return a law with its Gamma, if it has one, as one name."""
     return law if Gamma is None else f"{law}, Gamma = {Gamma:.12g}"
 
 
 def from_label(name: str) -> tuple[Law, float | None]:
-    """The law and the Gamma of a `label`."""
+    """Return the law and the Gamma of a `label`."""
     law, _, Gamma = name.partition(", Gamma = ")
     return LAWS[law], float(Gamma) if Gamma else None

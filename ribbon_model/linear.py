@@ -1,13 +1,13 @@
 """Linear stability of the m-covered circle (section 6.2 of Audoly & Seffen 2015): bifurcations, intervals, index of the energy.
 
-kappa_n is in units of L = 2 pi, so kappa_n r0 = kappa_n / m on the m-covered circle. Two notions of stability are kept apart,
-because for the isotropic rod they disagree:
+kappa_n is in units of L = 2 pi, so kappa_n r0 = kappa_n / m on the m-covered circle. There are two notions of stability,
+which differ for the isotropic rod:
 
 - as published: every root (26b), b k**2 (1 - k**2) / c, is positive;
 - of the energy: its second variation has no negative direction. The balance (16c) has no rotational inertia, so where gc, the
   stiffness of a pure twist, is negative the published root can come out positive although the energy is not a minimum.
 
-For the ribbon, the flat rod and the law 'finite width' g is infinite, c = 1, and both say the same. Gamma, the last argument of
+For the ribbon, the flat rod and the law 'finite width' g is infinite, c = 1, and both agree. Gamma, the last argument of
 the functions here, is for the law 'finite width' only.
 """
 
@@ -21,7 +21,7 @@ from ribbon_model.laws import Law, NoThreshold
 
 
 def thresholds(law: Law, m: int, n: int, nu: float, Gamma: float | None = None) -> tuple[float, ...]:
-    """The values of kappa_n (L = 2 pi) where the mode of wavenumber n leaves the m-covered circle: m K, b = 0 in (25b).
+    """Return the values of kappa_n (L = 2 pi) where the mode of wavenumber n leaves the m-covered circle: m K, b = 0 in (25b).
 
     One value for the ribbon (equation (27)), the flat rod and the law 'finite width', two for the isotropic rod (nearer to
     kappa_n = m first).
@@ -46,7 +46,7 @@ def circle(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = No
 
 
 def covering(kappa_n: float, kappa_star: float, energy: float) -> int:
-    """Covering index of the circle that has these values, of any law.
+    """Return the covering index of the circle that has these values, of any law.
 
     The energy of a planar circle is a multiple of (omega_1 - kappa_n)**2, without kappa_n**2 / 2, so kappa_n**2 + 2 energy is
     (m - kappa_n) (kappa_star - kappa_n). Negative where the circle is curled against its natural curvature.
@@ -57,13 +57,13 @@ def covering(kappa_n: float, kappa_star: float, energy: float) -> int:
 
 
 def stability_interval(law: Law, m: int, nu: float, Gamma: float | None = None) -> tuple[float, float]:
-    """The kappa_n r0 around the natural state 1 for which the m-covered circle is linearly stable, as published (Fig. 10).
+    """Return the kappa_n r0 around the natural state 1 for which the m-covered circle is linearly stable (Fig. 10).
 
     On either side it ends at the threshold of n = m - 1 or m + 1: thresholds move away from 1 as n moves away from m.
-    The ribbon has, besides, the limit 1/nu where t = 0 and all high wavenumbers go unstable together; it comes first only
-    for nu < 0, m = 1. Infinite where nothing ends it. The boundary c = 0 of the isotropic rod never does: where c = 0,
+    The ribbon also has the limit 1/nu, where t = 0 and all high wavenumbers become unstable together; it comes first only
+    for nu < 0, m = 1. An end may be infinite. The boundary c = 0 of the isotropic rod is never an end: where c = 0,
     b (1 - k**2) = -(t k (1 - k**2))**2 / g, so the mode is unstable already. (Beyond c = 0 all published roots may become
-    positive again, at m = 2, nu = -.3 for instance: islands that are no minima of the energy.)
+    positive again, for example at m = 2, nu = -.3: these are not minima of the energy.)
 
     For the isotropic rod the energy of this interval need not be a minimum: see `energy_interval`.
 
@@ -84,11 +84,11 @@ def stability_interval(law: Law, m: int, nu: float, Gamma: float | None = None) 
 
 
 def energy_interval(law: Law, m: int, nu: float, Gamma: float | None = None) -> tuple[float, float]:
-    """The kappa_n r0 around 1 for which the energy of the m-covered circle is a minimum; raises as `stability_interval`.
+    """Return the kappa_n r0 around 1 for which the energy of the m-covered circle is a minimum; raises as `stability_interval`.
 
-    `stability_interval`, cut at kappa_n r0 = 1 - g: below it the moment of the circle, 1 - kappa_n r0, exceeds g and the strip
-    gains by turning over about its own centreline (n = 0, not among the modes of (26): it moves no mass). It matters for the
-    isotropic rod, g = 1, at m = 1: a ring cannot be stable inside out.
+    It is `stability_interval`, cut at kappa_n r0 = 1 - g: below that the moment of the circle, 1 - kappa_n r0, exceeds g, and
+    turning the strip about its own centreline lowers the energy (n = 0, not among the modes of (26): it moves no mass). This
+    affects the isotropic rod, g = 1, at m = 1: a ring cannot be stable inside out.
     """
     low, high = stability_interval(law, m, nu, Gamma)
     g, _ = law.tangent_moduli(1.0, nu, _width(law, m, nu, Gamma))
@@ -96,14 +96,14 @@ def energy_interval(law: Law, m: int, nu: float, Gamma: float | None = None) -> 
 
 
 def index(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = None) -> float:
-    """Number of negative directions of the energy of the m-covered circle, closed loops only; kappa_n for L = 2 pi.
+    """Return the number of negative directions of the energy of the m-covered circle, closed loops only; kappa_n for L = 2 pi.
 
     Each wavenumber n counts twice, cosine and sine. With b, c of (25) the quadratic form of (psi_2, psi_3) has the determinant
     g b (1 - k**2) and the diagonal term g c, so it has
 
     - one negative direction where b (1 - k**2) < 0; two where c < 0 instead; none otherwise;
     - n = m: one where c < 0 (the other is the rigid rotation);
-    - n = 0: one, once, where c < 0: turning over about the centreline (uniform psi_2 would open the loop).
+    - n = 0: one, once, where c < 0: turning about the centreline (uniform psi_2 would open the loop).
 
     For g infinite c = 1 and only the sign of b (1 - k**2) counts. In-plane perturbations never lower the energy while the
     tangent bending modulus is positive, which it is for the laws of the paper.
@@ -117,7 +117,7 @@ def index(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = Non
     Raises
     ------
     ValueError
-        As `stability_interval`. On a bifurcation itself the zero directions are not counted.
+        See `stability_interval`. On a bifurcation the zero directions are not counted.
     """
     _check(m, nu)
     ratio, width = kappa_n / m, _width(law, m, nu, Gamma)

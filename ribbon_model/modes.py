@@ -1,4 +1,4 @@
-"""Critical modes of a primary branch (m, n): which symmetry they break, and which one a branch that leaves by them keeps.
+"""Critical modes of a primary branch (m, n): the symmetry that they break, and the one that a new branch keeps.
 
 The symmetries of a primary branch are the rotary reflection that takes S to S + L/2n, and reversals of S: n mirrors, about
 S = 0, L/2n, L/n ..., and n two-fold axes along d2, half-way between. A mode of the class of wavenumber j (`stability`) turns
@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-#: What a reversal is called.
+#: Names of the reversals.
 REVERSALS = {"mirror": "mirror", "axis": "two-fold axis"}
 
 
@@ -40,12 +40,12 @@ class Mode:
 
     @classmethod
     def parse(cls, n: int, text: str) -> Mode:
-        """The mode that a scene or a file names, as `str` does.
+        """Return the mode that a scene or a file names, as `str` does.
 
         Raises
         ------
         ValueError
-            It is no mode of a branch of wavenumber n.
+            It is not a mode of a branch of wavenumber n.
         """
         known = [cls(n, j, parity) for j in (0, n) for parity in ("even", "odd")][1:]  # (0, even) keeps all symmetry
         known += [cls(n, j, "") for j in range(1, n)]
@@ -57,7 +57,7 @@ class Mode:
 
     @property
     def dimension(self) -> int:
-        """Of the kernel."""
+        """Dimension of the kernel."""
         return 2 if 0 < self.wavenumber < self.n else 1
 
     @property
@@ -81,11 +81,11 @@ class Mode:
 
     @property
     def symmetric(self) -> bool:
-        """Whether the two ways to leave along a mode are images of each other (a pitchfork)."""
+        """True if the two directions along a mode are images of each other (a pitchfork)."""
         return self._order % 2 == 0 or self.wavenumber == 0
 
     def kept(self, reversal: str) -> str:
-        """The symmetry of an emanating branch, in words."""
+        """Return the symmetry of an emanating branch, in words."""
         mirrors, axes = self._reversals(reversal)
         words = [_counted(mirrors, "mirror", "mirrors"), _counted(axes, "two-fold axis", "two-fold axes")]
         if self.repeats > 1:
@@ -93,13 +93,13 @@ class Mode:
         return ", ".join(filter(None, words))
 
     def broken(self, reversal: str) -> str:
-        """What an emanating branch has lost of the symmetry of the primary one, in words."""
+        """Return the symmetries of the primary branch that an emanating branch breaks, in words."""
         mirrors, axes = (self.n - number for number in self._reversals(reversal))
         words = [_counted(mirrors, "mirror", "mirrors"), _counted(axes, "two-fold axis", "two-fold axes")]
         return ", ".join([*filter(None, words), f"{2 * self.n}-fold rotary reflection"])
 
     def _reversals(self, reversal: str) -> tuple[int, int]:
-        """Numbers of mirrors and of two-fold axes that are kept."""
+        """Return the numbers of mirrors and of two-fold axes that are kept."""
         if self._order % 2:
             return self.repeats // 2, self.repeats // 2
         return (self.repeats, 0) if reversal == "mirror" else (0, self.repeats)

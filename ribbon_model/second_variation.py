@@ -1,8 +1,8 @@
-"""What the second variation of the energy at an equilibrium needs: the equilibrium along the whole loop, and the form itself.
+"""The second variation of the energy at an equilibrium: the equilibrium along the whole loop, and the form itself.
 
-The frame is perturbed by a rotation theta(S), components on the lab axes, periodic because a closed frame is: whether the
-quaternion comes back to itself or to its negative plays no part. With u = theta', the strains change by u on the directors, so
-omega_2 = 0 asks for u . d2 = 0; x changes by theta x x - w with w' = u x x, so the loop stays closed if the means of u and w'
+The frame is perturbed by a rotation theta(S), with components on the lab axes. It is periodic because a closed frame is; the
+sign of the quaternion after one loop has no effect. With u = theta', the strains change by u on the directors, so
+omega_2 = 0 requires u . d2 = 0; x changes by theta x x - w with w' = u x x, so the loop stays closed if the means of u and w'
 vanish. With K = D2H = C C^T, u = sum of d_a (C v)_a, E = (theta, w) in R^6, and the constant
 
     N = [[mu x, -R x], [-R x, 0]],   mu = M + x x R,
@@ -35,7 +35,7 @@ _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
 #: Degree on the mesh of a circle, and the phase in radians by which the highest wave of interest turns on an interval: there
 #: the error of 8 Gauss points is (8! / 16!)^2 2^17 / 17 = 3e-14. With ten times the phase the wave would not be resolved.
 _CIRCLE_DEGREE, _PHASE = 8, 2.0
-#: Length, relative to the loop, and winding may be off by this much. A guess beside a branch has some defect; half a turn more
+#: Length, relative to the loop, and winding may be off by this much. A guess near a branch has some defect; half a turn more
 #: would be another winding number.
 _LENGTH_DEFECT, _WINDING_DEFECT = 1e-6, 0.25
 
@@ -47,15 +47,15 @@ class Symmetry:
     Attributes
     ----------
     order : int
-        Equal parts that the loop consists of, of length L / order.
+        Number of equal parts of the loop, of length L / order.
     winding : int
         From one part to the next the frame turns by 2 pi winding / order about e3.
     flip : bool
-        Whether d2 and d3 change sign besides (on the frame this is a half turn about d1; in space, a rotary reflection).
+        True if d2 and d3 also change sign (on the frame this is a half turn about d1; in space, a rotary reflection).
     mirror : bool
         Mirror symmetry at S = 0: d_i(-S) is the image of d_i(S), -d3(S) for i = 3.
     axis : bool
-        In its place, a two-fold axis along d2 at S = 0: d_i(-S) is the image of -d_i(S), d2(S) for i = 2.
+        Two-fold axis along d2 at S = 0 instead of a mirror: d_i(-S) is the image of -d_i(S), d2(S) for i = 2.
     """
 
     order: int = 1
@@ -66,7 +66,7 @@ class Symmetry:
 
     @property
     def reverses(self) -> bool:
-        """Whether there is a symmetry that takes S to -S."""
+        """True if there is a symmetry that takes S to -S."""
         return self.mirror or self.axis
 
 
@@ -100,18 +100,20 @@ class Equilibrium:
     Gamma: float | None = None
 
     def response(self, moment):
-        """Strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""
+        """Return the strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""
         values = self.law.values(self.nu, self.Gamma).values()
         if not self.law.gradient:
             return self.law.linearized(moment, self.kappa_n, *values)
-        batch, colours = _compiled(self.law)  # a response with loops and decisions, a hundred times faster than in plain Python
+        batch, colours = _compiled(
+            self.law
+        )  # compiled, a response with loops and decisions is a hundred times faster than in plain Python
         arguments = np.ascontiguousarray(moment), np.empty((0, 3)), np.array([self.kappa_n, *values])
         return batch.jacobian(np.zeros(len(moment)), *arguments, colours)
 
 
 @functools.cache
 def _compiled(law: Law) -> tuple:
-    """The strains of a law as compiled functions of M1, M2, M3, and the colouring of their Jacobian."""
+    """Return the strains of a law as compiled functions of M1, M2, M3, and the colouring of their Jacobian."""
     response = law.response_at
 
     def strains(u, p):
@@ -123,19 +125,19 @@ def _compiled(law: Law) -> tuple:
 
 
 def coupling(moment, force) -> np.ndarray:
-    """The antisymmetric matrix N (6, 6) of the constants mu and R (3,)."""
+    """Return the antisymmetric matrix N (6, 6) of the constants mu and R (3,)."""
     matrix = np.zeros((6, 6))
     matrix[:3, :3], matrix[:3, 3:], matrix[3:, :3] = cross_matrix(moment), -cross_matrix(force), -cross_matrix(force)
     return matrix
 
 
 def cross_matrix(a) -> np.ndarray:
-    """The matrix (3, 3) of a x."""
+    """Return the matrix (3, 3) of a x."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
 def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = None) -> Equilibrium:
-    """The planar m-covered circle, on a uniform mesh that is fine enough for the highest wavenumber that can lower the energy.
+    """Return the planar m-covered circle, on a uniform mesh that resolves the highest wavenumber that can lower the energy.
 
     A wave of wavenumber l has theta ~ u / l. The moment M, along d1, contributes |M| m |K| / l^2 of the stiffness and, where
     omega_2 is free, |M| |K| / l: above l^2 = m^2 + |M| m |K| (+ |M|^2 |K|^2) nothing is unstable.
@@ -167,7 +169,7 @@ def circle(law: Law, nu: float, m: int, kappa_n: float, Gamma: float | None = No
 
 
 def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: Mapping[str, float]) -> Equilibrium:
-    """The equilibrium from the solution on a domain; arguments as `solution.Solution`, which is where to ask for it.
+    """Return the equilibrium from the solution on a domain; arguments as for `solution.Solution`, whose method calls this.
 
     Raises
     ------
@@ -193,12 +195,12 @@ def from_solution(law: Law, domain: Domain, t, states, degree: int, parameters: 
 
 
 def _whole(sample, length):
-    """Lab axes (rows), directors and symmetry of a loop of which no symmetry is known."""
+    """Return the lab axes (rows), directors and symmetry of a loop of which no symmetry is known."""
     return np.eye(3), lambda stations: sample(np.mod(stations, LENGTH) / LENGTH), Symmetry()
 
 
 def _unfolded_half(between_axes: bool, sample, length):
-    """The same of a half loop between mirrors, or between two-fold axes."""
+    """Return lab axes, directors and symmetry of a half loop between mirrors, or between two-fold axes."""
     first = sample(np.zeros(1))[0]
     axes = np.array([first[1], first[2], first[0]] if between_axes else [first[2], -first[1], first[0]])
     image = np.diag([1.0, -1.0, -1.0]) if between_axes else np.diag([-1.0, 1.0, 1.0])
@@ -215,10 +217,10 @@ def _unfolded_half(between_axes: bool, sample, length):
 
 
 def _unfolded_cell(sample, length):
-    """The same of a quarter wave: an image under the two-fold axis d2 at its end, then half waves one after the other."""
+    """Return lab axes, directors and symmetry of a quarter wave: its image under the axis d2 at its end, then half waves."""
     first, last = sample(np.array([0.0, 1.0]))
     normal = np.cross(first[2], last[1])
-    if np.linalg.norm(normal) < 1e-6:  # then nothing turns from part to part, and any axis in the mirror plane will do
+    if np.linalg.norm(normal) < 1e-6:  # no rotation from part to part, so any axis in the mirror plane can be taken
         normal = first[0]
     normal /= np.linalg.norm(normal)
     axes = np.array([first[2], np.cross(normal, first[2]), normal])
@@ -244,7 +246,7 @@ def _unfolded_cell(sample, length):
     return axes, directors, Symmetry(order, round(winding) % order, flip=True, mirror=True)
 
 
-#: How a solution on a domain unfolds: ``(axes, directors, symmetry)`` from its directors and its length.
+#: Functions that unfold a solution on a domain: ``(axes, directors, symmetry)`` from its directors and its length.
 _UNFOLDED: dict[Domain, Callable] = {
     CELL: _unfolded_cell, HALF_LOOP: functools.partial(_unfolded_half, False),
     HALF_LOOP_BETWEEN_AXES: functools.partial(_unfolded_half, True), LOOP: _whole,

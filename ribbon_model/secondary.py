@@ -1,11 +1,11 @@
-"""Secondary branches: from a change of the index of a primary branch to the first point of a branch that leaves there.
+"""Secondary branches: the first point of a branch that leaves a primary branch where its index changes.
 
-`ribbon_model.modes` says what symmetry is left. A reversal that is kept fixes two places half a loop apart, so the branch is an
-ordinary one on the half loop between mirrors or between axes, where its kernel is simple. Modes of j = 0 that are odd keep no
+`ribbon_model.modes` determines the symmetry of the branch. A reversal that it keeps fixes two points half a loop apart, so the
+branch is computed on the half loop between mirrors or between axes, where its kernel is simple. Odd modes of j = 0 keep no
 reversal, and need the whole loop.
 
-Where R = 0 the equations are integrable and every wave has all symmetries of a primary branch. So the force tells a secondary
-branch from a primary one: it vanishes where they meet, and nowhere else for the laws with omega_2 = 0.
+Where R = 0 the equations are integrable and every wave has all symmetries of a primary branch. So the force
+distinguishes a secondary branch: for the laws with omega_2 = 0 it vanishes only where it meets a primary branch.
 """
 
 from __future__ import annotations
@@ -18,30 +18,30 @@ from contin import locate_branch_point
 from ribbon_model.domains import Domain
 from ribbon_model.solution import Solution
 
-#: The bifurcation on the half loop lies this near to where it is looked for, relative to 1 + |kappa_n|.
+#: Largest distance of the bifurcation on the half loop from the start of its search, relative to 1 + |kappa_n|.
 _NEAR = 1e-4
 
 
 def force(point) -> float:
-    """|R| of a point (or alike) of a branch: zero on a primary branch and on a circle."""
+    """Return |R| of a point (or similar object) of a branch: zero on a primary branch and on a circle."""
     return math.hypot(*(point[name] for name in ("R1", "R2", "R3")))
 
 
 def secondary_branch(solution: Solution, domain: Domain):
-    """Where a secondary branch leaves a primary one, near a solution on the cell, on the half loop that keeps its reversal.
+    """Return the point where a secondary branch leaves a primary one, near a solution on the cell, on a half loop.
 
     Returns
     -------
     system : Collocation
     x : ndarray, shape (system.size,)
-        The bifurcation, as the discrete equations of the half loop have it.
+        The bifurcation of the discrete equations of the half loop.
     tangent : ndarray, shape (system.size,)
         Along the branch that leaves.
 
     Raises
     ------
     ConvergenceError, ValueError
-        Nothing that keeps this reversal leaves near there.
+        No branch that keeps this reversal leaves nearby.
     """
     system, x = solution.on(domain).discretized()
     found = locate_branch_point(system, x)

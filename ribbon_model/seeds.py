@@ -1,4 +1,4 @@
-"""From a linear mode of the circle to the first point of its branch."""
+"""The first point of a branch, from a linear mode of the circle."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ribbon_model.linear import circle, thresholds
 
 
 def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, degree: int = 4, root: int = 0, Gamma=None):
-    """Where the branch (m, n) leaves the m-covered circle, on the cell.
+    """Return the point where the branch (m, n) leaves the m-covered circle, on the cell.
 
     The linear theory gives kappa_n; the discrete equations then give their own branch point there, and the tangent of the
     branch that leaves.
@@ -22,7 +22,7 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
     x : ndarray, shape (system.size,)
         The circle at the bifurcation.
     tangent : ndarray, shape (system.size,)
-        Along the branch, towards M2 > 0.
+        Tangent of the branch, towards M2 > 0.
 
     Raises
     ------
@@ -37,14 +37,14 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
 
 
 def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, degree: int = 4, root: int = 0, Gamma=None):
-    """Like `primary_branch`, on the half loop, where all wavenumbers live together."""
+    """Return the same as `primary_branch` on the half loop, which has all wavenumbers."""
     kappa_n = thresholds(law, m, n, nu, Gamma)[root]
     system = HALF_LOOP.discretize(law, intervals, degree, law.values(nu, Gamma))
     return leave_circle(system, HALF_LOOP.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
 
 
 def leave_circle(system: Collocation, circle: np.ndarray):
-    """The branch point at a circle, and the tangent that is not the circle's own."""
+    """Return the branch point at a circle, and the tangent that is not the circle's own."""
     found = locate_branch_point(system, circle)
     if not found.tangents:
         raise ValueError("no branch leaves the circle there")

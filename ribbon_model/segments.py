@@ -1,7 +1,7 @@
 """A closed strip of segments, on each of which the strains are constant: energy, closure and their exact derivatives.
 
 The loop is cut into N segments of length h. On each the frame turns about a fixed axis and the centreline is an arc of a helix,
-both in closed form. Closure is six conditions, that the frame and the centreline come back. So every closed strip of this kind
+both in closed form. Closure is six conditions: the frame and the centreline are periodic. So every closed strip of this kind
 is a state of the continuous strip, and its energy, the mean of U(omega), exceeds the minimum over all by O(h**2). For the laws
 with omega_2 = 0 the unknowns are omega_1 and omega_3.
 """
@@ -19,11 +19,11 @@ from ribbon_model.laws import Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
 from ribbon_model.shape import Shape
 
-_CLOSED = 1e-12  # what is left of the conditions of closure
+_CLOSED = 1e-12  # tolerance of the conditions of closure
 
 # in powers of z = p**2: sin(p)/p, f = (1 - cos p)/p**2, 2 f', 4 f'', g = (p - sin p)/p**3, 2 g', 4 g''; exact for |p| < pi
 _SERIES = np.array([[(-1) ** k / math.factorial(2 * k + i) for k in range(15)] for i in (1, 2, 3)])
-_BY_Z = np.diag(np.arange(1.0, 15), -1)  # a row of coefficients times this: those of the derivative
+_BY_Z = np.diag(np.arange(1.0, 15), -1)  # a row of coefficients times this gives those of the derivative
 _SERIES = np.array(
     [row @ np.linalg.matrix_power(2 * _BY_Z, order) for row, orders in zip(_SERIES, (1, 3, 3)) for order in range(orders)]
 ).T
@@ -35,7 +35,7 @@ _GENERATORS = np.array([cross_matrix(axis) for axis in np.eye(3)])
 
 
 def _turn(a):
-    """Of rotation vectors (K, 3): the series (7, K), cross matrix, its square, the rotation, its mean on the way; (K, 3, 3)."""
+    """Return, for rotation vectors (K, 3), the series (7, K), cross matrix, its square, rotation and its mean; (K, 3, 3)."""
     series = (np.vander(np.sum(a * a, axis=1), 15, increasing=True) @ _SERIES).T
     sine, f, _, _, g = series[:5, :, None, None]
     cross = np.einsum("kb,bij->kij", a, _GENERATORS)
@@ -57,7 +57,7 @@ class Strip:
     strains : ndarray, shape (N, 3)
         Components of omega on the directors, segment by segment.
     Gamma : float, optional
-        Of a law that has one.
+        Gamma of a law that has one.
     """
 
     law: Law
@@ -103,7 +103,7 @@ class Strip:
 
     @cached_property
     def _local(self):
-        """a = h omega, and what `_turn` gives for it."""
+        """a = h omega, and `_turn` of it."""
         a = self.segment * self.strains
         return a, *_turn(a)
 
@@ -134,7 +134,7 @@ class Strip:
 
     @cached_property
     def turning(self) -> np.ndarray:
-        """Rotation vectors (N, 3, 3), component by column, that a unit of each strain gives to all that follows."""
+        """Rotation vectors (N, 3, 3), component by column, by which a unit of each strain rotates all later segments."""
         return self.segment * self.axes[:-1] @ self._local[5]
 
     @cached_property
@@ -156,7 +156,7 @@ class Strip:
 
     @cached_property
     def own(self) -> np.ndarray:
-        """What a unit of each strain adds to the step of its own segment, shape (N, 3, 3), component by column."""
+        """Change of a segment's own step by a unit of each strain, shape (N, 3, 3), component by column."""
         return self.segment**2 * np.einsum("kij,kbj->kib", self.axes[:-1], self._slopes[0][..., 2])
 
     @cached_property
@@ -168,10 +168,10 @@ class Strip:
         return np.concatenate([turning, shift], axis=1).transpose(1, 0, 2)
 
     def closure_curvature(self, multipliers) -> np.ndarray:
-        """Second derivatives of multipliers . closure by the strains on a closed strip, shape (N, 3, N, 3)."""
+        """Return the second derivatives of multipliers . closure by the strains on a closed strip, shape (N, 3, N, 3)."""
         rotation, position = np.split(np.asarray(multipliers), 2)
         turning, shift = self.turning, self.closure_slopes[3:].transpose(1, 0, 2)
-        # a segment turns all that follows: its rotation vector times what a later one does
+        # a segment rotates all later ones: its rotation vector times the effect of a later one
         lever = -cross_matrix(position) @ shift - cross_matrix(rotation) @ turning / 2
         count = len(turning)
         later = np.triu(np.ones((count, count)), 1)[:, None, :, None]
@@ -189,9 +189,9 @@ class Strip:
         return result
 
     def linearized(self):
-        """Moments (n,), slopes of closure (6, n) and the Hessian of the Lagrangian (n, n) by the free strains, times N.
+        """Return moments (n,), slopes of closure (6, n) and Hessian of the Lagrangian (n, n) by the free strains, times N.
 
-        The multipliers are those that leave the least gradient.
+        The multipliers minimize the gradient.
         """
         free, count = self.free, len(self.strains)
         _, moment, stiffness = self.density
@@ -203,12 +203,12 @@ class Strip:
         return gradient, slopes, hessian.reshape(len(gradient), -1), multipliers
 
     def moved(self, change) -> Strip:
-        """The strip with the free strains changed by (n,), closed again by the smallest further change.
+        """Return the strip with the free strains changed by (n,), closed again by the smallest further change.
 
         Raises
         ------
         ValueError
-            It cannot be closed from there.
+            It cannot be closed.
         """
         strip = self._changed(change)
         for _ in range(12):
@@ -221,7 +221,7 @@ class Strip:
         raise ValueError("the strip cannot be closed by a small change of its strains")
 
     def along(self, stations) -> tuple[np.ndarray, np.ndarray]:
-        """Directors (K, 3, 3), as columns, and centreline (K, 3) at places S in [0, L]."""
+        """Return the directors (K, 3, 3), as columns, and centreline (K, 3) at places S in [0, L]."""
         number = np.minimum((np.asarray(stations) / self.segment).astype(int), len(self.strains) - 1)
         part = np.asarray(stations) - number * self.segment
         first, (*_, turn, mean) = self.axes[number], _turn(part[:, None] * self.strains[number])
@@ -229,9 +229,9 @@ class Strip:
         return first @ turn, x
 
     def shape(self, places: int = 401) -> Shape:
-        """The strip in space at ``places`` equally spaced S from 0 to L; eta interpolated between the middles of the segments.
+        """Return the strip in space at ``places`` equally spaced S; eta is interpolated between the middles of the segments.
 
-        Rods have no rulings: eta is 0.
+        Rods have no generators: eta is 0.
         """
         stations = np.linspace(0, LENGTH, places)
         axes, x = self.along(stations)
@@ -248,7 +248,7 @@ class Strip:
 
 
 def discretized(equilibrium: Equilibrium, segments: int) -> Strip:
-    """The strip that has the strains of an equilibrium in the middle of each segment, closed.
+    """Return the strip that has the strains of an equilibrium in the middle of each segment, closed.
 
     Raises
     ------

@@ -31,7 +31,7 @@ class Shape:
     eta: np.ndarray
 
     def closure(self) -> float:
-        """The largest difference between the two ends, in position and directors."""
+        """Return the largest difference between the two ends, in position and directors."""
         gap = np.abs(self.centreline[-1] - self.centreline[0]).max()
         return float(max(gap, np.abs(self.directors[-1] - self.directors[0]).max()))
 
@@ -41,7 +41,7 @@ class Shape:
         return self.centreline[:, None] + np.linspace(-0.5, 0.5, across)[:, None] * width * ruling[:, None]
 
     def upright(self) -> np.ndarray:
-        """The rotation, shape (3, 3), from the lab axes to axes on which the strip stands upright and looks to one side.
+        """Return the rotation, shape (3, 3), from the lab axes to axes on which the strip stands upright and looks to one side.
 
         Its rows are the new axes on the lab axes. The third is that of the area that the centreline encloses: on branches from
         a circle it is the direction of the moment. The second is d3 at the beginning, as far as it is perpendicular to that.
@@ -54,13 +54,13 @@ class Shape:
         return np.array([np.cross(side, up), side, up])
 
     def placed(self, length: float) -> Shape:
-        """The closed strip scaled to a length, upright, with the middle of its centreline at the origin."""
+        """Return the closed strip scaled to a length, upright, with the middle of its centreline at the origin."""
         axes, scale = self.upright(), length / (self.arclength[-1] - self.arclength[0])
         x = (self.centreline - self.centreline.mean(axis=0)) @ axes.T * scale
         return Shape(self.arclength * scale, x, self.directors @ axes.T, self.eta)
 
     def turned(self) -> Shape:
-        """The part and its image under the two-fold axis along d2 at its end."""
+        """Return the part and its image under the two-fold axis along d2 at its end."""
         axis, centre = self.directors[-1, 1], self.centreline[-1]
         turn = 2 * np.outer(axis, axis) - np.eye(3)
         x = (self.centreline[-2::-1] - centre) @ turn + centre
@@ -69,7 +69,7 @@ class Shape:
         return self._joined(Shape(s, x, d, self.eta[-2::-1]))
 
     def mirrored(self) -> Shape:
-        """Both sides of the mirror normal to d3 at S = 0, starting at the far end."""
+        """Return both sides of the mirror normal to d3 at S = 0, starting at the far end."""
         normal = self.directors[0, 2]
         mirror = np.eye(3) - 2 * np.outer(normal, normal)
         x = self.centreline[:0:-1] @ mirror
@@ -78,7 +78,7 @@ class Shape:
         return Shape(whole.arclength - whole.arclength[0], whole.centreline, whole.directors, whole.eta)
 
     def repeated(self, copies: int, axis, centre, angle: float) -> Shape:
-        """Copies one after the other, each turned by ``angle`` about the unit vector ``axis`` (3,) through ``centre`` (3,)."""
+        """Return copies one after the other, each rotated by ``angle`` about the unit vector ``axis`` (3,) at ``centre``."""
         cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
         result = self
         for copy in range(1, copies):
@@ -95,7 +95,7 @@ class Shape:
 
 
 def frames(states) -> np.ndarray:
-    """Directors (K, 3, 3), rows d1, d2, d3 on the lab axes, from states (K, >= 4) that begin with the quaternion."""
+    """Return the directors (K, 3, 3), rows d1, d2, d3 on the lab axes, from states (K, >= 4) that begin with the quaternion."""
     q = np.asarray(states)[:, :4].T
     return np.array(directors(*q)).T.reshape(-1, 3, 3) / np.sum(q * q, axis=0)[:, None, None]
 
@@ -120,7 +120,7 @@ def quaternions(directors) -> np.ndarray:
 
 
 def quadrature_centreline(t, states, degree: int, length: float) -> np.ndarray:
-    """x at the nodes, shape (K, 3), x(0) = 0: the integral of d3, by the Gauss points of each interval."""
+    """Return x at the nodes, shape (K, 3), x(0) = 0: the integral of d3, by the Gauss points of each interval."""
     tables = basis(degree)
     h = np.diff(t[::degree])
     nodal = np.stack([states[i : i + (len(h) - 1) * degree + 1 : degree, :4] for i in range(degree + 1)], axis=1)

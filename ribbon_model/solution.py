@@ -1,4 +1,4 @@
-"""A solution that knows itself: law, domain, states and parameters in one object, and what follows from them."""
+"""A solution: law, domain, states and parameters in one object, and the quantities that follow from them."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class Solution:
 
     @classmethod
     def of(cls, point: Point) -> Solution:
-        """The solution at a point of a branch (or alike: anything with ``system`` and ``x``)."""
+        """Return the solution at a point of a branch (or alike: anything with ``system`` and ``x``)."""
         return cls.at(point.system, point.x)
 
     @classmethod
     def at(cls, system: Collocation, x: np.ndarray) -> Solution:
-        """The solution that unknowns x (system.size,) of a discretized `domains.StripProblem` stand for."""
+        """Return the solution that unknowns x (system.size,) of a discretized `domains.StripProblem` stand for."""
         problem = system.problem
         parameters = dict(zip(problem.parameters, map(float, system.all_parameters(x))))
         return cls(problem.law, problem.on, system.nodes, system.states(x), system.degree, parameters)
@@ -81,7 +81,7 @@ class Solution:
         return self.parameters["kappa_n"], *(self.parameters[name] for name in self.law.parameters)
 
     def loads(self) -> tuple[np.ndarray, np.ndarray]:
-        """Components of M and R on the directors at the nodes, shape (K, 3) each."""
+        """Return the components of M and R on the directors at the nodes, shape (K, 3) each."""
         force, moment = self.force, self.moment
         if self.states.shape[1] > 4:
             moment = moment - np.cross(self.states[:, 4:7], force)
@@ -94,13 +94,13 @@ class Solution:
         return np.array([self.law.response(*m, *self.material)[1:4] for m in self.loads()[0]])
 
     def invariants(self) -> dict[str, np.ndarray]:
-        """What equilibrium keeps constant, at the nodes: ``norm`` |q|^2 and ``hamiltonian`` H(M) + R3, shape (K,) each."""
+        """Return the constants of motion at the nodes: ``norm`` |q|^2 and ``hamiltonian`` H(M) + R3, shape (K,) each."""
         moment, force = self.loads()
         values = [self.law.response(*m, *self.material)[0] for m in moment]
         return {"norm": np.sum(self.states[:, :4] ** 2, axis=1), "hamiltonian": np.array(values) + force[:, 2]}
 
     def shape(self) -> Shape:
-        """The closed strip in space, unfolded by the symmetries of the domain."""
+        """Return the closed strip in space, unfolded by the symmetries of the domain."""
         length, states = self.parameters["length"], self.states
         x = states[:, 4:7] if states.shape[1] > 4 else quadrature_centreline(self.t, states, self.degree, length)
         omega = self.strains()
@@ -108,11 +108,11 @@ class Solution:
         return self.domain.whole(part, self.parameters)
 
     def equilibrium(self) -> Equilibrium:
-        """The equilibrium along the whole loop, for its second variation; raises as `from_solution`."""
+        """Return the equilibrium along the whole loop, for its second variation; raises as `from_solution`."""
         return from_solution(self.law, self.domain, self.t, self.states, self.degree, self.parameters)
 
     def index(self) -> Stability:
-        """Number of negative directions of the energy; see `ribbon_model.stability.index`."""
+        """Return the number of negative directions of the energy; see `ribbon_model.stability.index`."""
         return stability.index(self.equilibrium())
 
     def functionals(self) -> dict[str, float]:
@@ -121,17 +121,17 @@ class Solution:
         return dict(zip(system.problem.functionals, map(float, system.functionals(x))))
 
     def on(self, domain: Domain) -> Solution:
-        """The same strip on another domain: a solution on the cell on a half loop, or any on the whole loop.
+        """Return the same strip on another domain: a solution on the cell on a half loop, or any on the whole loop.
 
         Raises
         ------
         ValueError
-            A domain that the strip cannot be carried to from its own.
+            A solution on this domain cannot be transferred to the other one.
         """
         if self.domain is domain:
             return self
         if domain is not LOOP and self.domain is not CELL:
-            raise ValueError(f"a solution on the {self.domain.name} is not carried to the {domain.name}")
+            raise ValueError(f"a solution on the {self.domain.name} cannot be transferred to the {domain.name}")
         shape = self.shape()
         period = len(shape.arclength) - 1
         first, last = domain.stretch(period, len(self.t) - 1)
@@ -147,7 +147,7 @@ class Solution:
         return Solution(self.law, domain, s / s[-1], states, self.degree, {**domain.problem(self.law).parameters, **values})
 
     def discretized(self) -> tuple[Collocation, np.ndarray]:
-        """The system on the mesh of the solution, with the domain's free parameters, and its unknowns (system.size,)."""
+        """Return the system on the mesh of the solution, with the domain's free parameters, and its unknowns (system.size,)."""
         mesh = np.append(self.t[: -1 : self.degree], 1.0)
         system = Collocation(self.domain.problem(self.law), mesh, self.degree, self.domain.free, self.parameters)
         return system, system.pack(self.states, self.parameters)

@@ -57,7 +57,7 @@ class SymmetryClass:
     Attributes
     ----------
     wavenumber : int
-        j: from one part of the loop to the next the perturbation gains the factor exp(2 pi i j / order), besides the motion
+        j: from one part of the loop to the next the perturbation is multiplied by exp(2 pi i j / order), after the motion
         that takes one part to the next. j = 0 keeps the symmetry.
     parity : str
         'even' or 'odd' under the mirror (or two-fold axis) at S = 0; '' where that takes j to another class, or there is none.
@@ -75,7 +75,7 @@ class SymmetryClass:
 
     @property
     def name(self) -> tuple[int, str]:
-        """What tells the class from the others of the same loop."""
+        """The name of the class: wavenumber and parity."""
         return self.wavenumber, self.parity
 
     @property
@@ -93,7 +93,7 @@ class SymmetryClass:
 
     @property
     def nearest(self) -> int:
-        """Which eigenvalue is nearest to zero."""
+        """The number of the eigenvalue nearest to zero."""
         return int(np.argmin(np.abs(self.eigenvalues)))
 
 
@@ -108,11 +108,11 @@ class Stability:
     decided : bool
         False where an eigenvalue is zero as far as the state is known, or the loop is not closed.
     reason : str
-        If not decided: what could not be told.
+        The reason if it is not decided.
     residual : float
         |Q| of the shift of phase over |v|^2. It would be zero without discretization: this is the error of eigenvalues.
     gap : float
-        By how much the loop does not close.
+        Gap of the loop; zero if it is closed.
     classes : tuple of SymmetryClass
     """
 
@@ -124,17 +124,17 @@ class Stability:
     classes: tuple[SymmetryClass, ...]
 
     def __getitem__(self, name: tuple[int, str]) -> SymmetryClass:
-        """A class by its ``name``."""
+        """Return a class by its ``name``."""
         return next(entry for entry in self.classes if entry.name == tuple(name))
 
     @property
     def critical(self) -> SymmetryClass:
-        """The class that has the eigenvalue nearest to zero."""
+        """The class with the eigenvalue nearest to zero."""
         return min(self.classes, key=lambda entry: abs(entry.eigenvalues[entry.nearest]))
 
 
 def index(equilibrium: Equilibrium) -> Stability:
-    """Number of negative directions of the energy of a closed equilibrium, on the mesh of the equilibrium.
+    """Return the number of negative directions of the energy of a closed equilibrium, on the mesh of the equilibrium.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def index(equilibrium: Equilibrium) -> Stability:
         nearest = entry.eigenvalues[entry.nearest]
         if abs(nearest) <= floor:
             label = f"class {entry.wavenumber} {entry.parity}".strip()
-            reasons.append(f"{label}: an eigenvalue {nearest:.1e} cannot be told from zero")
+            reasons.append(f"{label}: an eigenvalue {nearest:.1e} cannot be distinguished from zero")
     total = sum(entry.multiplicity * entry.negative for entry in classes)
     return Stability(total, not reasons, "; ".join(reasons), form.residual, points.gap, classes)
 
@@ -175,7 +175,7 @@ class _Points:
 
 
 def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
-    """Frame, centreline by the collocation's own quadrature, strains and compliance, and what Q is made of."""
+    """Return the fields of an equilibrium at the Gauss points; the centreline is by the collocation's own quadrature."""
     tables, mesh = basis(equilibrium.degree), equilibrium.mesh
     lengths = np.diff(mesh)
     stations = mesh[:-1, None] + lengths[:, None] * tables.points
@@ -203,7 +203,7 @@ def _at_gauss_points(equilibrium: Equilibrium) -> _Points:
 
 
 def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
-    """x(0) from a centre of all symmetries, given x(end) - x(0) of the piece; and the gap of the loop."""
+    """Return x(0) from a centre of all symmetries, given x(end) - x(0) of the piece; and the gap of the loop."""
     if not symmetry.reverses:
         return np.zeros(3), float(np.linalg.norm(end))
     start, middle = (np.eye(3) + each[3:, 3:] for each in (_reversal(symmetry), _motion(symmetry) @ _reversal(symmetry)))
@@ -217,7 +217,7 @@ def _origin(symmetry: Symmetry, end) -> tuple[np.ndarray, float]:
 
 @functools.cache
 def _reversal(symmetry: Symmetry) -> np.ndarray:
-    """The matrix (6, 6) that takes E'(S) to E'(-S) for perturbations that keep the mirror or axis at S = 0.
+    """Return the matrix (6, 6) that takes E'(S) to E'(-S) for perturbations that keep the mirror or axis at S = 0.
 
     The mirror is normal to e1, or the axis is e1. With X the mirror's matrix, u(-S) = X u(S) for both, x(-S) = X x(S) for the
     mirror and -X x(S) for the axis, so that u x x is multiplied by -X or X.
@@ -228,7 +228,7 @@ def _reversal(symmetry: Symmetry) -> np.ndarray:
 
 @functools.cache
 def _motion(symmetry: Symmetry) -> np.ndarray:
-    """The matrix T (6, 6) that takes E'(S) to E' one part further for perturbations of class 0; x turns like w."""
+    """Return the matrix T (6, 6) that takes E'(S) to E' one part further for perturbations of class 0; x turns like w."""
     angle = 2 * np.pi * symmetry.winding / symmetry.order
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     return np.kron(np.diag([1.0, -1.0 if symmetry.flip else 1.0]), turn)
@@ -240,16 +240,16 @@ _CIRCULAR = np.kron(np.eye(2), np.array([[1, 1j, 0], [1, -1j, 0], [0, 0, np.sqrt
 
 @functools.cache
 def _phases(symmetry: Symmetry) -> np.ndarray:
-    """T on the circular axes is exp(2 pi i p / order): the whole numbers p (6,)."""
+    """Return the whole numbers p (6,): T on the circular axes is exp(2 pi i p / order)."""
     turning = np.array([symmetry.winding, -symmetry.winding, 0])
     return np.concatenate([turning, turning + (symmetry.order // 2 if symmetry.flip else 0)])
 
 
 @functools.cache
 def _closing(symmetry: Symmetry, wavenumber: int) -> tuple[np.ndarray, np.ndarray]:
-    """From the increment D of E over a part, E(0) = Z D in a class: Z (6, 6), and the rows (c, 6) whose product with D is zero.
+    """Return Z (6, 6) and rows (c, 6) of a class: E(0) = Z D for the increment D of E over a part, and rows . D = 0.
 
-    E(0) + D = rho T E(0). Where rho T has the eigenvalue 1, D is zero and E(0) a rigid motion, which does not matter.
+    E(0) + D = rho T E(0). Where rho T has the eigenvalue 1, D is zero and E(0) a rigid motion, which has no effect.
     """
     phases = (wavenumber + _phases(symmetry)) % symmetry.order
     factors = np.exp(2j * np.pi * phases / symmetry.order) - 1
@@ -258,7 +258,7 @@ def _closing(symmetry: Symmetry, wavenumber: int) -> tuple[np.ndarray, np.ndarra
 
 
 def _symmetric(matrix, symmetry: Symmetry) -> np.ndarray:
-    """The part of N (6, 6) that has the symmetry of the loop: all of it, but for what a state beside a branch lacks."""
+    """Return the part of N (6, 6) that has the symmetry of the loop: all of it, except for a state that is not on a branch."""
     phases = _phases(symmetry)
     circular = _CIRCULAR @ matrix @ _CIRCULAR.conj().T
     circular[(phases[:, None] - phases) % symmetry.order != 0] = 0
@@ -288,7 +288,7 @@ class _Intervals:
     motion: np.ndarray
 
     def condensed(self) -> _Intervals | None:
-        """What does not change the increments eliminated: 6 unknowns on each; None where that is not positive definite.
+        """Return the form after elimination of what does not change the increments, 6 unknowns each; None if indefinite.
 
         By a QR factorization of B^T, B the increments, the first 6 of K orthonormal coordinates y give all increments.
         """
@@ -304,7 +304,7 @@ class _Intervals:
         return _Intervals(local, self.increments @ axes[:, :, :_RIGID], motion[:, :_RIGID])
 
     def paired(self, coupling) -> _Intervals:
-        """Two intervals as one each time; their number is even."""
+        """Return pairs of intervals as one each; the number of intervals is even."""
         first, last = self.increments[::2], self.increments[1::2]
         across = first.transpose(0, 2, 1) @ coupling @ last / 2
         upper = np.concatenate([self.local[::2], across], axis=2)
@@ -313,18 +313,18 @@ class _Intervals:
         return _Intervals(np.concatenate([upper, lower], axis=1), np.concatenate([first, last], axis=2), motion)
 
     def split(self, at: int) -> tuple[_Intervals, _Intervals]:
-        """The first intervals, ``at`` of them, and the others."""
+        """Return the first intervals, ``at`` of them, and the others."""
         parts = self.local, self.increments, self.motion
         return _Intervals(*(part[:at] for part in parts)), _Intervals(*(part[at:] for part in parts))
 
     def joined(self, other: _Intervals) -> _Intervals:
-        """These intervals and others behind them."""
+        """Return these intervals, followed by others."""
         parts = zip((self.local, self.increments, self.motion), (other.local, other.increments, other.motion))
         return _Intervals(*(np.concatenate(pair) for pair in parts))
 
 
 def _of_mesh(points: _Points, coupling, degree: int) -> _Intervals:
-    """Q on each interval of the mesh; unknowns are v at the Gauss points times the roots of their weights.
+    """Return Q on each interval of the mesh; unknowns are v at the Gauss points times the roots of their weights.
 
     It is the identity plus l c_ij G_j^T N G_i / 2 between the Gauss points j and i, l the length and
     c_ij = a_ij sqrt(w_i / w_j) - a_ji sqrt(w_j / w_i), with the Runge-Kutta method's matrix a and weights w.
@@ -340,7 +340,7 @@ def _of_mesh(points: _Points, coupling, degree: int) -> _Intervals:
 
 
 def _condensed(intervals: _Intervals, coupling) -> _Intervals:
-    """Intervals of the mesh with six unknowns each, joined in pairs as long as what is eliminated is positive definite."""
+    """Return intervals with six unknowns each, joined in pairs as long as the eliminated block is positive definite."""
     found = intervals.condensed()
     while found is not None:
         intervals, even = found, len(found.local) // 2 * 2
@@ -367,7 +367,7 @@ class _Form:
         blocks[range(count), :, range(count)] += (intervals.local + intervals.local.transpose(0, 2, 1)) / 2
 
     def classes(self) -> tuple[SymmetryClass, ...]:
-        """Every class; sets ``residual``."""
+        """Return every class; set ``residual``."""
         symmetry, found = self.symmetry, []
         for j in range(symmetry.order // 2 + 1):
             own = 2 * j % symmetry.order == 0
@@ -378,7 +378,7 @@ class _Form:
         return tuple(found)
 
     def _part(self, j: int, parity: str):
-        """The matrix (n, n) on a part of the loop without what closes it, and W (6, n) of the part.
+        """Return the matrix (n, n) on a part of the loop without what closes it, and W (6, n) of the part.
 
         With a reversal, v on the image of the piece is v on the piece times 1 or -1 (``parity``). Without a parity both kinds
         are unknowns, the second times i, which makes the matrix real.
@@ -397,7 +397,7 @@ class _Form:
         return form, np.hstack([self.increments + reflected, 1j * (self.increments - reflected)]) * np.sqrt(0.5)
 
     def _eigenvalues(self, form, increments, j: int, known):
-        """Eigenvalues of a class: closed, under the conditions of closure, the shift of phase ``known`` left out."""
+        """Return the eigenvalues of a class under the conditions of closure, without the shift of phase ``known``."""
         closing, rows = _closing(self.symmetry, j)
         closing = closing.conj().T @ self.coupling
         closing = (closing + closing.conj().T) / 2

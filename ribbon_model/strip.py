@@ -24,7 +24,7 @@ class Strip:
     Raises
     ------
     ValueError
-        A field that is not positive and finite, or not thinner than wide and narrower than long; it begins with its name.
+        A field that is not positive and finite, or a strip that is not thinner than wide and narrower than long.
     """
 
     width: float
@@ -70,25 +70,26 @@ class Strip:
 
     @property
     def energy_unit(self) -> float:
-        """In J: an energy of 1 on average over the loop (the energies of this package are means)."""
+        """An energy of 1 in J (the energies of this package are means over the loop)."""
         return 2 * math.pi * self.moment_unit
 
     def radius(self, curvature: float) -> float:
-        """In m, of a curvature over 2 pi/L; with its sign, infinite for 0."""
+        """Return the radius in m of a curvature over 2 pi/L; with its sign, infinite for 0."""
         return self.length / (2 * math.pi * curvature) if curvature else math.inf
 
     def strain(self, bending, twist=0.0):
-        """Largest principal strain at the surface for a change of curvature and a twist, both over 2 pi/L; numbers or arrays.
+        """Return the largest principal strain at the surface for a change of curvature and a twist, both over 2 pi/L.
 
-        h/2 times the larger principal value of [[bending, twist], [twist, 0]]: what the section bends by is left out.
+        It is h/2 times the larger principal value of [[bending, twist], [twist, 0]], without the bending of the section.
+        Arguments are numbers or arrays.
         """
         return self.thickness / 2 / self.radius(1.0) * (abs(bending) / 2 + (bending**2 / 4 + twist**2) ** 0.5)
 
     @property
     def torsion_excess(self) -> float:
-        """By which part a plate's torsional stiffness exceeds that of the section: .63 h/w, Saint-Venant's first term."""
+        """Relative excess of a plate's torsional stiffness over that of the section: .63 h/w, Saint-Venant's first term."""
         return 0.63 * self.thickness / self.width
 
 
-#: What a strip is given by.
+#: Names of the dimensions of a strip.
 NAMES = tuple(field.name for field in fields(Strip))

@@ -1,19 +1,19 @@
-"""The unfolding arc: linear stability of a naturally circular strip whose ends are turned (section 5 of Audoly & Seffen 2015).
+"""The unfolding arc: linear stability of a naturally circular strip whose ends are rotated (section 5 of Audoly & Seffen).
 
 The strip has the natural curvature kappa_n and spans theta_n = L kappa_n; turning its ends by xi theta_n gives it the curvature
 (1 - xi) kappa_n. Out-of-plane perturbations obey (20a)-(20f) on [0, theta_n (1 - xi)] with x_1 = psi_2 = psi_3 = 0 at both ends
-(20g). Here the same equations are solved two ways:
+(20g). Here two methods solve the same equations:
 
 - `shooting_determinant` integrates (20) as printed, lengths in units of the actual radius;
 - `factors` is its closed form. By symmetry about the middle it is a product, of a factor for the modes with psi_2 even
   and one for those with psi_2 odd: det S = -8 (1 - xi)**4 even odd / t. It is written in units of the natural radius 1/kappa_n,
-  where nothing becomes singular but the law.
+  where only the law becomes singular.
 
 For the law 'finite width' every function takes ``width`` = w**2 kappa_n / h, that is w**2/(R h) with the natural radius R: the
-Gamma of these units. Its t may vanish twice in 0 < xi < 1, or not at all: small widths never do.
+Gamma of these units. Its t may vanish twice in 0 < xi < 1, or not at all; for small widths it never does.
 
 xi = 1, the flat strip, is a singular point of the scaling in (20): the interval shrinks to nothing and both forms vanish there
-with a power of 1 - xi, for any kind of strip. It is no root. `first_root` leaves |1 - xi| < `FLAT` out.
+with a power of 1 - xi, for any kind of strip. It is not a root. `first_root` leaves |1 - xi| < `FLAT` out.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 
 from ribbon_model.laws import Law
 
-#: Half width in xi of what is left out around the flat state, which is not a root.
+#: Half width in xi of the interval around the flat state that is left out; the flat state is not a root.
 FLAT = 0.01
 #: Conditions at both ends, by the number of the state in (x_1, psi_2, psi_3, M_2, M_3, R_1) that vanishes there.
 CLAMPED = (0, 1, 2)
@@ -33,7 +33,7 @@ HINGED = (0, 2, 3)
 
 
 def system_matrix(law: Law, nu, xi, width: float | None = None) -> np.ndarray:
-    """The matrix of (20), y' = matrix y with y = (x_1, psi_2, psi_3, M_2, M_3, R_1); shape (..., 6, 6), broadcasting nu and xi.
+    """Return the matrix of (20), y' = matrix y with y = (x_1, psi_2, psi_3, M_2, M_3, R_1); shape (..., 6, 6) with nu and xi.
 
     For g infinite (20b) is psi_2' = psi_3: M_2 is then a reaction, determined by (20d) to (20f).
 
@@ -60,7 +60,7 @@ def system_matrix(law: Law, nu, xi, width: float | None = None) -> np.ndarray:
 
 
 def shooting_determinant(law: Law, nu, xi, theta_n: float = math.pi, ends=CLAMPED, width: float | None = None) -> np.ndarray:
-    """det S(theta_n, nu, xi) of section 5.3, by the matrix exponential; shape of nu and xi broadcast.
+    """Return det S(theta_n, nu, xi) of section 5.3, by the matrix exponential; shape of nu and xi broadcast.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def shooting_determinant(law: Law, nu, xi, theta_n: float = math.pi, ends=CLAMPE
 
 
 def factors(law: Law, nu, xi, theta_n: float = math.pi, width: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The factors (even, odd) of the determinant with (20g), in closed form; shape of nu and xi broadcast.
+    """Return the factors (even, odd) of the determinant with (20g), in closed form; shape of nu and xi broadcast.
 
     With curvature kappa = 1 - xi, moment M = kappa - 1 (times B kappa_n), torsional stiffness T = t kappa, half length H and
 
@@ -117,7 +117,7 @@ def factors(law: Law, nu, xi, theta_n: float = math.pi, width: float | None = No
 
 
 def _trigonometric(w_squared, half):
-    """C = cos(w H), S = sin(w H)/w and Q = (S - H C)/w**2, for w**2 of either sign: entire functions of w**2."""
+    """Return C = cos(w H), S = sin(w H)/w and Q = (S - H C)/w**2, for w**2 of either sign: entire functions of w**2."""
     w = np.sqrt(np.abs(w_squared))
     phase, positive = w * half, w_squared >= 0
     bounded = np.minimum(phase, 700.0)  # where cosh would overflow
@@ -139,7 +139,7 @@ def first_root(
     method: str = "closed form",
     width: float | None = None,
 ) -> float | None:
-    """The smallest xi > 0 at which the planar arc has a marginal out-of-plane mode, to about 1e-12, or None below ``largest``.
+    """Return the smallest xi > 0 with a marginal out-of-plane mode of the arc, to about 1e-12, or None below ``largest``.
 
     Sign changes are bracketed on a fixed grid and closed in by Brent's method, in each factor separately or in the determinant.
 
@@ -152,7 +152,7 @@ def first_root(
     Parameters
     ----------
     ends : tuple
-        `CLAMPED`, (20g), or `HINGED`, which only the shooting method knows.
+        `CLAMPED`, (20g), or `HINGED`, for the shooting method only.
     method : str
         'closed form' (`factors`) or 'shooting' (`shooting_determinant`).
     width : float, optional
@@ -168,7 +168,7 @@ def first_root(
     from scipy.optimize import brentq
 
     if not (-1 < nu < 1 and theta_n > 0 and largest > 0):
-        raise ValueError(f"nu = {nu:g}, theta_n = {theta_n:g}, largest = {largest:g}: outside what the search covers")
+        raise ValueError(f"nu = {nu:g}, theta_n = {theta_n:g}, largest = {largest:g}: outside the range of the search")
     law.values(nu, width)
     found, end = [], law.arc_end(nu, width)
     for low, high in _pieces(law, nu, largest, end):
@@ -187,7 +187,7 @@ def first_root(
 
 
 def _functions(law, nu, theta_n, ends, method, width) -> list[Callable]:
-    """The functions of xi whose zeros are the modes."""
+    """Return the functions of xi whose zeros are the modes."""
     if method == "shooting":  # det S has the factor (1 - xi)**4 / t
         return [lambda xi: shooting_determinant(law, nu, xi, theta_n, ends, width) / (1 - np.asarray(xi)) ** 4]
     if method != "closed form":
@@ -198,7 +198,7 @@ def _functions(law, nu, theta_n, ends, method, width) -> list[Callable]:
 
 
 def _pieces(law, nu, largest, singular):
-    """Intervals of xi without a singular point inside."""
+    """Return the intervals of xi without a singular point inside."""
     if singular is not None:
         return [(0.0, min(largest, singular))]
     pieces = [(0.0, min(largest, 1 - FLAT))]
@@ -208,7 +208,7 @@ def _pieces(law, nu, largest, singular):
 
 
 def _grid(low, high, singular):
-    """Points from ``low`` to ``high``, both left out if singular; ever closer to where t vanishes."""
+    """Return the points from ``low`` to ``high``, both left out if singular; denser towards the zero of t."""
     start = max(low, 1e-3 * (high - low))
     uniform = np.linspace(start, high, 2 + int((high - start) / 0.01))
     if singular is None:

@@ -1,9 +1,9 @@
-"""Times contin and its peers on the user's own machine: pictures, a table of ratios, and every number as JSON.
+"""Time contin and other tools on your machine: pictures, a table of ratios, and every number as JSON.
 
     python scripts/bench.py [like-for-like] [fold] [cost] [startup] [stress] [--quick] [--out DIR]
 
-Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A peer
-that is not installed is left out, and named. See docs/performance.md.
+Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A tool
+that is not installed is left out, and the output names it. See docs/performance.md.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ PARTS = ("like-for-like", "fold", "cost", "startup", "stress")
 
 
 def arguments(argv=None) -> argparse.Namespace:
-    """The command line, parsed."""
+    """Return the parsed command line."""
     parser = argparse.ArgumentParser(prog="python scripts/bench.py", description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"what to run: {', '.join(PARTS)} (default: all)")
     parser.add_argument("--quick", action="store_true", help="few repeats: under two minutes instead of ten")
     parser.add_argument(
-        "--out", metavar="DIR", default="bench", help="where bench.json, bench.md and pictures go (default: bench)"
+        "--out", metavar="DIR", default="bench", help="folder for bench.json, bench.md and pictures (default: bench)"
     )
     parser.add_argument(
         "--page", metavar="FILE", help="put the tables into this Markdown file, the pictures into images/ beside it"
     )
     parser.add_argument(
-        "--bifpy-python", metavar="PATH", default=sys.executable, help="an interpreter that has bifpy (default: this)"
+        "--bifpy-python", metavar="PATH", default=sys.executable, help="a Python interpreter with bifpy (default: this one)"
     )
     options = parser.parse_args(argv)
     for part in options.parts:
@@ -51,7 +51,7 @@ def arguments(argv=None) -> argparse.Namespace:
 
 
 def measure(part: str, quick: bool, bifpy_python: str) -> dict:
-    """One part."""
+    """Run one part."""
     from benchmarks import cost, fold, like_for_like, startup, stress
 
     from ribbon_model import exact
@@ -69,7 +69,7 @@ def measure(part: str, quick: bool, bifpy_python: str) -> dict:
 
 
 def main(argv=None) -> int:
-    """Run what was asked for, and write it down."""
+    """Run the requested parts, and write the results."""
     options = arguments(argv)
     from benchmarks import like_for_like, report
     from benchmarks.measure import machine

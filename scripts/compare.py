@@ -1,11 +1,11 @@
-"""Records every number that the scenes and the bank of reference problems give, and compares two records bit by bit.
+"""Record every number of the scenes and of the bank of reference problems, and compare two records bit by bit.
 
     python scripts/compare.py record OUT.npz
     python scripts/compare.py A.npz B.npz
 
 It shows that a change of the code changed no number: record before and after, on the same machine with the same versions, and
 compare. A record is of the tree that this file lies in, wherever it is started from and whatever else is installed: every scene
-of configs/ by the commands of `branches`, with what leaves its secondary bifurcations, and every point of every case of the
+of configs/ by the commands of `branches`, with its secondary branches, and every point of every case of the
 bank of reference problems below tests/. All code is compiled afresh for it, and computes on one thread.
 
 Exit code: 0 recorded, or identical; 1 something differs; 2 bad usage, a file that cannot be used, a scene that cannot be run.
@@ -37,14 +37,14 @@ import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("contin", "ribbon_model", "branches")
-#: Attributes of result files that are left out: they say with which versions and on what machine a result was computed.
+#: Attributes of result files that are left out: the versions and the machine of a result.
 EXCLUDED_ATTRIBUTES = ("versions", "platform")
-#: What is replaced in printed lines: how long a run took, its only number that is a clock's.
+#: Pattern that is replaced in printed lines: the time of a run.
 CLOCK = re.compile(r"\bin \d+\.\d+ s$", re.MULTILINE)
-#: What a point's discretization is known by; the rest of it is code.
+#: Fields of a point's discretization that are recorded.
 OF_SYSTEM = ("mesh", "degree")
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-#: Processes at a time, and lines that a comparison prints at most.
+#: Number of processes, and largest number of lines that a comparison prints.
 PROCESSES, MOST_LINES = 2, 40
 USAGE = "usage: compare.py record OUT.npz, or compare.py A.npz B.npz"
 
@@ -52,14 +52,14 @@ Record = dict[str, np.ndarray]
 
 
 class CompareError(Exception):
-    """Something that cannot be recorded or compared; the message is one sentence."""
+    """A value that cannot be recorded or compared; the message is one sentence."""
 
 
 # --- values as arrays -------------------------------------------------------------------------------------------------
 
 
 def plain(key: str, value: Any) -> np.ndarray:
-    """One value as an array without Python objects; texts as unicode."""
+    """Return one value as an array without Python objects; texts as unicode."""
     array = np.asarray(value)
     if array.dtype.kind == "O" and all(isinstance(item, str) for item in array.flat):
         array = array.astype(str)
@@ -69,12 +69,12 @@ def plain(key: str, value: Any) -> np.ndarray:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a single number."""
+    """Return whether a value is a single number."""
     return isinstance(value, (bool, int, float, complex, np.number, np.bool_))
 
 
 def flat(key: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """What a value is made of, as (key, array): a mapping of numbers as one row with named columns, all others by parts."""
+    """Yield the parts of a value as (key, array): a mapping of numbers as one row with named columns, all others by parts."""
     if value is None:
         yield key, np.asarray("none")
     elif dataclasses.is_dataclass(value):
@@ -99,7 +99,7 @@ def flat(key: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def of_hdf5(key: str, path: Path) -> Record:
-    """Every dataset, and every attribute (after an @) that is not excluded."""
+    """Yield every dataset, and every attribute (after an @) that is not excluded."""
     found: Record = {}
 
     def take(name: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -117,7 +117,7 @@ def of_hdf5(key: str, path: Path) -> Record:
 
 
 def of_file(key: str, path: Path) -> Record:
-    """What a result file holds: HDF5 and JSON by parts, any other as its text."""
+    """Yield the content of a result file: HDF5 and JSON by parts, other files as text."""
     if path.suffix == ".h5":
         return of_hdf5(key, path)
     text = path.read_text(encoding="utf-8")
@@ -128,7 +128,7 @@ def of_file(key: str, path: Path) -> Record:
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """The environment of processes: this tree before any installed one, one thread, compiled code kept in ``folder``."""
+    """Return the environment of processes: this tree before any installed one, one thread, compiled code kept in ``folder``."""
     paths = filter(None, [str(ROOT), str(bank_folder().parent), os.environ.get("PYTHONPATH", "")])
     caches = {"CONTIN_CACHE_DIR": str(folder / "contin")}
     changes = {"PYTHONPATH": os.pathsep.join(paths), "PYTHONIOENCODING": "utf-8", "COLUMNS": "80"}
@@ -141,7 +141,7 @@ def run(words: list[str], env: dict[str, str]) -> subprocess.CompletedProcess:
     Raises
     ------
     CompareError
-        It did not come to an end of its own; a run that says in exit code 1 that a branch was lost did.
+        The run failed. Exit code 1, for a branch that was lost, is not a failure here.
     """
     done = subprocess.run([sys.executable, *words], cwd=ROOT, env=env, capture_output=True, encoding="utf-8")
     if done.returncode not in (0, 1) or "Traceback" in done.stderr:
@@ -151,29 +151,29 @@ def run(words: list[str], env: dict[str, str]) -> subprocess.CompletedProcess:
 
 
 def command(key: str, words: list[str], folder: Path, env: dict[str, str]) -> Record:
-    """Run a module: its exit code, and what it prints, without times and without the name of the folder."""
+    """Run a module; return its exit code and its output, without times and without the name of the folder."""
     done = run(["-m", *words], env)
     said = CLOCK.sub("in ... s", done.stdout).replace(str(folder), "OUT")
     return {f"{key}/{words[0]}/exit": np.asarray(done.returncode), f"{key}/{words[0]}/stdout": np.asarray(said)}
 
 
 def strip_options(path: Path) -> list[str]:
-    """The options of `branches.strip` that a scene's strip amounts to; none where it has no strip."""
+    """Return the options of `branches.strip` for a scene's strip; none if it has no strip."""
     strip = yaml.safe_load(path.read_text(encoding="utf-8")).get("strip", {})
     return [word for name, value in strip.items() for word in (f"--{name.replace('_', '-')}", str(value))]
 
 
 def has_secondaries(path: Path) -> bool:
-    """Whether secondary branches leave the branch of a result file."""
+    """Return whether secondary branches leave the branch of a result file."""
     with h5py.File(path) as file:
         return bool(np.any(file["events"]["label"] == b"SB"))
 
 
 def scene(path: Path, folder: Path, env: dict[str, str]) -> Record:
-    """Run a scene as its user does, and what follows from it: its strip in SI units, its secondary branches."""
+    """Run a scene as a user does, then its strip in SI units and its secondary branches."""
     key = f"configs/{path.stem}"
     folder.mkdir()
-    # one worker: the order in which branches come to a diagram must not depend on which is done first
+    # one worker: the order of branches in a diagram must not depend on their times
     found = command(key, ["branches.run", str(path), "--out", str(folder), "--workers", "1"], folder, env)
     if options := strip_options(path):
         found |= command(key, ["branches.strip", *options], folder, env)
@@ -193,7 +193,7 @@ def scene(path: Path, folder: Path, env: dict[str, str]) -> Record:
 
 @functools.cache
 def bank_folder() -> Path:
-    """The folder of the bank of reference problems, wherever it lies below tests/."""
+    """Return the folder of the bank of reference problems below tests/."""
     found = sorted((ROOT / "tests").glob("**/bank/case.py"))
     if len(found) != 1:
         raise CompareError(f"{ROOT / 'tests'} must hold one bank/case.py, not {len(found)}")
@@ -201,13 +201,13 @@ def bank_folder() -> Path:
 
 
 def bank_modules() -> list[str]:
-    """The modules of the bank that have cases."""
+    """Return the modules of the bank that have cases."""
     files = sorted(bank_folder().glob("*.py"))
     return [file.stem for file in files if re.search(r"^CASES\b", file.read_text(encoding="utf-8"), re.MULTILINE)]
 
 
 def of_point(key: str, point: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """All fields of a point; of its discretization what it is known by."""
+    """Yield all fields of a point, and the recorded fields of its discretization."""
     for field in dataclasses.fields(point):
         value = getattr(point, field.name)
         if field.name == "system":
@@ -216,7 +216,7 @@ def of_point(key: str, point: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def of_bank() -> Record:
-    """Run every case of the bank in this process: all points of its branch, and why it stopped."""
+    """Run every case of the bank in this process; yield all points of its branch, and the reason of its end."""
     found: Record = {}
     for name in bank_modules():
         for case in importlib.import_module(f"bank.{name}").CASES:
@@ -231,7 +231,7 @@ def of_bank() -> Record:
 
 
 def bank(folder: Path, env: dict[str, str]) -> Record:
-    """The bank's record, made in a process of its own."""
+    """Return the bank's record, made in a process of its own."""
     path = folder / "bank.npz"
     run([str(Path(__file__).resolve()), "--bank", str(path)], env)
     return read(path)
@@ -241,7 +241,7 @@ def bank(folder: Path, env: dict[str, str]) -> Record:
 
 
 def write(path: Path, record: Record) -> None:
-    """Keep a record, whole or not at all."""
+    """Write a record as a whole."""
     part = path.with_name(f".{path.name}.part")
     try:
         with open(part, "wb") as file:
@@ -254,7 +254,7 @@ def write(path: Path, record: Record) -> None:
 
 
 def read(path: Path) -> Record:
-    """The arrays of a record."""
+    """Return the arrays of a record."""
     try:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
@@ -268,7 +268,7 @@ def read(path: Path) -> Record:
 
 
 def check_tree(env: dict[str, str]) -> None:
-    """CompareError unless processes import the packages of this tree."""
+    """Raise CompareError unless processes import the packages of this tree."""
     code = f"import {', '.join(PACKAGES)}; print({', '.join(f'{name}.__file__' for name in PACKAGES)}, sep=chr(10))"
     for file in run(["-c", code], env).stdout.splitlines():
         if ROOT not in Path(file).resolve().parents:
@@ -276,7 +276,7 @@ def check_tree(env: dict[str, str]) -> None:
 
 
 def timed(name: str, job: Any, *arguments: Any) -> Record:
-    """Do one job, and say how long it took."""
+    """Do one job, and print its time."""
     began = time.monotonic()
     found = job(*arguments)
     print(f"{name}: {len(found)} arrays, {time.monotonic() - began:.0f} s", flush=True)
@@ -301,7 +301,7 @@ def record(path: Path) -> None:
 
 
 def is_long(path: Path) -> bool:
-    """Whether a scene takes much longer than others, and should not come last: those of many branches."""
+    """Return whether a scene takes much longer than others, and should not come last: those of many branches."""
     values = yaml.safe_load(path.read_text(encoding="utf-8"))
     return any(isinstance(value, list) for value in values.values())
 
@@ -310,25 +310,25 @@ def is_long(path: Path) -> bool:
 
 
 def columns(array: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    """The named columns of an array; itself, without a name, where it has none."""
+    """Return the named columns of an array; itself, without a name, where it has none."""
     names = array.dtype.names
     return [("", array)] if names is None else [(name, array[name]) for name in names]
 
 
 def count(arrays: Iterable[np.ndarray]) -> str:
-    """How many arrays, and how many numbers are in them."""
+    """Return the number of arrays, and of the numbers in them."""
     arrays = list(arrays)
     numbers = sum(column.size for array in arrays for _, column in columns(array) if column.dtype.kind in "biufc")
     return f"{len(arrays)} arrays, {numbers} numbers"
 
 
 def same(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether two arrays agree in type, shape and every bit."""
+    """Return whether two arrays agree in type, shape and every bit."""
     return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
 def gaps(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
-    """The largest absolute and relative difference of two arrays of numbers; inf where one alone is not a number."""
+    """Return the largest absolute and relative difference of two arrays of numbers; inf where one alone is not a number."""
     wide = complex if "c" in (a.dtype.kind, b.dtype.kind) else float
     a, b = np.atleast_1d(a.astype(wide)), np.atleast_1d(b.astype(wide))
     with np.errstate(all="ignore"):
@@ -340,7 +340,7 @@ def gaps(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
 
 
 def changed_line(a: np.ndarray, b: np.ndarray) -> str:
-    """The first line in which two arrays of texts differ."""
+    """Return the first line in which two arrays of texts differ."""
     lines = [[line for text in array.astype(str).ravel().tolist() for line in text.split("\n")] for array in (a, b)]
     longest = max(map(len, lines))
     pairs = zip(*(part + [""] * (longest - len(part)) for part in lines))
@@ -350,7 +350,7 @@ def changed_line(a: np.ndarray, b: np.ndarray) -> str:
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> str:
-    """How two arrays differ, in words."""
+    """Return the difference of two arrays in words."""
     shapes = f"shape {a.shape}" if a.shape == b.shape else f"shapes {a.shape} and {b.shape}"
     if a.dtype.kind in "US" and b.dtype.kind in "US":
         return f"text, {shapes}: {changed_line(a, b)}"
@@ -374,7 +374,7 @@ def difference(a: np.ndarray, b: np.ndarray) -> str:
 
 
 def compare(first: Path, second: Path) -> int:
-    """Compare two records, and print what differs; the exit code."""
+    """Compare two records, and print the differences; return the exit code."""
     a, b = read(first), read(second)
     lines = [f"{key}: {difference(a[key], b[key])}" for key in a if key in b and not same(a[key], b[key])]
     changed = len(lines)
@@ -395,7 +395,7 @@ def compare(first: Path, second: Path) -> int:
 
 
 def output(text: str) -> Path:
-    """Where a record goes; CompareError if it cannot go there."""
+    """Return the file of a record; raise CompareError if it cannot be written."""
     path = Path(text).resolve()
     if path.suffix != ".npz" or path.is_dir() or not path.parent.is_dir():
         raise CompareError(f"{text!r} must be the name of an .npz file in a folder that exists")
@@ -412,7 +412,7 @@ def bank_alone(path: Path) -> None:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command; the exit code."""
+    """Run the command; return the exit code."""
     words = sys.argv[1:] if argv is None else argv
     if words in (["-h"], ["--help"]):
         print(__doc__.strip())

@@ -1,4 +1,4 @@
-"""The private constants of contin: what changes on the bank of test problems when one is ten times larger, or smaller.
+"""Measure the private constants of contin: changes on the bank of test problems if one is ten times larger, or smaller.
 
     python scripts/constants.py                 # all of them, a line each; takes minutes
     python scripts/constants.py _FAR _CHORDS    # these only

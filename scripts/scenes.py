@@ -1,4 +1,4 @@
-"""Random scenes, each computed as `branches.run` computes it, against the exact solution.
+"""Compute random scenes as `branches.run` does, and compare them with the exact solution.
 
     python scripts/scenes.py [--count 5000] [--seed 0] [--wide 300] [--workers 1] [--law LAW] [--nu LOW HIGH]
 
@@ -6,7 +6,7 @@ A scene is a law (ribbon, flat rod, isotropic rod), nu uniform in (-.99, .5), m 
 scenes; invalid ones are drawn again. Scene number i depends on the seed and i only. Compared are, in order:
 
 1. no label "possible", and no branch point on the way (the cell keeps the symmetry of one wavenumber);
-2. every fold of kappa_n: how many, in which order, and the value;
+2. the folds of kappa_n: their number, order and values;
 3. the end: the circle of the linear theory (`ribbon_model.linear`) or the limit where the quadrature
    (`ribbon_model.exact`) ends the branch.
 
@@ -53,7 +53,7 @@ NARROW, WIDE = 14, 40
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """What came of a scene.
+    """The result of a scene.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Result:
     fault : str
         The first difference from the exact solution; empty if there is none.
     unfinished : str
-        Why the run stopped too early; empty if it did not.
+        The reason why the run stopped too early; empty if it did not.
     error, estimate : float
         The largest error of a value, relative to 1 + its size, and the run's estimate of it, relative alike.
     seconds : float
@@ -130,7 +130,7 @@ def compare(config: Config) -> Result:
 def differences(points: list[Point], stop: Stop, expected: list, config: Config) -> tuple[str, str, list]:
     """Return the first difference, why the run is unfinished, and (error, estimate) of all values compared."""
     unfinished = "" if stop.reason in ("trivial branch", "limit") else str(stop)
-    if unfinished and expected[-1].label == "MX":  # a homoclinic orbit, where nothing can follow the branch
+    if unfinished and expected[-1].label == "MX":  # a homoclinic orbit, where no method can follow the branch
         unfinished = ""
     values: list[tuple[float, float]] = []
     possible = [point for point in points if point.name.startswith("possible")]
@@ -197,10 +197,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=5000, help="scenes (5000)")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--wide", type=int, default=300, help="so many of them have m and n up to 40 (300)")
+    parser.add_argument("--wide", type=int, default=300, help="number of scenes with m and n up to 40 (300)")
     parser.add_argument("--workers", type=int, default=1, help="processes")
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
-    parser.add_argument("--law", action="append", choices=NAMES, help="this law only; may be repeated")
+    parser.add_argument("--law", action="append", choices=NAMES, help="only this law; may be repeated")
     parser.add_argument("--nu", type=float, nargs=2, default=(-0.99, 0.5), metavar=("LOW", "HIGH"))
     options = parser.parse_args(arguments)
     if min(options.count, options.workers) < 1 or min(options.wide, options.first) < 0:

@@ -1,10 +1,10 @@
-"""Runs that are killed, interrupted, starved of disk and started twice; what is left, and whether it goes on to the same end.
+"""Inject faults into runs (kills, interrupts, full disks, second runs), and check that they resume with the same bits.
 
     python scripts/torture.py [--trials 300] [--scenes branch secondary diagram ...] [--seed 1] [--keep DIR]
 
-A trial is one scene, computed in processes of its own. One to three times a fault hits it at a random moment; after each one
+A trial is one scene, computed in its own processes. One to three times a fault is injected at a random moment. After each fault
 the file must open with plain h5py and hold every point of the last checkpoint, bit by bit those of an undisturbed run. Then
-the run goes on, and its columns must be in the end, bit by bit, those of the undisturbed run. Needs POSIX (fork, signals).
+the run resumes, and its final columns must be, bit by bit, those of the undisturbed run. This needs POSIX (fork, signals).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ SCENES = {
 
 
 def undisturbed(name: str, folder: Path) -> Scene:
-    """A scene computed without faults: how long it takes, and what comes out."""
+    """Return the time and the result of a scene without faults."""
     folder.mkdir(parents=True)
     (folder / "scene.yaml").write_text(SCENES[name])
     if name == "diagram":
@@ -69,7 +69,7 @@ def undisturbed(name: str, folder: Path) -> Scene:
 
 
 def load_kernels(names: list[str]) -> None:
-    """Compile or load what the scenes need, once, before processes are forked."""
+    """Compile or load the functions of the scenes, once before processes are forked."""
     from branches.config import DiagramConfig, parse
     from branches.display import Display
     from branches.job import compute_branch
@@ -81,7 +81,7 @@ def load_kernels(names: list[str]) -> None:
 
 
 def torture(names: list[str], count: int, seed: int, folder: Path, tell: Callable[[str], None] = print) -> list[str]:
-    """Trials of scenes in turn, every kind of fault in turn; what went wrong, a line each."""
+    """Run trials with scenes and kinds of faults in turn; return a line for each failure."""
     chance, problems, tally = random.Random(seed), [], collections.Counter()
     load_kernels(names)
     scenes = [undisturbed(name, folder / f"undisturbed-{name.replace(' ', '-')}") for name in names]
@@ -116,12 +116,12 @@ def torture(names: list[str], count: int, seed: int, folder: Path, tell: Callabl
 
 
 def main(argv=None) -> int:
-    """Run the trials; 1 if any failed."""
+    """Run the trials; return 1 if any failed."""
     parser = argparse.ArgumentParser(prog="python scripts/torture.py", description=__doc__.splitlines()[0])
     parser.add_argument("--trials", type=int, default=300, metavar="N", help="number of trials (default: 300)")
     parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES), metavar="SCENE", help=", ".join(SCENES))
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the random moments (default: 1)")
-    parser.add_argument("--keep", metavar="DIR", help="where trials run; those that failed are kept there")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the random moments (default: 1)")
+    parser.add_argument("--keep", metavar="DIR", help="folder for the trials; failed ones are kept")
     options = parser.parse_args(argv)
     with contextlib.ExitStack() as stack:
         folder = Path(options.keep or stack.enter_context(tempfile.TemporaryDirectory()))

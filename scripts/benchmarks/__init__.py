@@ -1,1 +1,1 @@
-"""What ``scripts/bench.py`` measures: like for like, tool for tool, cost laws, start-up; and how it is written down."""
+"""The measurements of ``scripts/bench.py`` (like for like, tool for tool, cost laws, start-up) and their report."""

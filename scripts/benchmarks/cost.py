@@ -21,7 +21,7 @@ DEGREES = range(2, 9)
 
 
 def run(quick: bool) -> dict:
-    """All cost laws."""
+    """Return all cost laws."""
     repeats = 5 if quick else 15
     return {
         "intervals": _sweep([(n, 7, 4) for n in (10, 20, 40, 80, 160, 320, 640)], repeats),
@@ -36,7 +36,7 @@ def run(quick: bool) -> dict:
 
 
 def chain(n: int) -> contin.BoundaryValueProblem:
-    """n coupled states on a ring, with one free parameter: a right-hand side that costs little beside the linear algebra."""
+    """Return a problem of n coupled states on a ring, with one free parameter: its right-hand side costs little."""
 
     def rhs(t, u, p, out):
         for i in range(n):
@@ -50,7 +50,7 @@ def chain(n: int) -> contin.BoundaryValueProblem:
 
 
 def flops(intervals: int, n: int, degree: int, extra: int = 1) -> float:
-    """Multiplications and additions of the condensation in `contin.linalg.condensation`, leading terms, with its border row."""
+    """Return the leading terms of the operations of `contin.linalg.condensation`, with its border row."""
     rows, width, inner = n * degree, n * (degree + 1) + extra, n * (degree - 1)
     local = sum(2 * (rows - c + extra - 1) * (width - c - 1) for c in range(inner))
     link = sum(2 * (2 * n - c + extra - 1) * (3 * n + extra - c - 1) for c in range(n))
@@ -62,7 +62,7 @@ def _sweep(shapes, repeats) -> list[dict]:
 
 
 def _one(intervals, n, degree, repeats) -> dict:
-    """One Newton iteration (linearize: rhs, Jacobian, assembly, factorization; and one solve), its share of factorization."""
+    """Measure one Newton iteration (rhs, Jacobian, assembly, factorization, one solve) and the share of factorization."""
     problem = chain(n)
     system = contin.Collocation(problem, np.linspace(0, 1, intervals + 1), degree, ["lam"], {})
     x = np.full(system.size, 0.5)
@@ -91,7 +91,7 @@ def _one(intervals, n, degree, repeats) -> dict:
 
 
 def _blas(size: int) -> dict:
-    """What the machine's LAPACK reaches on one dense block of this size, and its matrix product."""
+    """Return the speed of the machine's LAPACK on one dense block of this size, and of its matrix product."""
     from scipy.linalg.lapack import dgetrf
 
     matrix = np.asfortranarray(np.random.default_rng(1).standard_normal((size, size)) + size * np.eye(size))
@@ -109,7 +109,7 @@ def _blas(size: int) -> dict:
 
 # --- error ----------------------------------------------------------------------------------------------------------
 
-#: Branch, where on it (a test of exact points), what that is.
+#: Branch, a test that selects a point on it, and the name of that point.
 CASES = (
     (1, 2, (-100, 100), lambda p: p.kappa_n >= 3.0, "(1, 2) at κₙ = 3"),
     (1, 4, (-1e3, 1e3), lambda p: p.eta_max_squared >= 9.5, "(1, 4) at η²max ≈ 9.5"),
@@ -119,7 +119,7 @@ CASES = (
 
 
 def _errors(m, n, limits, chosen, name, quick) -> dict:
-    """Error of kappa* at a point of the exact branch, by degree and intervals, on uniform and on adapted meshes."""
+    """Return the error of kappa* at a point of the exact branch, by degree and intervals, on uniform and adapted meshes."""
     truth = next(point for point in exact.curve(m, n, NU, kappa_limits=limits) if chosen(point))
     system, x = _reference(m, n, truth)
     truth = exact.solve(m, n, NU, truth, kappa_n=system.parameter(x, "kappa_n"))
@@ -139,13 +139,13 @@ def _errors(m, n, limits, chosen, name, quick) -> dict:
 
 
 def _reference(m, n, truth):
-    """A well resolved solution of contin at the exact point's kappa_n: system and unknowns."""
+    """Return a well resolved solution of contin at the exact point's kappa_n: system and unknowns."""
     system, x, tangent = primary_branch(RIBBON, m, n, NU, 20, 6)
     settings = contin.Settings(
         limits={"kappa_n": (-2e4, 2e3)}, errors=False, branch_points=False, trivial="M2", max_points=5000
     )
-    monitor = contin.Monitor("UZ", "there", lambda trial: trial["kappa_n"] - truth.kappa_n)
-    settings = contin.Settings(**{**vars(settings), "monitors": (monitor,)})
+    there = contin.TestFunction("UZ", "there", lambda trial: trial["kappa_n"] - truth.kappa_n)
+    settings = contin.Settings(**{**vars(settings), "test_functions": (there,)})
     for point in contin.Continuation(system, x, settings, tangent):
         if point.label == "UZ" and abs(point["kappa_star"] - truth.kappa_star) < 1e-4 * (1 + abs(truth.kappa_star)):
             return point.system, point.x
@@ -153,7 +153,7 @@ def _reference(m, n, truth):
 
 
 def _kappa_star(reference, x, intervals, degree, adapted) -> float:
-    """kappa* at the reference's kappa_n on another mesh."""
+    """Return kappa* at the reference's kappa_n on another mesh."""
     names = dict(zip(reference.problem.parameters, reference.all_parameters(x)))
 
     def on(mesh):
@@ -177,14 +177,14 @@ def _kappa_star(reference, x, intervals, degree, adapted) -> float:
 
 
 def slope(x, y) -> float:
-    """Exponent of the power law through the points, by least squares on the upper half of x, the asymptotic part."""
+    """Return the exponent of the power law through the points, by least squares on the upper half of x."""
     x, y = np.log(np.array(x, dtype=float)), np.log(np.array(y, dtype=float))
     upper = len(x) // 2
     return float(np.polyfit(x[upper:], y[upper:], 1)[0])
 
 
 def table(results: dict) -> str:
-    """Markdown."""
+    """Return the results as Markdown."""
     laws = [
         f"- time against intervals: exponent {_law(results['intervals'], 'intervals', 'linearize'):.2f}, memory "
         f"{_law(results['intervals'], 'intervals', 'bytes_held'):.2f} (1 is linear)",

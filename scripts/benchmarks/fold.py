@@ -20,7 +20,7 @@ HALF, AUTO_CELL, SCIPY, BIFPY = "AUTO-07p, half loop in 13 components", "AUTO-07
 
 
 def run(quick: bool, bifpy_python: str, exact_fold: float, budget: float) -> dict:
-    """All measurements, fastest settings by tool and error, and who was left out. ``budget`` in seconds ends the repeats."""
+    """Return all measurements, the fastest settings by tool and error, and the tools left out; ``budget`` is in seconds."""
     skipped, contestants = {}, dict(_contin())
     if (reason := auto_07p.missing()) is not None:
         skipped |= {LOOP: reason, HALF: reason, AUTO_CELL: reason}
@@ -51,7 +51,7 @@ def run(quick: bool, bifpy_python: str, exact_fold: float, budget: float) -> dic
     return {"rows": rows, "best": best(rows), "skipped": skipped, "exact_fold": exact_fold}
 
 
-#: First steps that are tried.
+#: First steps of the runs.
 FIRST_STEPS = {"contin": (0.05, 0.5, 2.0), "AUTO-07p": (0.05, 0.2)}  # AUTO-07p does not stay on the branch with 0.5
 
 
@@ -86,13 +86,13 @@ def _auto() -> dict[tuple[str, str], Callable]:
 
 
 def _scipy() -> dict[tuple[str, str], Callable]:
-    """The tolerance of solve_bvp."""
+    """Return the tolerance of solve_bvp."""
     tolerances = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
     return {(SCIPY, f"tol {t:.0e}"): lambda t=t: second_run("scipy_fold", tolerance=t) for t in tolerances}
 
 
 def best(rows: list[dict]) -> dict[str, dict[str, dict | None]]:
-    """By tool and error: the row that got there in the least time, or None."""
+    """Return, by tool and error, the row with the least time, or None."""
     found = {}
     for tool in dict.fromkeys(row["tool"] for row in rows):
         found[tool] = {}
@@ -103,7 +103,7 @@ def best(rows: list[dict]) -> dict[str, dict[str, dict | None]]:
 
 
 def table(results: dict) -> str:
-    """Markdown: times, and how many times that of contin."""
+    """Return the times as Markdown, with their ratios to that of contin."""
     errors = [f"{error:.0e}" for error in ERRORS]
     lines = ["| tool | " + " | ".join(f"to {error}" for error in errors) + " |", "|---|" + "---|" * len(errors)]
     for tool, cells in results["best"].items():

@@ -14,7 +14,7 @@ END = -0.5
 
 
 def bifpy_missing(python: str) -> str | None:
-    """Why bifpy cannot be run by that interpreter, or None."""
+    """Return the reason why bifpy cannot be run by that interpreter, or None."""
     if auto_07p.shutil.which("gfortran") is None:
         return "gfortran is not on the path"
     found = subprocess.run([python, "-c", "import bifpy"], capture_output=True)
@@ -22,13 +22,13 @@ def bifpy_missing(python: str) -> str | None:
 
 
 def bifpy(python: str, statement: str, stop: str, intervals=40, degree=4, tolerance=1e-10) -> dict:
-    """One study by bifpy."""
+    """Run one study by bifpy."""
     script = str(SCRIPTS / "peers" / "bifpy_auto.py")
     return child(python, script, statement, stop, str(intervals), str(degree), str(tolerance), "1.0")
 
 
 def run(quick: bool, bifpy_python: str, exact_fold: float) -> dict:
-    """Results by program and tolerance, and who was left out."""
+    """Return results by program and tolerance, and the programs left out."""
     results, skipped = {}, {}
     if (reason := auto_07p.missing()) is not None:
         skipped["AUTO-07p"] = reason
@@ -49,14 +49,14 @@ def run(quick: bool, bifpy_python: str, exact_fold: float) -> dict:
 
 
 def second_run(name: str, **arguments) -> dict:
-    """A task's second run in one process (the first one loads compiled code), and what a process with one run would take."""
+    """Return a task's second run in one process (the first one loads compiled code), and the time of a process with one."""
     done = task(name, 1, **arguments)
     again = done["runs"][0]
     return again | {"process_seconds": done["process_seconds"] - again["task_seconds"]}
 
 
 def _summary(name, runs, tolerance, exact_fold) -> dict:
-    """Medians over the repeats; counts from a run of their own where counting costs time."""
+    """Return medians over the repeats; counts come from a separate run where counting costs time."""
     last, seconds = runs[-1], [run["seconds"] for run in runs]
     row = {
         "seconds": median(seconds), "spread": [min(seconds), max(seconds)], "points": last["points"],
@@ -77,13 +77,13 @@ def _summary(name, runs, tolerance, exact_fold) -> dict:
 
 
 def ratio(results: dict) -> float | None:
-    """Time per point of AUTO-07p over that of contin, at the first tolerance."""
+    """Return the time per point of AUTO-07p over that of contin, at the first tolerance."""
     rows = results["results"][f"{TOLERANCES[0]:.0e}"]
     return rows["AUTO-07p"]["per_point"] / rows["contin"]["per_point"] if "AUTO-07p" in rows else None
 
 
 def table(results: dict) -> str:
-    """Markdown."""
+    """Return the results as Markdown."""
     lines = [
         "| tolerance | program | time, branch | points | time a point | factorizations or Newton iterations | time each | "
         "whole process | error of the fold | error of the end |",

@@ -1,4 +1,4 @@
-"""Timing: contestants take turns, each in processes of its own, on one thread; and what machine it was."""
+"""Timing: tools are run in turns, each in its own processes, on one thread; and a description of the machine."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ ONE_THREAD = dict.fromkeys(
 
 
 def environment(**changes: str) -> dict[str, str]:
-    """The environment of a child process: one thread, this project importable."""
+    """Return the environment of a child process: one thread, this project importable."""
     paths = [str(SCRIPTS), str(SCRIPTS.parent), os.environ.get("PYTHONPATH", "")]
     return os.environ | ONE_THREAD | {"PYTHONPATH": os.pathsep.join(filter(None, paths))} | changes
 
 
 def child(*command: str, timeout: float = 900, **changes: str) -> dict:
-    """Run ``command``; the JSON of its last line, with ``process_seconds``, the wall clock of the whole process.
+    """Run ``command``; return the JSON of its last line, with ``process_seconds``, the time of the whole process.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def task(name: str, repeats: int = 1, **arguments) -> dict:
 
 
 def in_turn(contestants: Mapping[str, Callable[[], dict]], repeats: int) -> dict[str, list[dict]]:
-    """Results of every contestant, who take turns (A B A B ...), so that a change of the machine's load meets all of them."""
+    """Return the results of every tool, run in turns (A B A B ...), so that a change of the machine's load affects all."""
     results = {name: [] for name in contestants}
     for _ in range(repeats):
         for name, run in contestants.items():
@@ -59,7 +59,7 @@ def median(values) -> float:
 
 
 def machine() -> dict:
-    """What the numbers were taken on."""
+    """Return a description of the machine."""
     import numba
     import numpy
     import scipy

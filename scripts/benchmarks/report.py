@@ -26,7 +26,7 @@ TABLES = {
 
 
 def markdown(results: dict) -> dict[str, str]:
-    """A block of Markdown for the machine and for every part that was run."""
+    """Return a block of Markdown for the machine and for every part that was run."""
     machine = dict(results["machine"])
     load = machine.pop("load_at_start")
     text = ", ".join(f"{name} {value}" for name, value in machine.items())
@@ -43,7 +43,7 @@ def markdown(results: dict) -> dict[str, str]:
 
 
 def page(results: dict) -> str:
-    """The whole as one Markdown document."""
+    """Return the whole as one Markdown document."""
     blocks = markdown(results)
     parts = [f"## {TITLES[part]}\n\n{text}\n" for part, text in blocks.items() if part != "machine"]
     return "\n".join([f"# Benchmark\n\n{blocks['machine']}\n", *parts])
@@ -67,7 +67,7 @@ def update(path: Path, results: dict) -> None:
 
 
 def pictures(results: dict, folder: Path) -> list[Path]:
-    """Draw what was run; the files."""
+    """Draw the results; return the files."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -88,7 +88,7 @@ def _saved(figure, path: Path) -> Path:
 
 
 def _plain(axis, values):
-    """Ticks of a logarithmic axis at these values, written as numbers."""
+    """Set the ticks of a logarithmic axis at these values, written as numbers."""
     axis.set_ticks(values, [f"{value:g}" for value in values])
     axis.set_ticks([], minor=True)
 

@@ -1,4 +1,4 @@
-"""Start-up: what imports cost, the first run of a scene with empty caches, the next ones, and what a minimal scene loads."""
+"""Start-up: times of imports, of the first run of a scene with empty caches, of later runs, and the modules loaded."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ sys.exit(code)
 
 
 def run(quick: bool) -> dict:
-    """All start-up times, in seconds."""
+    """Return all start-up times, in seconds."""
     repeats = 3 if quick else 7
     imports = in_turn({name: lambda name=name: _timed(f"import {name}") for name in ("sys", *PACKAGES)}, repeats)
     empty = median(row["seconds"] for row in imports.pop("sys"))
@@ -42,14 +42,14 @@ def run(quick: bool) -> dict:
 
 
 def _timed(statement: str) -> dict:
-    """Wall clock of a Python process that does just that."""
+    """Return the time of a Python process with these arguments."""
     began = time.perf_counter()
     subprocess.run([sys.executable, "-c", statement], env=environment(), check=True, capture_output=True)
     return {"seconds": time.perf_counter() - began}
 
 
 def _scene(out: Path, caches: dict[str, str]) -> dict:
-    """One run of the scene m1_n2 as a process; time and what it loaded."""
+    """Run the scene m1_n2 as a process; return the time and the modules loaded."""
     began = time.perf_counter()
     command = [sys.executable, "-c", MODULES, str(CONFIG), "--quiet", "--out", str(out)]
     done = subprocess.run(command, env=environment(**caches), capture_output=True, text=True)
@@ -61,7 +61,7 @@ def _scene(out: Path, caches: dict[str, str]) -> dict:
 
 
 def _importtime(module: str) -> list[tuple[str, float]]:
-    """Packages by the time that their own modules took to import, in seconds, the dearest first."""
+    """Return packages with the import time of their own modules in seconds, the slowest first."""
     done = subprocess.run(
         [sys.executable, "-X", "importtime", "-c", f"import {module}"],
         env=environment(),
@@ -73,7 +73,7 @@ def _importtime(module: str) -> list[tuple[str, float]]:
 
 
 def by_package(text: str) -> list[tuple[str, float]]:
-    """Self times of ``python -X importtime``, summed by top-level package, the dearest first."""
+    """Return the self times of ``python -X importtime``, summed by top-level package, the slowest first."""
     spent: dict[str, float] = {}
     for own, name in re.findall(r"^import time:\s+(\d+) \|\s+\d+ \|\s+(\S+)", text, re.MULTILINE):
         package = name.partition(".")[0]
@@ -82,7 +82,7 @@ def by_package(text: str) -> list[tuple[str, float]]:
 
 
 def table(results: dict) -> str:
-    """Markdown."""
+    """Return the results as Markdown."""
     lines = ["| import | beyond an empty Python |", "|---|---|"]
     lines += [f"| `{name}` | {seconds:.2f} s |" for name, seconds in results["imports"].items()]
     lines += [

@@ -1,7 +1,7 @@
-"""Numerical stability: branches that are hard, settings that are extreme, and what cannot be; against the exact quadrature.
+"""Numerical stability: hard branches, extreme settings and invalid modes, compared with the exact quadrature.
 
-Each case says how it ended, the largest error of kappa_n and kappa* at folds and ends (relative to 1 + |value|), by how
-much the quaternion's length drifts, and how nearly singular the discrete equations came (1 / smallest singular value, at
+The result of a case is the reason of its end, the largest error of kappa_n and kappa* at folds and ends (relative to
+1 + |value|), the drift of the quaternion's length, and the condition of the discrete equations (1 / smallest singular value, at
 regular points).
 """
 
@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-#: (what, m, n, nu, changes of the setting): limits of kappa_n, mesh, Newton's tolerance, steps.
+#: (name, m, n, nu, changes of the setting): limits of kappa_n, mesh, Newton's tolerance, steps.
 CASES = (
     ("as scenes do it", 1, 2, 0.3, {}),
     ("tolerance 1e-14", 1, 2, 0.3, {"tolerance": 1e-14}),
@@ -32,12 +32,12 @@ CASES = (
     ("κₙ → −10⁴", 3, 1, 0.3, {"limits": (-1e4, 100)}),
     ("κₙ → −10⁶, a branch a million long", 3, 1, 0.3, {"limits": (-1e6, 100)}),
 )
-#: What is refused: (what, m, n, nu).
+#: Modes that are rejected: (name, m, n, nu).
 REFUSED = (("no threshold: n = m", 3, 3, 0.3), ("a loop that does not close: m/n even", 2, 1, 0.3))
 
 
 def run(quick: bool) -> dict:
-    """Every case once."""
+    """Run every case once."""
     rows = [_case(*case) for case in (CASES[:7] if quick else CASES)]
     return {"rows": rows, "refused": [(what, _refusal(m, n, nu)) for what, m, n, nu in REFUSED]}
 
@@ -83,13 +83,13 @@ def _case(what, m, n, nu, changes) -> dict:
 
 
 def _drift(point) -> float:
-    """The largest deviation of the quaternion's length from one at mesh points."""
+    """Return the largest deviation of the quaternion's length from one at mesh points."""
     states = point.system.states(point.x)[:: point.system.degree, :4]
     return float(np.abs((states**2).sum(axis=1) - 1).max())
 
 
 def _singular(point) -> float:
-    """1 / the smallest singular value of the equations with the arclength condition."""
+    """Return 1 / the smallest singular value of the equations with the arclength condition."""
     from contin.linalg.singular import smallest_directions
 
     system = point.system
@@ -109,7 +109,7 @@ def _refusal(m, n, nu) -> str:
 
 
 def table(results: dict) -> str:
-    """Markdown."""
+    """Return the results as Markdown."""
     lines = ["| case | (m, n) | ends by | points | intervals | folds and ends | largest error | drift of |q|² | 1/σ | time |"]
     lines.append("|" + "---|" * 10)
     lines[0] = lines[0].replace("|q|²", "q·q")

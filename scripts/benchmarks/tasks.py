@@ -1,4 +1,4 @@
-"""What contin and SciPy are timed at, each task in a process of its own: ``python -m benchmarks.tasks NAME ARGUMENTS REPEATS``.
+"""The timed tasks of contin and SciPy, each in its own process: ``python -m benchmarks.tasks NAME ARGUMENTS REPEATS``.
 
 Prints one line of JSON: ``first`` (the run that also loads compiled code), ``runs`` (repeats in the same process), ``imported``
 (seconds that the imports took).
@@ -15,7 +15,7 @@ import time
 
 @functools.cache
 def half_loop_in_full():
-    """The half loop in the thirteen components (M, R, q, x), the statement of ``peers/auto/half.f90``."""
+    """Return the half loop in the thirteen components (M, R, q, x), the statement of ``peers/auto/half.f90``."""
     import contin
     from ribbon_model.equilibrium import directors, spin
     from ribbon_model.laws import RIBBON
@@ -41,13 +41,13 @@ def half_loop_in_full():
 
 
 def circle_in_full(t):
-    """The thirteen components of the circle at kappa_n = 2.3."""
+    """Return the thirteen components of the circle at kappa_n = 2.3."""
     a = math.pi * t
     return (-1.3, 0, 0, 0, 0, 0, math.cos(a / 2), math.sin(a / 2), 0, 0, 0, math.cos(a) - 1, math.sin(a))
 
 
 def half_loop(intervals=40, degree=4, tolerance=1e-10, stop="BP") -> dict:
-    """The circle to its bifurcation, the branch from there to its fold (LP) or end (BP): contin on AUTO's formulation."""
+    """Follow the circle to its bifurcation, and the branch to its fold (LP) or end (BP), in AUTO's formulation."""
     import contin
 
     newton, mesh = contin.Newton(tolerance), contin.MeshControl(min_intervals=intervals, max_intervals=intervals, every=3)
@@ -64,9 +64,9 @@ def half_loop(intervals=40, degree=4, tolerance=1e-10, stop="BP") -> dict:
 
 
 def cell(intervals=8, degree=6, tolerance=1e-12, angle=0.35, accuracy=0.02, step=0.05, stop="LP", m=1, n=2) -> dict:
-    """The branch (m, n) on its quarter wave, from its bifurcation to its fold (LP) or end (BP), on a fixed number of intervals.
+    """Follow the branch (m, n) on its quarter wave to its fold (LP) or end (BP), on a fixed number of intervals.
 
-    ``angle``, ``accuracy`` and ``step``, the first one, are settings of contin that say how long its steps are.
+    ``angle``, ``accuracy`` and the first ``step`` are settings of contin that determine its steps.
     """
     import contin
     from ribbon_model.laws import RIBBON
@@ -85,14 +85,14 @@ def cell(intervals=8, degree=6, tolerance=1e-12, angle=0.35, accuracy=0.02, step
 
 
 def scipy_fold(tolerance=1e-8) -> dict:
-    """The fold of (1, 2) by ``solve_bvp``."""
+    """Return the fold of (1, 2) by ``solve_bvp``."""
     from peers import scipy_bvp
 
     return scipy_bvp.fold(tolerance) | {"circle_seconds": 0.0}
 
 
 def _until(run, label):
-    """Points of a run up to the first with a label, after the start."""
+    """Return the points of a run up to the first with a label, after the start."""
     COUNTER.update(linearizations=0, linearize_seconds=0.0)
     points = []
     for point in run:
@@ -103,7 +103,7 @@ def _until(run, label):
 
 
 def _summary(points) -> dict:
-    """Counts and special values of a branch; ``iterations`` are those of the points that came out."""
+    """Return counts and special values of a branch; ``iterations`` are those of its points."""
     folds = [point["kappa_n"] for point in points if point.label == "LP"]
     return {
         "points": len(points), "iterations": sum(point.iterations for point in points), "fold": folds[0] if folds else None,
@@ -113,7 +113,7 @@ def _summary(points) -> dict:
 
 
 def counted(which="half_loop", **arguments) -> dict:
-    """A task with the factorizations on its branch counted, and the time in them."""
+    """Return a task with the factorizations on its branch counted, and the time in them."""
     import contin
 
     linearize = contin.Collocation.linearize
@@ -133,7 +133,7 @@ def counted(which="half_loop", **arguments) -> dict:
     return result | COUNTER
 
 
-#: What `counted` counts; a task that follows a branch sets it to zero where the branch begins.
+#: The counters of `counted`; a task sets them to zero at the first point of its branch.
 COUNTER = {"linearizations": 0, "linearize_seconds": 0.0}
 
 

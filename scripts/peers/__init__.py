@@ -1,1 +1,1 @@
-"""Other programs on the problems of this project, each driven as its own users would: nothing here is used by the packages."""
+"""Other programs on the problems of this project, each used as its own users would. The packages do not use this."""

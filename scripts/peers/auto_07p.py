@@ -31,7 +31,7 @@ DS={first_step}, DSMIN=1e-6, DSMAX={longest_step}, IADS=1, SP=['{stop}']
 
 
 def missing() -> str | None:
-    """Why AUTO-07p cannot be run here, or None."""
+    """Return the reason why AUTO-07p cannot be run, or None."""
     if shutil.which("gfortran") is None:
         return "gfortran is not on the path"
     if not (LIBRARY / "main.o").exists():
@@ -41,7 +41,7 @@ def missing() -> str | None:
 
 @functools.cache
 def build(statement: str) -> tuple[Path, float]:
-    """The executable of one statement, and the seconds that compiling took. Removed when the process ends."""
+    """Return the executable of one statement, and the seconds that compiling took. Removed when the process ends."""
     folder = tempfile.TemporaryDirectory(prefix="bench-auto-")
     _FOLDERS.append(folder)
     program = Path(folder.name) / "program"
@@ -61,7 +61,7 @@ _FOLDERS: list[tempfile.TemporaryDirectory] = []
 def study(
     statement: str, stop: str = "BP", intervals=40, degree=4, tolerance=1e-10, longest_step=1.0, first_step=0.05, count=False
 ) -> dict:
-    """From the circle through its bifurcation along the branch to the first fold (``stop`` LP) or to its end (BP).
+    """Follow the circle through its bifurcation, and the branch to its first fold (``stop`` LP) or its end (BP).
 
     ``seconds`` is AUTO's own "Total Time" of the second run, ``circle_seconds`` of the first, ``process_seconds`` the wall
     clock of both processes. ``fold`` and ``end`` are in full precision. ``iterations`` are known with ``count`` only, which
@@ -93,7 +93,7 @@ def study(
 
 
 def _run(program: Path, folder: Path, constants: str) -> dict:
-    """One run of AUTO in a folder that may hold a restart file."""
+    """Run AUTO once in a folder that may hold a restart file."""
     (folder / "fort.2").write_text(constants)
     (folder / "fort.97").unlink(missing_ok=True)
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
@@ -112,7 +112,7 @@ LABELS = {1: "BP", 2: "LP", 3: "HB", 4: "UZ", 5: "LP", 6: "BP", 9: "EP", -4: "UZ
 
 
 def parse(branch_file: str, diagnostics: str, printed: str) -> dict:
-    """Seconds, number of points, Newton iterations (all of them, location of special points included) and labels of a run.
+    """Return seconds, number of points, all Newton iterations (location of special points included) and labels of a run.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ NU = 0.3
 
 
 def strains(M1, M3, kappa):
-    """w1, w3 of the law (9)."""
+    """Return w1, w3 of the law (9)."""
     p = M1 + (1 - NU) * kappa
     r = (p * p + M3 * M3) ** 0.5
     a = (p + r) / 2
@@ -26,18 +26,18 @@ def strains(M1, M3, kappa):
 
 
 def spin(q0, q1, q2, q3, w1, w3, length):
-    """dq/dt for w2 = 0."""
+    """Return dq/dt for w2 = 0."""
     h = length / 2
     return [h * (-q1 * w1 - q3 * w3), h * (q0 * w1 + q2 * w3), h * (q3 * w1 - q1 * w3), h * (-q2 * w1 + q0 * w3)]
 
 
 def second(q0, q1, q2, q3):
-    """Lab components of d2."""
+    """Return the lab components of d2."""
     return 2 * (q1 * q2 - q0 * q3), q0**2 - q1**2 + q2**2 - q3**2, 2 * (q2 * q3 + q0 * q1)
 
 
 def half_rates(u, p):
-    """The thirteen components, over [0, L/2]."""
+    """Return the thirteen components, over [0, L/2]."""
     M1, M2, M3, R1, R2, R3, q0, q1, q2, q3 = (u[i] for i in range(10))
     w1, w3 = strains(M1, M3, p[0])
     rates = [M2 * w3 + R2, M3 * w1 - M1 * w3 - R1, -M2 * w1, R2 * w3, R3 * w1 - R1 * w3, -R2 * w1]
@@ -47,7 +47,7 @@ def half_rates(u, p):
 
 
 def half_conditions(a, b, p):
-    """Mirrors at both ends."""
+    """Return the conditions of mirrors at both ends."""
     q0, q1, q2, q3 = (b[i] for i in range(6, 10))
     return [
         a[2], a[3], a[4], a[6] - 1, a[7], a[8], a[9], a[10], a[11], a[12],
@@ -67,7 +67,7 @@ def half_start(u, p, t):
 
 
 def cell_rates(u, p):
-    """The quarter wave of (1, 2); p = kappa_n, M1, M2."""
+    """Return the quarter wave of (1, 2); p = kappa_n, M1, M2."""
     q0, q1, q2, q3 = (u[i] for i in range(4))
     M1 = (q0**2 + q1**2 - q2**2 - q3**2) * p[1] + 2 * (q1 * q2 + q0 * q3) * p[2]
     M3 = 2 * (q1 * q3 + q0 * q2) * p[1] + 2 * (q2 * q3 - q0 * q1) * p[2]
@@ -75,7 +75,7 @@ def cell_rates(u, p):
 
 
 def cell_conditions(a, b, p):
-    """The frame at S = 0; d2 normal to the moment at the other end, and turned about it by pi/4."""
+    """Return the conditions: the frame at S = 0; d2 normal to the moment at the other end, turned about it by pi/4."""
     x, y, z = second(b[0], b[1], b[2], b[3])
     c = math.sqrt(0.5)
     moment = -((p[1] * p[1] + p[2] * p[2]) ** 0.5)

@@ -1,8 +1,8 @@
 """SciPy's ``solve_bvp`` on the cell of the branch (1, 2), driven by a pseudo-arclength loop, with analytic Jacobians.
 
-``solve_bvp`` has no continuation and no folds, so both are here, in the way that costs it least: arclength is measured in the
+``solve_bvp`` has no continuation and no folds. Both are here, in the fastest way for it: arclength is measured in the
 three parameters (one boundary condition, no further state), each solution starts from the mesh of the last one, the loop runs
-at a coarse tolerance until kappa_n turns, and only then the fold is taken to the wanted tolerance, as the maximum of kappa_n
+at a coarse tolerance beyond the fold, and then the fold is computed to the final tolerance, as the maximum of kappa_n
 over M2 by interpolation. States (q0 q1 q2 q3), parameters (kappa_n, M1, M2); the same equations as ``auto/cell.f90``.
 """
 
@@ -18,7 +18,7 @@ NU, LENGTH, TURN = 0.3, np.pi / 4, np.pi / 4
 
 
 def directors(q):
-    """Lab components of d1 and d2, shape (2, 3, ...), and their derivatives by q, shape (2, 3, 4, ...)."""
+    """Return the lab components of d1 and d2, shape (2, 3, ...), and their derivatives by q, shape (2, 3, 4, ...)."""
     q0, q1, q2, q3 = q
     d = [
         [q0**2 + q1**2 - q2**2 - q3**2, 2 * (q1 * q2 + q0 * q3), 2 * (q1 * q3 - q0 * q2)],
@@ -47,13 +47,13 @@ def strains(M1, M3, kappa):
 
 
 def _third(q):
-    """Components of the lab axes 1 and 2 on d3, shape (2, points), and their derivatives by q, shape (2, 4, points)."""
+    """Return the components of the lab axes 1 and 2 on d3, shape (2, points), and derivatives by q, shape (2, 4, points)."""
     q0, q1, q2, q3 = q
     return np.array([2 * (q1 * q3 + q0 * q2), 2 * (q2 * q3 - q0 * q1)]), 2 * np.array([[q2, q3, q0, q1], [-q1, -q0, q3, q2]])
 
 
 def _local(q, p):
-    """Strains, d(M1, M3)/dq (2, 4, points), d(M1, M3)/d(M1, M2) at S = 0 (2, 2, points)."""
+    """Return the strains, d(M1, M3)/dq (2, 4, points), d(M1, M3)/d(M1, M2) at S = 0 (2, 2, points)."""
     kappa, m1, m2 = p
     d, slopes = directors(q)
     third, third_slopes = _third(q)
@@ -77,7 +77,7 @@ def rhs(t, q, p):
 
 
 def rhs_jacobian(t, q, p):
-    """Derivatives by q (4, 4, points) and by kappa_n, M1, M2 (4, 3, points)."""
+    """Return the derivatives by q (4, 4, points) and by kappa_n, M1, M2 (4, 3, points)."""
     (w1, w3, slopes), by_q, by_moment = _local(q, p)
     spin, h, zero = _spins(q), LENGTH / 2, np.zeros_like(w1)
     gain = np.einsum("sip,stp->itp", spin, slopes)  # dq'/d(M1, M3, kappa_n)
@@ -88,7 +88,7 @@ def rhs_jacobian(t, q, p):
 
 
 def _conditions(q, qb, p):
-    """The six conditions of the cell and their derivatives by q(0), q(1), p: shapes (6,), (6, 4), (6, 4), (6, 3)."""
+    """Return the six conditions of the cell and their derivatives by q(0), q(1), p: shapes (6,), (6, 4), (6, 4), (6, 3)."""
     _, m1, m2 = p
     (_, d2), (_, s2) = directors(qb)
     mu, c, s = -np.hypot(m1, m2), np.cos(TURN), np.sin(TURN)
@@ -103,13 +103,13 @@ def _conditions(q, qb, p):
 
 
 class Loop:
-    """Solutions along the branch; ``solutions`` and ``nodes`` count what it took."""
+    """Solutions along the branch; ``solutions`` and ``nodes`` are counters of the work."""
 
     def __init__(self):
         self.solutions, self.nodes = 0, 0
 
     def solve(self, row, target, guess, tolerance):
-        """The solution with row . (kappa_n, M1, M2) = target, from (t, q, p)."""
+        """Return the solution with row . (kappa_n, M1, M2) = target, from (t, q, p)."""
 
         def boundary(q, qb, p):
             return np.append(_conditions(q, qb, p)[0], row @ p - target)
@@ -131,7 +131,7 @@ class Loop:
         return found.x, found.y, found.p
 
     def branch(self, tolerance, until, first=0.3, step=0.4):
-        """Points from M2 = ``first`` beside the bifurcation on, until ``until(points)``, by pseudo-arclength with secants."""
+        """Return points from M2 = ``first`` near the bifurcation until ``until(points)``, by pseudo-arclength with secants."""
         t = np.linspace(0, 1, 6)
         circle = np.array([np.cos(LENGTH * t / 2), np.sin(LENGTH * t / 2), 0 * t, 0 * t])
         guess = t, circle, np.array([2.5, -1.5, first])
@@ -150,7 +150,7 @@ class Loop:
 
 
 def fold(tolerance: float) -> dict:
-    """kappa_n at the fold of (1, 2) with ``tol`` of solve_bvp, and the seconds it took.
+    """Return kappa_n at the fold of (1, 2) with ``tol`` of solve_bvp, and the seconds.
 
     Near the fold kappa_n is a smooth function of M2: the next point is where the polynomial through the last ones has its
     maximum, until that moves kappa_n by less than the tolerance asks for.
@@ -182,7 +182,7 @@ def fold(tolerance: float) -> dict:
 
 
 def _maximum(x, y):
-    """Where the polynomial through the points (x, y) has its maximum, next to the largest y."""
+    """Return the place of the maximum of the polynomial through the points (x, y), next to the largest y."""
     centre = x[int(np.argmax(y))]
     polynomial = np.polynomial.Polynomial(np.linalg.solve(np.vander(np.array(x) - centre, increasing=True), y))
     roots = polynomial.deriv().roots()

@@ -1,4 +1,4 @@
-"""What happens to runs of many branches."""
+"""Faults of runs of many branches."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tortures.runs import Run, Scene, claim, columns
 
 
 def content(folder: Path) -> dict[str, object]:
-    """Columns of all branches, and the graph."""
+    """Return the columns of all branches, and the graph."""
     found: dict[str, object] = {path.name: columns(path) for path in sorted(folder.glob("*.h5"))}
     graph = json.loads((folder / "diagram.json").read_text())
     found["nodes"] = sorted(json.dumps(node, sort_keys=True) for node in graph["nodes"])
@@ -37,9 +37,9 @@ def _alive(pid: int) -> bool:
 
 
 def trial(scene: Scene, number: int | None, chance: random.Random) -> float:
-    """A diagram hit by a signal (None: one of its workers is killed), looked at, and computed to its end; 0.0.
+    """Send a signal to a diagram (None: kill one of its workers), check it, and compute it to its end; return 0.0.
 
-    Branches that were finished are not computed again.
+    Finished branches are not computed again.
     """
     out = scene.folder / "out"
     run = Run(scene.folder, *scene.words)

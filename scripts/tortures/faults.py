@@ -1,4 +1,4 @@
-"""What happens to runs of one branch; each fault starts a run, lets it happen, waits for the end, and returns the run."""
+"""Faults of runs of one branch. Each function starts a run, injects its fault, waits for the end, and returns the run."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from collections.abc import Callable
 
 from tortures.runs import TABLES, Fault, Run, Scene, claim, columns
 
-#: Starts a run, lets something happen to it at a random moment, waits for its end.
+#: Start a run, inject a fault at a random moment, wait for the end.
 Happening = Callable[[Scene, random.Random], Run]
 
 
 def _signalled(number: int, fresh: bool = False, twice: bool = False) -> Happening:
-    """A signal at a random moment."""
+    """Send a signal at a random moment."""
 
     def fault(scene: Scene, chance: random.Random) -> Run:
         run = scene.start(fresh=fresh)
@@ -35,7 +35,7 @@ def _signalled(number: int, fresh: bool = False, twice: bool = False) -> Happeni
 
 
 def _killed_while_writing(scene: Scene, chance: random.Random) -> Run:
-    """kill -9 between two lines of the code that writes."""
+    """Kill (-9) between two lines of the code that writes."""
     last, written = chance.randrange(1, scene.lines + 1), writers()
 
     def prepare():
@@ -65,7 +65,7 @@ def writers() -> tuple[str, ...]:
 
 
 def _no_room(scene: Scene, chance: random.Random) -> Run:
-    """No file may grow beyond a random size, as on a full disk."""
+    """Limit the size of files to a random value, as on a full disk."""
     size = chance.randrange(1, 2 * sum(map(len, scene.expected.values())))
 
     def prepare():
@@ -76,7 +76,7 @@ def _no_room(scene: Scene, chance: random.Random) -> Run:
 
 
 def _starved(scene: Scene, prepare: Callable[[], None] | None) -> Run:
-    """A run that cannot write everything: refused, and what was there is as it was."""
+    """Check a run that cannot write everything: it is rejected, and the old file is unchanged."""
     before = scene.path.read_bytes() if scene.path.exists() else None
     run = scene.start(prepare=prepare)
     code = run.wait()
@@ -89,7 +89,7 @@ def _starved(scene: Scene, prepare: Callable[[], None] | None) -> Run:
 
 
 def _full_disk(scene: Scene, chance: random.Random) -> Run:
-    """A small disk with little room left; where none can be mounted, the limit on the size of files."""
+    """Run on a small disk with little space; if none can be mounted, limit the size of files."""
     kept, disk = scene.path.read_bytes() if scene.path.exists() else b"", scene.folder.parent / f"{scene.folder.name}.disk"
     disk.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", disk], capture_output=True).returncode:
@@ -111,7 +111,7 @@ def _full_disk(scene: Scene, chance: random.Random) -> Run:
 
 
 def _read_only(scene: Scene, chance: random.Random) -> Run:
-    """A folder that cannot be written to from some moment on; as nobody, for whom permissions count."""
+    """Make the folder read-only at some moment, as a user without rights."""
     user = 65534 if os.getuid() == 0 else os.getuid()
     if os.getuid() == 0:
         for path in (scene.folder, *scene.folder.iterdir()):
@@ -128,7 +128,7 @@ def _read_only(scene: Scene, chance: random.Random) -> Run:
 
 
 def _two_at_once(scene: Scene, chance: random.Random) -> Run:
-    """A second run on the same file at a random moment: refused, and the first one ends as if alone."""
+    """Start a second run on the same file at a random moment: it is rejected, and the first one is not affected."""
     run = scene.start()
     time.sleep(scene.moment(chance))
     twin = dataclasses.replace(scene).start() if scene.path.exists() else Run(scene.folder, *scene.words)
@@ -138,7 +138,7 @@ def _two_at_once(scene: Scene, chance: random.Random) -> Run:
 
 
 def _power_cut(scene: Scene, chance: random.Random) -> Run:
-    """kill -9, and what was not synchronized with the disk is lost: a file being written keeps a part of its bytes."""
+    """Kill (-9) and lose unsynchronized data: a file that is being written keeps a part of its bytes."""
     run = _signalled(signal.SIGKILL)(scene, chance) if chance.random() < 0.5 else _killed_while_writing(scene, chance)
     for path in scene.folder.glob(".*.part"):
         os.truncate(path, chance.randrange(path.stat().st_size + 1))
@@ -146,7 +146,7 @@ def _power_cut(scene: Scene, chance: random.Random) -> Run:
 
 
 def _cut_file(scene: Scene, chance: random.Random) -> Run:
-    """The result itself loses its end, which no program can prevent: it is refused in a sentence."""
+    """Truncate the result itself: it is rejected in a sentence."""
     run = _signalled(signal.SIGKILL)(scene, chance)
     if not scene.path.exists():
         return run
@@ -178,7 +178,7 @@ FAULTS = {
 
 
 def inspect(scene: Scene, run: Run) -> float:
-    """Look at what a fault left; seconds of the run whose points are not there."""
+    """Check the file after a fault; return the seconds of the run whose points are lost."""
     kept, saved, computed = run.progress
     if not scene.path.exists():
         claim(kept == 0, f"{kept:.0f} points were on disk, and the file is gone")
@@ -198,7 +198,7 @@ def inspect(scene: Scene, run: Run) -> float:
 
 
 def trial(scene: Scene, fault: Happening, chance: random.Random) -> float:
-    """Let a fault hit a scene once or a few times, then go on to its end; the longest piece lost, seconds."""
+    """Inject a fault into a scene once or a few times, then resume to its end; return the longest loss in seconds."""
     lost = 0.0
     for _ in range(chance.choice([1, 1, 2, 3])):
         run = fault(scene, chance)

@@ -1,4 +1,4 @@
-"""Runs of ``branches.run`` as processes that tell how far they are, and the scenes that they compute."""
+"""Runs of ``branches.run`` as processes that report their progress, and their scenes."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ PATIENCE = 120.0
 
 
 class Fault(Exception):
-    """What a trial found wrong, in words."""
+    """A failure of a trial; the message says what is wrong."""
 
 
 def claim(fact: object, text: str) -> None:
-    """Fault unless ``fact``."""
+    """Raise Fault unless ``fact``."""
     if not fact:
         raise Fault(text)
 
 
 class Run:
-    """``python -m branches.run ...`` in a folder: forked from this process, which has the compiled code, or from nothing.
+    """``python -m branches.run ...`` in a folder: forked from this process, which has the compiled code, or started anew.
 
     Attributes
     ----------
     progress : shared array of float
-        Points on disk for certain; when the last one got there; when the last one was computed (monotonic clock).
+        Number of points on disk; time when the last one was written; time when the last one was computed (monotonic clock).
     """
 
     def __init__(self, folder: Path, *words: str, fresh: bool = False, prepare: Callable[[], None] | None = None):
@@ -58,12 +58,12 @@ class Run:
             _child(folder, argv, self._said, self.progress, prepare)
 
     def send(self, number: int) -> None:
-        """A signal, if it still runs."""
+        """Send a signal, if it still runs."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, number)
 
     def wait(self) -> int:
-        """The exit code, negative for a signal; Fault if it hangs, or says more than a line of what is wrong."""
+        """Return the exit code, negative for a signal; raise Fault if it hangs, or reports an error in more than one line."""
         until = time.monotonic() + PATIENCE
         while (code := self._poll()) is None:
             if time.monotonic() > until:
@@ -83,7 +83,7 @@ class Run:
         return None if pid == 0 else os.waitstatus_to_exitcode(status)
 
     def said(self) -> str:
-        """What it wrote to standard error."""
+        """Return its standard error."""
         return self._said[1].read_text(errors="replace")
 
 
@@ -93,7 +93,7 @@ def _default_signals() -> None:
 
 
 def _child(folder: Path, argv: list[str], said: list[Path], progress, prepare) -> None:
-    """What a forked run does; never returns."""
+    """Do a forked run; never returns."""
     code = 70
     try:
         os.setpgid(0, 0)
@@ -121,7 +121,7 @@ def _child(folder: Path, argv: list[str], said: list[Path], progress, prepare) -
 
 
 def _report(progress) -> None:
-    """Have the writer say how far it is, and write as often as it may."""
+    """Let the writer report its progress, and write as often as possible."""
     from branches.store import BranchWriter
 
     append, checkpoint = BranchWriter.append, BranchWriter.checkpoint
@@ -140,7 +140,7 @@ def _report(progress) -> None:
 
 @dataclasses.dataclass
 class Scene:
-    """A scene on the rack: its folder, the words of its command, how long it takes undisturbed, and what comes out."""
+    """A scene under test: its folder, the words of its command, its time without faults, and its result."""
 
     name: str
     folder: Path
@@ -155,16 +155,16 @@ class Scene:
         return self.folder / "x.h5"
 
     def start(self, **options) -> Run:
-        """A run that goes on with what there is."""
+        """Return a run that resumes."""
         return Run(self.folder, *self.words, *(["--resume"] if self.path.exists() else []), **options)
 
     def moment(self, chance: random.Random) -> float:
-        """A random time within the run."""
+        """Return a random time within the run."""
         return chance.uniform(0, 1.05 * self.seconds)
 
 
 def columns(path: Path) -> dict[str, bytes]:
-    """All columns of a result, bit by bit, with plain h5py."""
+    """Return all columns of a result, bit by bit, with plain h5py."""
     import h5py
 
     with h5py.File(path, "r") as file:

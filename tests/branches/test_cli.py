@@ -44,8 +44,8 @@ def test_a_command_does_the_same_as_its_module(command):
 
 def test_an_unknown_command_is_answered_in_one_sentence(call):
     done = call(cli.main, "rum")
-    assert done.returncode == 2 and done.err.startswith("error: there is no command 'rum'; known are run, ")
-    assert call(cli.main).err.startswith("error: a command is needed; known are run, ")
+    assert done.returncode == 2 and done.err.startswith("error: there is no command 'rum'; the commands are run, ")
+    assert call(cli.main).err.startswith("error: a command is needed; the commands are run, ")
 
 
 def test_it_is_installed_as_ribbon(root):

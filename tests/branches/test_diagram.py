@@ -120,7 +120,7 @@ def test_a_second_run_computes_what_is_missing_only(folder, capsys):
 
 
 @pytest.mark.parametrize("change, said", [
-    ("nu=0.25", "ribbon_nu0.3_m1_n2.h5 is no branch of this one"),
+    ("nu=0.25", "ribbon_nu0.3_m1_n2.h5 is not a branch of this one"),
     ("limits={kappa_n: [-50, 100]}", "ribbon_nu0.3_m1_n2.h5: limits = "),
 ])  # fmt: skip
 def test_a_folder_of_another_scene_is_refused(folder, change, said):
@@ -140,7 +140,7 @@ def test_a_scene_with_more_branches_goes_on_and_overwrite_replaces(tmp_path):
     assert run_diagram(other, tmp_path, Display(silent=True), overwrite=True) == "complete"
     assert [family[1] for family in diagram.families(diagram.read(tmp_path))] == [0.32]
     (tmp_path / "diagram.json").write_text("{}")
-    with pytest.raises(StoreError, match="no result of branches.run"):
+    with pytest.raises(StoreError, match="not a result of branches.run"):
         run_diagram(other, tmp_path, Display(silent=True))
 
 
@@ -270,9 +270,9 @@ def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
         ("{m: [1, 2.5], n: 2}", "m: "),
         ("{m: [1], n: [1]}", "none of its branches"),
         ("{m: [], n: [1]}", "m: the list is empty"),
-        ("{m: [1, 1], n: [2]}", r"ribbon, nu = 0.3, \(1, 2\) stands twice"),
-        ("{m: 1, n: 2, nu: [0.3, 0.3]}", r"ribbon, nu = 0.3, \(1, 2\) stands twice"),
-        ("{m: 1, n: 2, nu: [0, 0.0]}", "nu = 0, .* stands twice"),
+        ("{m: [1, 1], n: [2]}", r"ribbon, nu = 0.3, \(1, 2\) is listed twice"),
+        ("{m: 1, n: 2, nu: [0.3, 0.3]}", r"ribbon, nu = 0.3, \(1, 2\) is listed twice"),
+        ("{m: 1, n: 2, nu: [0, 0.0]}", "nu = 0, .* is listed twice"),
         ("{m: 1, n: 2, law: finite width, Gamma: [1.0, 1.0000000000001]}", "1 and 1.0000000000001 agree in 12 digits"),
         ("{pairs: [[1, 2]], m: 3}", "pairs"),
         ("{pairs: [[1, 2, 3]]}", "pairs: must be a list of"),

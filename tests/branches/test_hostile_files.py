@@ -166,7 +166,7 @@ def test_files_that_lost_their_end(good, tmp_path, silent, part):
 @pytest.mark.parametrize("text", ["", "[]", "{}", "null", "[" * 100_000, '{"nodes": 3}', '{"nodes": [], "edges": 1}', "\0"])
 def test_diagrams_that_are_none(tmp_path, text):
     (tmp_path / "diagram.json").write_text(text)
-    assert "no diagram" in refused(lambda: diagram.read(tmp_path))
+    assert "not a diagram" in refused(lambda: diagram.read(tmp_path))
 
 
 def test_diagrams_with_a_value_changed(good, tmp_path):

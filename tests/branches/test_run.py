@@ -55,17 +55,18 @@ def rows(path):
         return file["points"][:]
 
 
-def test_zeros_that_agree_in_six_digits_have_two_names(tmp_path, capsys):
-    path = tmp_path / "x.h5"
-    run_branch(scene_of(zeros={"kappa_n": [3.0, 3.0000001]}, limits={"kappa_n": (-100.0, 3.2000001)}), path, Display())
+def test_zeros_that_agree_in_six_digits_have_names_of_their_own(tmp_path, capsys):
+    path, values = tmp_path / "x.h5", [3.0, 3.0000001, 3.00000014]
+    run_branch(scene_of(zeros={"kappa_n": values}, limits={"kappa_n": (-100.0, 3.2000001)}), path, Display())
     with h5py.File(path) as file:
         events = file["events"][:]
     zeros = events[events["label"] == b"UZ"]
-    assert zeros["name"].tolist() == [b"kappa_n = 3", b"kappa_n = 3.0000001"]
-    assert zeros["kappa_n"] == pytest.approx([3.0, 3.0000001], abs=1e-11)
+    assert zeros["name"].tolist() == [b"kappa_n = 3", b"kappa_n = 3.0000001", b"kappa_n = 3.00000014"]
+    assert zeros["kappa_n"] == pytest.approx(values, abs=1e-11)
     assert events["name"][-1] == b"kappa_n = 3.2000001"
     said = capsys.readouterr().out
-    assert "user value (kappa_n = 3.0000001) at" in said and "stopped: reached kappa_n = 3.2000001" in said
+    assert "user value (kappa_n = 3.0000001) at" in said
+    assert "stopped: reached kappa_n = 3.2000001, the scene's own limit" in said
 
 
 # --- the main job ---------------------------------------------------------------------------------------------------
@@ -156,7 +157,7 @@ MISTAKES = {
     "name too long": (["scene.yaml", "--out", "x" * 300], "too long"),
     "folder is a file": (["scene.yaml", "--out", "scene.yaml/x.h5"], "scene.yaml' is not a folder"),
     "folder cannot be made": (["scene.yaml", "--out", "/proc/none/x.h5"], "cannot write '/proc/none/x.h5'"),
-    "foreign file": (["scene.yaml", "--out", "foreign.h5"], "exists and is no readable result of this program"),
+    "foreign file": (["scene.yaml", "--out", "foreign.h5"], "exists and is not a readable result of this program"),
     "foreign file to resume": (["scene.yaml", "--out", "foreign.h5", "--resume"], "not a readable HDF5 file"),
     "another scene": (["scene.yaml", "--out", "other.h5"], "another scene (n = 3 there, 2 here); --overwrite"),
     "another scene to resume": (["scene.yaml", "--out", "other.h5", "--resume"], "another scene (n = 3 there, 2 here); resume"),
@@ -189,7 +190,7 @@ def test_an_unfinished_result_is_not_replaced_unasked(tmp_path, silent, undistur
     path, config = tmp_path / "x.h5", scene_of()
     stop = silent({9: lambda: os.kill(os.getpid(), signal.SIGINT)})
     assert run_branch(config, path, stop) == "interrupted"
-    with pytest.raises(StoreError, match="unfinished run of this scene; --resume goes on"):
+    with pytest.raises(StoreError, match="unfinished run of this scene; --resume continues it"):
         run_branch(config, path, silent())
     assert run_branch(config, path, silent(), overwrite=True) == "complete"
     assert tables(path) == undisturbed(config)
@@ -400,7 +401,7 @@ def test_a_run_extended_is_the_run_that_went_on(tmp_path, silent, undisturbed, t
     ({"steps": {"max_points": 10}}, {"nu": 0.2, "steps": {"max_points": 20}}, "nu = 0.3 there, 0.2 here"),
     ({"steps": {"max_points": 10}}, {"steps": {"max_points": 20, "largest": 0.1}}, "steps = "),
     ({"steps": {"max_points": 10}}, {"steps": {"max_points": 5}}, "max_points: 5 must exceed the 9 points taken already"),
-    ({"steps": {"max_points": 20}}, {"limits": {"kappa_n": (0, 3)}}, "limits: kappa_n: 0, 3 must contain the place to go on"),
+    ({"steps": {"max_points": 20}}, {"limits": {"kappa_n": (0, 3)}}, "kappa_n: 0, 3 must contain the last point of the file"),
 ])  # fmt: skip
 def test_a_run_that_cannot_be_extended_so(tmp_path, silent, first, then, said):
     path = tmp_path / "x.h5"

@@ -114,7 +114,7 @@ def test_a_file_holds_its_scene(returned):
         ("domain=half loop between axes", "must be 'half loop'"),
         ("origin.mode=sideways", "mode: 'sideways' must be"),
         ("origin.kappa_n=-300", "limits: kappa_n"),
-        ("m=[3, 5]", "belongs to a scene of one branch"),
+        ("m=[3, 5]", "must not be given in a scene of many branches"),
     ],
 )
 def test_origins_that_are_none(change, message):
@@ -123,7 +123,7 @@ def test_origins_that_are_none(change, message):
 
 
 def test_an_origin_beside_the_branch_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="is no point of the branch"):
+    with pytest.raises(ConfigError, match="is not on the branch"):
         run_branch(parse(SCENE, "scene", ["origin.kappa_star=2.5"]), tmp_path / "x.h5", Display(silent=True))
 
 

@@ -116,7 +116,7 @@ def test_the_scenes_that_come_with_it(root):
         (["strip.colour=1"], "unknown field 'strip.colour'; the fields are width, thickness"),
         (["strip={width: 1}"], "the field 'strip.thickness' is missing"),
         (["strip=3"], "strip: must hold the fields width"),
-        (["nu=.3"], "nu: stands beside strip"),
+        (["nu=.3"], "nu: must not be given together with strip"),
         (["zeros=3"], "zeros: must hold"),
         (["strip.thickness=1e-300", "strip.youngs_modulus=1e-300"], "overflow"),
     ],

@@ -193,11 +193,11 @@ def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
 
 def test_a_branch_stops_where_the_law_ends():
     """(3, 1) at Gamma = 10 runs off to where U loses its convexity; the quadrature is lost at the same kappa_n."""
-    found = followed(3, 1, 10.0, monitors=convexity.monitors(FINITE_WIDTH))
+    found = followed(3, 1, 10.0, test_functions=convexity.test_functions(FINITE_WIDTH))
     assert found.stop.reason == "event" and convexity.NAME in found.stop.message
     lost = exact_finite_width.curve(3, 1, NU, 10.0)[-1]
     assert lost.label == "MX" and lost.kappa_n == pytest.approx(found.points[-1]["kappa_n"], abs=0.05)
-    assert not convexity.monitors(RIBBON)
+    assert not convexity.test_functions(RIBBON)
 
 
 def test_a_flat_rod_of_no_width():

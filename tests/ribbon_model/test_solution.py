@@ -44,7 +44,7 @@ def test_what_is_not_carried_over(point):
     half = Solution.of(point).on(HALF_LOOP)
     assert half.on(HALF_LOOP) is half
     for other in (CELL, HALF_LOOP_BETWEEN_AXES):
-        with pytest.raises(ValueError, match="half loop is not carried"):
+        with pytest.raises(ValueError, match="half loop cannot be transferred"):
             half.on(other)
     system, x = half.on(LOOP).discretized()
     assert np.abs(system.residual(x)).max() < 1e-8

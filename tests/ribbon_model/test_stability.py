@@ -90,7 +90,7 @@ def test_one_direction_changes_at_a_fold_and_keeps_the_symmetry(m, n):
         if fold.label != "LP":
             continue
         found = index(equilibrium(fold))
-        assert not found.decided and "cannot be told from zero" in found.reason
+        assert not found.decided and "cannot be distinguished from zero" in found.reason
         assert found.critical.name == (0, "even")
         assert abs(found.critical.eigenvalues[found.critical.nearest]) < 1e-9
         before, after = (index(equilibrium(points[k])) for k in (at - 1, at + 1))

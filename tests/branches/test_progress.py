@@ -1,0 +1,167 @@
+"""The line of progress: on a terminal only, overwritten in place, with an estimate that converges."""
+
+import io
+import os
+import time
+
+import pytest
+
+from branches import progress as module
+from branches import shell
+from branches.progress import Progress, StartingDisplay
+from contin import exact_text
+
+TAPE = "--width .016 --thickness .00012 --length .6 --natural-radius .03 --poisson-ratio .3 --youngs-modulus 200e9"
+
+
+class Terminal(io.StringIO):
+    """Standard error that claims to be a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def a_terminal(monkeypatch):
+    """Put it in place of standard error: in the test itself, since pytest replaces that after the fixtures."""
+    monkeypatch.setenv("COLUMNS", "200")
+    stream = Terminal()
+    monkeypatch.setattr("sys.stderr", stream)
+    return stream
+
+
+def lines(text):
+    """What stood in the line, one after the other."""
+    return [part for part in (line.rstrip() for line in text.split("\r")) if part]
+
+
+def test_the_line_is_overwritten_and_goes_away(monkeypatch, capsys):
+    terminal = a_terminal(monkeypatch)
+    with Progress("branches", total=2) as progress:
+        progress.part("(1, 2)")
+        progress.part_done()
+        progress.tell("a line\n")
+        progress.part("(1, 3)")
+        progress.part_done()
+    shown = terminal.getvalue()
+    assert "\n" not in shown and shown.endswith(" " * 199 + "\r")  # the terminal's width but one, blank
+    assert "0 of 2 branches done, 0 s so far: (1, 2)" in lines(shown)
+    assert lines(shown)[-1].startswith("2 of 2 branches done, 0 s so far, about 0 s to go")
+    assert capsys.readouterr().out == "a line\n"
+
+
+def test_a_line_inside_another_one_is_shown_in_its_place(monkeypatch):
+    terminal = a_terminal(monkeypatch)
+    with Progress("items", total=2) as outer:
+        with Progress("cases", total=3) as inner:
+            inner.part("thin")
+            outer.part("fig7")
+        outer.part_done()
+    shown = list(dict.fromkeys(lines(terminal.getvalue())))  # each is written twice, for the cursor to end behind it
+    assert [line.split()[3] for line in shown] == ["cases", "items"] and shown[1].startswith("1 of 2 items done")
+
+
+def test_nothing_is_shown_if_quiet_or_elsewhere_than_on_a_terminal(monkeypatch, capsys):
+    terminal = a_terminal(monkeypatch)
+    with Progress("branches", total=1, quiet=True) as progress:
+        progress.part("(1, 2)")
+        progress.tell("a line\n")
+    assert terminal.getvalue() == "" == capsys.readouterr().out
+    plain = io.StringIO()
+    monkeypatch.setattr("sys.stderr", plain)
+    with Progress("branches", total=1) as progress:
+        progress.part("(1, 2)")
+    assert plain.getvalue() == ""
+
+
+def test_the_line_moves_while_nothing_happens(monkeypatch):
+    terminal = a_terminal(monkeypatch)
+    monkeypatch.setattr(module, "_PERIOD", 0.01)
+    with Progress("starting"):
+        time.sleep(0.3)
+    assert len(lines(terminal.getvalue())) > 3
+
+
+def test_the_estimate_converges(monkeypatch):
+    """Ten parts of 7 s: exact from the first one on, also between the ends of two parts."""
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    progress = Progress("branches", total=10)
+    assert "to go" not in progress.text()
+    for done in range(1, 11):
+        progress.part("next")
+        now[0] += 5
+        if done > 1:
+            assert f", about {exact_text(70 - now[0])} s to go" in progress.text()
+        now[0] += 2
+        progress.part_done()
+        so_far, left = exact_text(now[0]), exact_text(70 - now[0])
+        assert f"{done} of 10 branches done, {so_far} s so far, about {left} s to go" in progress.text()
+    now[0] += 1000
+    assert "18 min so far, about 0 s to go" in progress.text()  # never negative
+
+
+def test_a_part_that_takes_longer_than_the_others_raises_the_estimate(monkeypatch):
+    """Two parts in 100 s so far: 50 s for each of the three that are left, less 50 s of the current one."""
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    progress = Progress("items", total=4)
+    now[0] += 2
+    progress.part_done()
+    progress.part("long")
+    now[0] += 98
+    assert progress.text() == "1 of 4 items done, 100 s so far, about 100 s to go: long"
+
+
+def shown_on_a_terminal(command, *arguments, program, **more):
+    """What a command writes on a pseudo-terminal."""
+    pty = pytest.importorskip("pty")
+    ours, theirs = pty.openpty()
+    process = command.start(*arguments, program=program, stderr=theirs, env={"COLUMNS": "200", **more})
+    os.close(theirs)
+    shown = b""
+    while True:
+        try:
+            part = os.read(ours, 65536)
+        except OSError:  # how Linux says that the other end is closed
+            break
+        if not part:
+            break
+        shown += part
+    os.close(ours)
+    process.stdout.close()
+    assert process.wait() == 0
+    return lines(shown.decode())
+
+
+def test_a_strip_on_a_terminal(command):
+    shown = shown_on_a_terminal(command, *TAPE.split(), program=("-m", "branches.strip"))
+    assert any("branches done" in line and "to go: (1, 3)" in line for line in shown)
+    assert shown_on_a_terminal(command, *TAPE.split(), "--quiet", program=("-m", "branches.strip")) == []
+
+
+def test_secondary_branches_on_a_terminal(command):
+    (command.folder / "pair.yaml").write_text("{m: 5, n: 2, stability: true, limits: {kappa_n: [-21, 100]}, stride: 20}")
+    assert command("pair.yaml", "--quiet").returncode == 0
+    shown = shown_on_a_terminal(command, "pair.h5", program=("-m", "branches.secondary"))
+    assert any("secondary bifurcations done" in line and "keeps" in line for line in shown)
+
+
+def test_the_start_of_a_run_is_shown_until_its_first_output(monkeypatch, capsys):
+    """A first run compiles for a minute before it has anything to say."""
+    terminal = a_terminal(monkeypatch)
+    monkeypatch.setattr(module, "_PERIOD", 0.01)
+    display = StartingDisplay()
+    time.sleep(0.1)
+    display.note("the run")
+    shown = terminal.getvalue()
+    assert lines(shown)[-1] == "starting (the first run compiles machine code, which takes about a minute): 0 s so far"
+    time.sleep(0.1)
+    assert terminal.getvalue() == shown and capsys.readouterr().out == "the run\n"
+
+
+def test_a_case_of_finite_elements_is_counted(tmp_path, monkeypatch):
+    terminal = a_terminal(monkeypatch)
+    monkeypatch.setattr(shell, "version", lambda: "2.20")
+    monkeypatch.setattr(shell, "solve", lambda case, stopped: shell.Outcome(case, 0.7, (), "", 1.0, "2.20"))
+    shell.compute(shell.DEFAULT[:2], tmp_path / "x.h5")
+    assert lines(terminal.getvalue())[-1].startswith("2 of 2 cases done")
