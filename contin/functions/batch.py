@@ -28,7 +28,7 @@ from contin.functions.sparsity import sparsity_pattern
 #: The generated kernel. What it says is part of the fingerprint: an edit compiles every problem anew.
 _TEMPLATE = """
 def evaluate(
-    t: Vector, u: Matrix, v: Matrix, p: Vector, inputs: IndexVector, owner: IndexMatrix, seed: Vector, out: Matrix, jac: Stack
+    t: Vector, u: Matrix, v: Matrix, p: Vector, inputs: IndexVector, owner: IndexMatrix, work: Vector, out: Matrix, jac: Stack
 ) -> None:
     for i in range(u.shape[0]):
 {real}
@@ -37,13 +37,14 @@ def evaluate(
     for i in range(u.shape[0]):
         for colour in range(owner.shape[0]):
             for s in range(inputs[colour], inputs[colour + 1]):
-                seed[inputs[s]] = STEP
+                work[inputs[s]] = STEP
 {complex}
+            for row in range(owner.shape[1]):
+                if owner[colour, row] >= 0:
+                    jac[i, row, owner[colour, row]] = work[{inputs} + row] / STEP
             for s in range(inputs[colour], inputs[colour + 1]):
-                seed[inputs[s]] = 0.0
+                work[inputs[s]] = 0.0
 """
-#: Its line for the derivative of one value.
-_STORE_DERIVATIVE = "if owner[colour, {row}] >= 0: jac[i, {row}, owner[colour, {row}]] = complex({value}).imag / STEP"
 #: The complex step: no sum of it and a number of the problem is rounded to another number.
 _STEP = 2.0**-300
 
@@ -107,7 +108,7 @@ class Batch:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
         out = np.empty((len(u), self.count))
         try:
-            self._evaluate(t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_SEED, out, _NO_JACOBIAN)
+            self._evaluate(t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN)
         except Raised as error:
             raise error.exception() from None
         return out
@@ -116,7 +117,7 @@ class Batch:
         """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
         out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, colours.width))
         try:
-            self._evaluate(t, u, v, p, colours.inputs, colours.owner, np.zeros(self.signature.inputs), out, jac)
+            self._evaluate(t, u, v, p, colours.inputs, colours.owner, np.zeros(self.signature.inputs + self.count), out, jac)
         except Raised as error:
             exception = error.exception()
             if not isinstance(exception, ZeroDivisionError):
@@ -140,7 +141,7 @@ class Batch:
 
 
 #: Stand for a colouring and a Jacobian that are not asked for.
-_NO_INPUTS, _NO_OWNER, _NO_SEED = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0)
+_NO_INPUTS, _NO_OWNER, _NO_WORK = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0)
 _NO_JACOBIAN = np.empty((0, 0, 0))
 
 
@@ -155,10 +156,11 @@ def _source(signature: Signature, counts: Sequence[int], fills: Sequence[bool]) 
         for j in range(max(count, 1)):
             value = f"r[{j}]" if count else "r"
             real.append(f"out[i, {row}] = {value}")
-            step.append(_STORE_DERIVATIVE.format(row=row, value=value))
+            step.append(f"work[{signature.inputs + row}] = complex({value}).imag")
             row += 1
     return _TEMPLATE.format(
         real="\n".join(" " * 8 + line for line in real), complex="\n".join(" " * 12 + line for line in step),
+        inputs=signature.inputs,
     )  # fmt: skip
 
 
@@ -171,7 +173,7 @@ def _call(signature: Signature, index: int, filled: int | None, kind: str) -> li
     for name, component, size in groups:
         numbers = [component.format(j) for j in range(size)]
         if kind == "complex128":
-            numbers = [f"complex({number}, seed[{slot + j}])" for j, number in enumerate(numbers)]
+            numbers = [f"complex({number}, work[{slot + j}])" for j, number in enumerate(numbers)]
         slot += size
         inside = "".join(number + ", " for number in numbers)
         arguments.append(f"{name}({inside})" if filled is None else f"np.array([{inside}])")
