@@ -5,34 +5,29 @@ let idle = 0; // timer: pictures of the other states are drawn when nothing has 
 
 function readOut() {
   const { branch, s } = now,
-    whole = Math.abs(s - Math.round(s)) < 1e-9,
     [kind, word, index] = stability(branch, s);
+  const tag = `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`;
+  const columns = [...AXES].filter(([name]) => STRIPS || name !== "index");
   const rows = [
-    ["branch", nameOf(branch)],
-    ["κ<sub>n</sub> L/2π", digits(branch.value("kappa_n", s)), "kappa_n"],
-    ["κ*", digits(branch.value("kappa_star", s)), "kappa_star"],
-    ["energy", digits(branch.value("energy", s)), "energy"],
-    [
-      "stability",
-      `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`,
-      "stability",
-    ],
-    ...(branch.ruled ? [["rulings cross beyond", percent(widest(branch.strip(s))), "widest"]] : []),
-    [
-      "point",
-      branch.circle
-        ? "exact"
-        : whole
-          ? `${Math.round(s)} of ${branch.size - 1}${branch.labels[Math.round(s)] ? ` (${branch.labels[Math.round(s)]})` : ""}`
-          : `${Math.floor(s)} – ${Math.ceil(s)}`,
-      "point",
-    ],
+    ["branch", escaped(nameOf(branch))],
+    ...columns.map(([name, { brief }]) => [brief, digits(branch.value(name, s)), name]),
+    ...(STRIPS || branch.columns.index ? [["stability", tag, "stability"]] : []),
+    ...(STRIPS && branch.ruled ? [["rulings cross beyond", percent(widest(shownStrip())), "widest"]] : []),
+    ["point", pointName(branch, s), "point"],
   ];
   $("readout").innerHTML = rows
-    .map(([name, value, id]) => `<div><dt>${name}</dt><dd${id ? ` data-value="${id}"` : ""}>${value}</dd></div>`)
+    .map(([name, value, id]) => `<div><dt>${name}</dt><dd${id ? ` data-value="${escaped(id)}"` : ""}>${value}</dd></div>`)
     .join("");
   const text = story();
   if (!now.playing && $("story").textContent !== text) $("story").textContent = text;
+  $("snap").hidden = !atFold();
+}
+
+function pointName(branch, s) {
+  if (branch.circle) return "exact";
+  if (Math.abs(s - Math.round(s)) > 1e-9) return `${Math.floor(s)} – ${Math.ceil(s)}`;
+  const label = branch.labels[Math.round(s)];
+  return `${Math.round(s)} of ${branch.size - 1}${label ? ` (${escaped(label)})` : ""}`;
 }
 
 /** All states of the family at the present kappa_n, by energy. */
@@ -48,6 +43,7 @@ function coexisting() {
 
 function drawStates() {
   clearTimeout(idle);
+  if (!STRIPS) return;
   const found = coexisting();
   $("states-note").textContent = `${found.length} at κₙL/2π = ${short(now.branch.value("kappa_n", now.s))}, least energy first`;
   $("states").replaceChildren(

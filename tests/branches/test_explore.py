@@ -16,7 +16,8 @@ from branches.config import Config, parse
 from branches.diagram import run_diagram
 from branches.display import Display
 from branches.explore.__main__ import main
-from branches.explore.gather import CHANNELS, gather, shapes
+from branches.explore.gather import gather
+from branches.explore.strips import CHANNELS, shapes
 from branches.files import StoreError
 from branches.job import run_branch
 from branches.read import read_branch
@@ -385,7 +386,7 @@ def test_material_can_be_switched(pages, browser):
 @needs_chromium
 def test_export(pages, browser):
     browser.open(pages / "m1_n2.html")
-    for button in ("csv", "yaml", "diagram.svg", "diagram.png", "ribbon.svg", "ribbon.png"):
+    for button in ("csv", "yaml", "diagram.svg", "diagram.png", "strip.svg", "strip.png"):
         browser.js(f"document.querySelector('[data-save=\"{button}\"]').click()")
     points = read_branch(pages / "m1_n2.h5").points
     rows = list(csv.DictReader(browser.downloaded("m1_n2.csv").decode().splitlines()))
