@@ -13,6 +13,8 @@ class Branch {
     this.columns = {};
     for (const [name, text] of Object.entries(about.columns)) this.columns[name] = new Float64Array(bytes(text));
     this.circle = !("shapes" in about);
+    const { kappa_n, energy } = this.columns;
+    if (!this.profile) this.columns.elastic = kappa_n.map((k, i) => energy[i] + (k * k) / 2);
     this.size = this.columns[this.parameter].length;
     this.abscissa = this.columns.arclength || this.columns[this.parameter];
     this.id = this.circle ? `circle_${this.m}` : this.file.replace(/\.\w+$/, "");

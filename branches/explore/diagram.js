@@ -24,7 +24,7 @@ function hoverText(branch, i) {
   const mark = markAt(branch, i),
     [kind, word, index] = stability(branch, i);
   const special = mark && mark.kind in SYMBOLS ? `<br>${(mark.kind !== "user" && SYMBOLS[mark.kind][2]) || mark.name}` : "";
-  const columns = STRIPS ? [...AXES.keys()] : [now.x, now.y];
+  const columns = STRIPS ? COLUMNS : [now.x, now.y];
   const values = columns.map((name) => `<br>${AXES.get(name).brief} = ${digits(branch.columns[name][i])}`).join("");
   const known = branch.columns.index ? `<br>${word}${index && kind !== "unknown" ? `, index ${index}` : ""}` : "";
   return `<b>${escaped(nameOf(branch))}</b>${special}${values}${known}`;
@@ -113,13 +113,16 @@ function ringNames() {
 
 const ends = (values) => [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
 
+const median = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? Infinity;
+
 /** The part of the diagram that is shown: all of it, or of many branches the neighbourhood of the rings. */
 function extent(whole) {
   const places = now.family.branches.flatMap(({ columns }) => [...columns[now.x]].map((x, i) => [x, columns[now.y][i]]));
   let [low, high] = ends(places.map(([x]) => x));
   if (!whole && STRIPS && now.x === "kappa_n" && now.family.branches.length > 4)
     [low, high] = [Math.max(low, -8), Math.min(high, 14)];
-  const [bottom, top] = ends(places.filter(([x]) => x >= low && x <= high).map(([, y]) => y));
+  let [bottom, top] = ends(places.filter(([x]) => x >= low && x <= high).map(([, y]) => y));
+  if (!whole && STRIPS && now.y !== "kappa_star") top = Math.min(top, median(marks().map((mark) => mark.y))); // low ones matter
   const across = 0.06 * (high - low || 1),
     up = 0.08 * (top - bottom || 1);
   return { x: [low - across, high + across], y: [bottom - up, top + up] };

@@ -136,5 +136,9 @@ function exactBranch(name, m, n, nu) {
   if (m === n || m % (2 * n) === 0) return null; // a rigid motion, or the loop does not close without a force
   const law = EXACT_LAWS[name],
     mode = { m, n, nu };
-  return { law, mode, defect: (z) => law.defect(z, mode), values: (z) => law.values(z, mode) };
+  const values = (z) => {
+    const found = law.values(z, mode);
+    return { ...found, elastic: found.energy + found.kappa_n ** 2 / 2 };
+  };
+  return { law, mode, defect: (z) => law.defect(z, mode), values };
 }

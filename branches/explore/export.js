@@ -2,7 +2,7 @@
 // Files to take away: pictures, tables, the solid for a printer.
 
 function csv(branch) {
-  const names = Object.keys(branch.columns),
+  const names = Object.keys(branch.columns).filter((name) => name !== "elastic"), // the file holds the others
     head = [...(branch.circle ? [] : ["label"]), ...names].join(",");
   const rows = Array.from({ length: branch.size }, (_, i) =>
     [...(branch.circle ? [] : [branch.labels[i]]), ...names.map((name) => branch.columns[name][i])].join(","),

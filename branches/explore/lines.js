@@ -10,6 +10,7 @@ const SYMBOLS = {
   secondary: ["diamond", 9, STRIPS ? "secondary bifurcation" : "branch point", "◆"],
   hopf: ["square", 9, "Hopf point", "■"],
   user: ["x", 8, "given value", "✕"],
+  exact: ["star-open", 11, "fold of the exact solution", "☆"], // of an overlay
 };
 
 const wave = (number) => colour(`wave${((number - 1) % WAVES) + 1}`);

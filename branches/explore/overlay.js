@@ -66,7 +66,14 @@ function overlayName() {
 const overlayText = () =>
   overlay().family ? `computed: ${overlayName()}` : `exact solution, computed in this page: ${overlayName()}`;
 const overlayStroke = () => ({ color: colour("overlay"), dash: "solid", width: 1.3, simplify: false });
-const overlayEntries = () => (overlay() ? [{ text: overlayText(), stroke: overlayStroke() }] : []);
+const overlayEntries = () => {
+  const chosen = overlay();
+  if (!chosen) return [];
+  return [
+    { text: overlayText(), stroke: overlayStroke() },
+    ...(chosen.law ? [{ text: SYMBOLS.exact[2], symbol: "exact" }] : []),
+  ];
+};
 
 function overlayTraces() {
   const { x, y, folds } = overlayData(),

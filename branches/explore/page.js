@@ -105,8 +105,8 @@ function listChoices() {
   FAMILIES.forEach(({ name }, i) => $("family").add(new Option(name, String(i))));
   $("family-label").hidden = FAMILIES.length < 2;
   for (const id of ["x", "y"]) {
-    for (const [name, { title }] of AXES) {
-      const plain = Object.assign(document.createElement("span"), { innerHTML: title }).textContent;
+    for (const [name, { brief }] of AXES) {
+      const plain = Object.assign(document.createElement("span"), { innerHTML: brief }).textContent;
       if (!STRIPS || id === "y" || name === "kappa_n") $(id).add(new Option(plain, name));
     }
     $(id).value = now[id];

@@ -7,10 +7,9 @@ function readOut() {
   const { branch, s } = now,
     [kind, word, index] = stability(branch, s);
   const tag = `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`;
-  const columns = [...AXES].filter(([name]) => STRIPS || name !== "index");
   const rows = [
     ["branch", escaped(nameOf(branch))],
-    ...columns.map(([name, { brief }]) => [brief, digits(branch.value(name, s)), name]),
+    ...COLUMNS.map((name) => [AXES.get(name).brief, digits(branch.value(name, s)), name]),
     ...(STRIPS || branch.columns.index ? [["stability", tag, "stability"]] : []),
     ...(STRIPS && branch.ruled ? [["rulings cross beyond", percent(widest(shownStrip())), "widest"]] : []),
     ["point", pointName(branch, s), "point"],

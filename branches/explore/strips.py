@@ -25,11 +25,12 @@ from ribbon_model.linear import circle, covering, energy_interval, index
 
 #: What is kept of a shape at each node, in this order.
 CHANNELS = ("q0", "q1", "q2", "q3", "eta", "x1", "x2", "x3")
-#: Columns that the map can draw: name, title, and a short name, in HTML.
+#: Columns that the map can draw: name, title, and a short name, in HTML. The page makes the last one, energy + kappa_n^2 / 2.
 AXES = (
     ("kappa_n", "natural curvature κ<sub>n</sub>L/2π", "κ<sub>n</sub> L/2π"),
     ("kappa_star", "conjugate curvature κ*", "κ*"),
     ("energy", "energy, in units 2πB/L", "energy"),
+    ("elastic", "elastic energy (energy + κ<sub>n</sub>²/2), in units 2πB/L", "elastic energy"),
 )
 #: Columns of a circle: those of every law that the page reads.
 CIRCLE_COLUMNS = ("kappa_n", "kappa_star", "energy", "index")
