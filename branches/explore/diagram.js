@@ -113,7 +113,7 @@ function ringNames() {
 
 const ends = (values) => [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
 
-const median = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? Infinity;
+const lowThird = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 3)] ?? Infinity;
 
 /** The part of the diagram that is shown: all of it, or of many branches the neighbourhood of the rings. */
 function extent(whole) {
@@ -122,7 +122,7 @@ function extent(whole) {
   if (!whole && STRIPS && now.x === "kappa_n" && now.family.branches.length > 4)
     [low, high] = [Math.max(low, -8), Math.min(high, 14)];
   let [bottom, top] = ends(places.filter(([x]) => x >= low && x <= high).map(([, y]) => y));
-  if (!whole && STRIPS && now.y !== "kappa_star") top = Math.min(top, median(marks().map((mark) => mark.y))); // low ones matter
+  if (!whole && STRIPS && now.y !== "kappa_star") top = Math.min(top, lowThird(marks().map((mark) => mark.y))); // low states matter
   const across = 0.06 * (high - low || 1),
     up = 0.08 * (top - bottom || 1);
   return { x: [low - across, high + across], y: [bottom - up, top + up] };

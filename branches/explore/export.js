@@ -34,18 +34,9 @@ function onGround(make) {
 
 /** A trace without points, for an entry of the legend. */
 function legendTrace({ text, tint, kind, symbol, stroke }) {
-  const line = stroke || (kind && strokeOf({ tint, kind }));
-  const marker = symbol && { symbol: SYMBOLS[symbol][0], size: SYMBOLS[symbol][1], color: colour("mark") };
-  return {
-    type: "scatter",
-    mode: line ? "lines" : "markers",
-    x: [null],
-    y: [null],
-    name: text,
-    showlegend: true,
-    line,
-    marker,
-  };
+  const trace = { type: "scatter", x: [null], y: [null], name: text, showlegend: true };
+  if (!symbol) return { ...trace, mode: "lines", line: stroke || strokeOf({ tint, kind }) };
+  return { ...trace, mode: "markers", marker: { symbol: SYMBOLS[symbol][0], size: SYMBOLS[symbol][1], color: colour("mark") } };
 }
 
 /** The map as shown, with a legend and the chosen state: a figure of its own. */

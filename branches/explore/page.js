@@ -113,6 +113,7 @@ function listChoices() {
     FIRST_VALUES[id] = now[id];
   }
   $("x-label").hidden = STRIPS;
+  $("colour").parentElement.hidden = !FAMILIES.some(({ branches }) => branches.some((branch) => branch.columns.index));
 }
 
 /** Show all of the map, or the part that was shown first. */

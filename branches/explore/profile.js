@@ -6,19 +6,30 @@ const byTime = () => now.branch.nodes > 1;
 function profileTraces() {
   const { branch } = now,
     values = branch.states(now.s),
-    { channels, nodes, states } = branch;
+    { channels, nodes, components } = branch;
   const column = (c) => Array.from({ length: nodes }, (_, k) => values[k * channels + c]);
   if (!byTime())
     return [
-      { type: "bar", x: states.map(escaped), y: states.map((_, i) => values[i + 1]), marker: { color: colour("accent") } },
+      {
+        type: "bar",
+        x: components.map(escaped),
+        y: components.map((_, i) => values[i + 1]),
+        marker: { color: colour("accent") },
+      },
     ];
-  return states.map((name, i) => ({
+  return components.map((name, i) => ({
     type: "scatter",
     mode: "lines",
     name: escaped(name),
     x: column(0),
     y: column(i + 1),
-    line: { color: wave(i + 2), width: 2.2, dash: ["solid", "dash", "dot"][Math.floor(i / WAVES) % 3] },
+    line: {
+      color: wave(i + 2),
+      width: 2.2,
+      shape: "spline",
+      simplify: false,
+      dash: ["solid", "dash", "dot"][Math.floor(i / WAVES) % 3],
+    },
   }));
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ from branches.explore.packing import packed, quantised
 from branches.files import StoreError
 from contin import StoredColumns, read_columns
 
+#: The column of the size of the states, their root mean square over the nodes.
+NORM = "norm"
 #: Nodes of a profile, at most. Twice as many make pages twice as large; a quarter of them shows corners at steep layers.
 _MOST_NODES = 161
 #: Kinds of labelled points, as the page knows them.
@@ -31,7 +34,7 @@ def gathered(files: list[Path]) -> dict:
     if not free:
         raise StoreError(f"the branches have no free parameter in common; that of {str(files[0])!r} is {', '.join(first.free)}")
     axes = [name for name in common if name != "index" and _varies(name, stored)]
-    upwards = [name for name in axes if name not in (*first.free, "arclength")] + [*axes, *free]
+    upwards = [name for name in axes if name not in (*free, "arclength", NORM)] + [NORM]
     branches = [_branch(path, one, axes) for path, one in stored.items()]
     family = {"name": "branches", "parameter": free[0], "branches": branches, "circles": []}
     return {
@@ -52,7 +55,12 @@ def _read(path: Path) -> StoredColumns:
         raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
     if len(stored.labels) < 2:
         raise StoreError(f"{str(path)!r} holds {len(stored.labels)} point; a branch has two at least")
-    return stored
+    columns = stored.columns | {NORM: np.array([np.sqrt(np.mean(states**2)) for _, states in stored.profiles])}
+    if all(len(times) == 1 for times, _ in stored.profiles):  # an algebraic problem: its states are columns, too
+        columns |= dict(zip(stored.states, np.array([states[0] for _, states in stored.profiles]).T))
+    if bad := [name for name, values in columns.items() if not np.isfinite(values).all()]:
+        raise StoreError(f"{str(path)!r}: the column {bad[0]!r} holds values that are no numbers")
+    return replace(stored, columns=columns)
 
 
 def _branch(path: Path, stored: StoredColumns, axes: list[str]) -> dict:
@@ -66,7 +74,7 @@ def _branch(path: Path, stored: StoredColumns, axes: list[str]) -> dict:
     ]
     return {
         "profile": True, "name": path.stem, "file": path.name, "stop": stored.stop, "marks": marks, "labels": stored.labels,
-        "columns": {name: packed(stored.columns[name], "<f8") for name in kept}, "states": stored.states,
+        "columns": {name: packed(stored.columns[name], "<f8") for name in kept}, "components": stored.states,
         "nodes": count, "channels": values.shape[2], "shapes": packed(values, "<i2"), "scale": packed(scale, "<f8"),
     }  # fmt: skip
 

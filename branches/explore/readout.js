@@ -19,7 +19,7 @@ function readOut() {
     .join("");
   const text = story();
   if (!now.playing && $("story").textContent !== text) $("story").textContent = text;
-  $("snap").hidden = !atFold();
+  $("snap").hidden = !canSnap();
 }
 
 function pointName(branch, s) {
@@ -29,10 +29,10 @@ function pointName(branch, s) {
   return `${Math.round(s)} of ${branch.size - 1}${label ? ` (${escaped(label)})` : ""}`;
 }
 
-/** All states of the family at the present kappa_n, by energy. */
-function coexisting() {
-  const kappa = now.branch.value("kappa_n", now.s),
-    found = [{ branch: now.branch, s: now.s }];
+/** All states of the family at the kappa_n of a place, by energy. */
+function coexisting(from = now.branch, place = now.s) {
+  const kappa = from.value("kappa_n", place),
+    found = [{ branch: from, s: place }];
   for (const branch of now.family.branches)
     for (const s of branch.places(kappa))
       if (!found.some((one) => one.branch === branch && Math.abs(one.s - s) < 0.02)) found.push({ branch, s });

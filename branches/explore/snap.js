@@ -110,7 +110,7 @@ function integrated(mixed, eta) {
 /** The state that a strip at this place may snap to: of those of lower energy, stable if one is, the most alike; or null. */
 function snapTarget(branch, s) {
   const energy = branch.value("energy", s),
-    lower = coexisting().filter((one) => one.branch !== branch && one.energy < energy - 1e-9),
+    lower = coexisting(branch, s).filter((one) => one.branch !== branch && one.energy < energy - 1e-9),
     stable = lower.filter((one) => stability(one.branch, one.s)[0] === "stable");
   const found = (stable.length ? stable : lower).map((one) => ({
     ...one,
@@ -119,11 +119,16 @@ function snapTarget(branch, s) {
   return found.reduce((best, one) => (best && best.path.fit >= one.path.fit ? best : one), null);
 }
 
-const atFold = () => STRIPS && (markAt(now.branch, now.s) || {}).kind === "fold";
+/** Whether a strip can come to this place and must leave it: a fold, and stable on one side if the index is known. */
+function canSnap() {
+  const { branch, s } = now;
+  if (!STRIPS || (markAt(branch, s) || {}).kind !== "fold") return false;
+  return !branch.columns.index || [-0.5, 0.5].some((side) => branch.index(s + side) === 0);
+}
 
 /** Play the way from the fold to the state that `snapTarget` finds, then stay there. */
 async function snap() {
-  const target = atFold() && !now.morph && snapTarget(now.branch, now.s);
+  const target = canSnap() && !now.morph && snapTarget(now.branch, now.s);
   if (!target) return;
   if (now.playing) await play();
   const begin = performance.now(),
