@@ -41,15 +41,18 @@ function remember() {
   if (!restoring && !now.playing) writing = setTimeout(() => writeAddress(false), 300);
 }
 
+/** Give a control a value; its first one where it cannot have that. */
+function setControl(control, value, first) {
+  const possible = control.tagName === "SELECT" || (value !== null && Number.isFinite(Number(value)));
+  control.value = value !== null && possible ? value : first;
+  if (!control.value) control.value = first;
+}
+
 /** Show what an address says; what it does not say, or says wrongly, is as on a page just opened. */
 async function restore(text) {
   restoring = true;
   const words = new URLSearchParams(text.replace(/^#/, ""));
-  for (const id of CONTROLS) {
-    const before = $(id).value;
-    $(id).value = words.get(id) ?? FIRST_VALUES[id];
-    if (!$(id).value) $(id).value = $(id).tagName === "SELECT" ? FIRST_VALUES[id] : before;
-  }
+  for (const id of CONTROLS) setControl($(id), words.get(id), FIRST_VALUES[id]);
   if (STRIPS) $("triads").checked = words.has("directors");
   await chooseFamily(FAMILIES[Number(words.get("material"))] ? Number(words.get("material")) : 0, words.get("compare"));
   const branch = now.family.branches.find(({ id }) => id === words.get("branch")) || now.branch,

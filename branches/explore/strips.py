@@ -38,8 +38,9 @@ CIRCLE_COLUMNS = ("kappa_n", "kappa_star", "energy", "index")
 INFINITE, UNKNOWN = -2, -1
 #: About so many nodes make a closed strip; a quarter wave has no fewer than the second number.
 _LOOP_NODES, _FEWEST = 384, 16
-#: Circles reach as far in kappa_n as the branches do, in about twice so many steps. (On a circle all columns are parabolas.)
-_CIRCLE_STEPS = 50
+#: Circles reach a little farther in kappa_n than the branches do, so that they are there at the outermost fold (ten times more
+#: would leave a fifth of the map to them), in about twice so many steps. (On a circle all columns are parabolas.)
+_BEYOND, _CIRCLE_STEPS = 0.02, 50
 #: An integration takes a few hundred evaluations; the end conditions, which hold moments, are met to about 1e-6 of those.
 _MOST_EVALUATIONS, _OPEN = 50_000, 1e-3
 
@@ -68,7 +69,9 @@ def family(found: list[tuple[Path, StoredBranch]]) -> dict:
     ends = [end for _, branch in found for end in (branch.points["kappa_n"].min(), branch.points["kappa_n"].max())]
     coverings = {branch["m"] for branch in branches} | {branch["to"] for branch in branches if branch["to"] is not None}
     bifurcations = [mark for branch in branches for mark in branch["marks"] if mark["kind"] == "circle"]
-    circles = [_circle(law, nu, m, (min(ends), max(ends)), bifurcations) for m in sorted(coverings)]
+    beyond = _BEYOND * (max(ends) - min(ends))
+    reach = float(min(ends) - beyond), float(max(ends) + beyond)
+    circles = [_circle(law, nu, m, reach, bifurcations) for m in sorted(coverings)]
     about = {"name": f"{law}, ν = {exact_text(nu)}", "law": law, "nu": nu, "parameter": "kappa_n"}
     return about | {"branches": branches, "circles": circles}
 
