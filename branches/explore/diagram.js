@@ -54,8 +54,8 @@ const QUIET = { type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: f
 
 /** What is drawn of the branches themselves, in pictures too. */
 const branchTraces = (groups) => [
-  ...groups.map((group) => ({ ...QUIET, name: group.key, x: group.x, y: group.y, line: strokeOf(group) })),
   ...overlayTraces(),
+  ...groups.map((group) => ({ ...QUIET, name: group.key, x: group.x, y: group.y, line: strokeOf(group) })),
 ];
 
 function diagramTraces() {

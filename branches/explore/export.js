@@ -54,14 +54,19 @@ function diagramFigure(paper) {
     marker: { size: 13, color: colour("front"), line: { width: 2, color: colour("mark") } },
   };
   const inside = ["x", "y"].every((axis) => here[axis][0] >= shownRange(axis)[0] && here[axis][0] <= shownRange(axis)[1]);
-  const entries = [...legendEntries(groups), ...overlayEntries()].map(legendTrace);
+  const entries = legendEntries(groups).map(legendTrace),
+    second = [...overlayEntries().map(legendTrace), ...(inside ? [here] : [])].map((trace) => ({
+      ...trace,
+      legend: "legend2",
+    }));
   layout.annotations.forEach((note) => (note.bgcolor = paper));
   const legend = { orientation: "h", x: 0, y: -0.13, font, bgcolor: "rgba(0,0,0,0)", itemwidth: 40 };
   Object.assign(layout, { paper_bgcolor: paper, font, legend, showlegend: true, hovermode: false });
-  layout.margin = { ...MARGIN, r: 24, t: 20, b: 130 };
+  layout.legend2 = { ...legend, y: -0.135 - 0.037 * Math.ceil(entries.length / 5) }; // entries of its own width, under the first
+  layout.margin = { ...MARGIN, r: 24, t: 20, b: 160 };
   layout.xaxis.range = [...shownRange("x")];
   layout.yaxis.range = [...shownRange("y")];
-  return { data: [...branchTraces(groups), specialPoints(), ...entries, ...(inside ? [here] : [])], layout };
+  return { data: [...branchTraces(groups), specialPoints(), ...entries, ...second], layout };
 }
 
 /** The strip as shown, or the profiles: a figure of its own. */

@@ -4,6 +4,7 @@
 
 const OVERLAY = "overlay",
   OVERLAY_FOLDS = "overlay folds";
+let laid = null; // what is laid over the map, as `overlayData` returns
 
 /** The list of what can be compared with. */
 function listOverlays() {
@@ -76,7 +77,8 @@ const overlayEntries = () => {
 };
 
 function overlayTraces() {
-  const { x, y, folds } = overlayData(),
+  laid = overlayData();
+  const { x, y, folds } = laid,
     shape = overlay() && overlay().law ? "spline" : "linear";
   const marker = { symbol: "star-open", size: 11, color: colour("overlay"), line: { width: 1.2 } };
   return [
