@@ -61,8 +61,12 @@ function followed({ law, mode, defect }, stop) {
 
 const ribbonCurves = new Map(); // they are the same for every nu
 
-/** The exact branch (m, n): {points: [{kappa_n, kappa_star, energy, amplitude}], folds: the same}, within limits of kappa_n. */
-function exactCurve(name, m, n, nu, [low, high]) {
+/**
+ * The exact branch (m, n) of a law: {points: [{kappa_n, kappa_star, energy, elastic, amplitude}], folds: the same}, within limits
+ * of kappa_n; Gamma for the law of finite width.
+ */
+function exactCurve(name, m, n, nu, [low, high], Gamma) {
+  if (name === FINITE_WIDTH) return widthCurve(m, n, nu, Gamma, [low, high]);
   const branch = exactBranch(name, m, n, nu);
   if (!branch) return { points: [], folds: [] };
   const inside = ({ kappa_n, side }, { side: first }) => side === first && kappa_n >= low && kappa_n <= high;
@@ -82,16 +86,24 @@ function exactCurve(name, m, n, nu, [low, high]) {
   return { points: values.slice(0, size), folds: folds.filter(Boolean) };
 }
 
-/** The extreme kappa_n between two places of a branch: golden section on the curve over their chord. */
+/** The extreme kappa_n between two places of a branch, on the curve over their chord. */
 function exactFold({ defect, values }, from, to, sign) {
   const chord = plus(to, -1, from),
     size = Math.hypot(...chord),
-    tangent = chord.map((part) => part / size),
-    golden = (Math.sqrt(5) - 1) / 2;
-  const at = (s) => {
-    const place = curvePoint(defect, plus(from, s, tangent), tangent);
-    return place && values(place);
-  };
+    tangent = chord.map((part) => part / size);
+  return extreme(
+    (s) => {
+      const place = curvePoint(defect, plus(from, s, tangent), tangent);
+      return place && values(place);
+    },
+    size,
+    sign,
+  );
+}
+
+/** The value at(s), 0 <= s <= size, of largest sign * kappa_n, by golden section; null where at(s) is null on the way. */
+function extreme(at, size, sign) {
+  const golden = (Math.sqrt(5) - 1) / 2;
   let [low, high] = [0, size],
     best = null;
   for (let i = 0; i < 40; i++) {

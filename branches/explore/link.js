@@ -1,7 +1,7 @@
 "use strict";
 // A link to what is shown: the address of the page holds the place, the view and the sliders, after its #.
 
-const CONTROLS = ["x", "y", "colour", "compare", "nu", "width", "ground"]; // their values, where they are not the first ones
+const CONTROLS = ["x", "y", "colour", "compare", "nu", "gamma", "width", "ground"]; // their values, where they are not the first ones
 const FIRST_VALUES = Object.fromEntries(CONTROLS.map((id) => [id, $(id).value]));
 let restoring = false,
   writing = 0; // timer: the address follows when nothing has moved for a moment

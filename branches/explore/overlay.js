@@ -1,15 +1,17 @@
 "use strict";
-// Thin lines laid over the map, to compare: the exact solution of a law at any nu, computed here, or the branches of another
-// material that the page holds.
+// Thin lines laid over the map, to compare: the exact solution of a law with any parameters, computed here, or the branches of
+// another material that the page holds.
 
 const OVERLAY = "overlay",
   OVERLAY_FOLDS = "overlay folds";
-let laid = null; // what is laid over the map, as `overlayData` returns
+let laid = { lines: [], folds: [] }; // what is laid over the map, as `overlayData` returns
 
 /** The list of what can be compared with. */
 function listOverlays() {
   const options = [new Option("nothing", "")];
-  if (STRIPS) for (const law of Object.keys(EXACT_LAWS)) options.push(new Option(`exact solution: ${law}`, `exact ${law}`));
+  if (STRIPS)
+    for (const law of [...Object.keys(EXACT_LAWS), FINITE_WIDTH])
+      options.push(new Option(`exact solution: ${law}`, `exact ${law}`));
   FAMILIES.forEach((family, i) => family !== now.family && options.push(new Option(`computed: ${family.name}`, `family ${i}`)));
   const before = $("compare").value;
   $("compare").replaceChildren(...options);
@@ -20,7 +22,8 @@ function listOverlays() {
 /** What is chosen: {law, nu}, {family}, or null. */
 function overlay() {
   const [kind, which] = [$("compare").value.slice(0, 5), $("compare").value.slice(6)];
-  if (kind === "exact") return { law: which, nu: Number($("nu").value) };
+  const Gamma = which === FINITE_WIDTH ? 10 ** Number($("gamma").value) : undefined;
+  if (kind === "exact") return { law: which, nu: Number($("nu").value), Gamma };
   return kind === "famil" ? { family: FAMILIES[Number($("compare").value.slice(7))] } : null;
 }
 
@@ -30,38 +33,36 @@ function shownModes() {
   return [...new Map(primary.map(({ m, n }) => [`${m} ${n}`, [m, n]])).values()];
 }
 
-/** Exact branches of the modes that are shown: points and folds, as `exactCurve` returns. */
-function exactBranches({ law, nu }) {
-  const limits = ends(now.family.branches.flatMap((branch) => [...branch.columns.kappa_n]));
-  return shownModes().map(([m, n]) => ({ m, n, ...exactCurve(law, m, n, nu, limits) }));
-}
+/** A line to be laid over the map: its columns by name. */
+const overlayLine = (found) => Object.fromEntries([...AXES.keys()].map((name) => [name, found.map((point) => point[name])]));
 
-/** Lines of the overlay, {x, y}, broken between branches; and its folds with a text each. */
-function overlayData() {
+/** Compute what is to be laid over the map, with a breath between branches; null when another choice came on the way. */
+async function overlayData() {
   const chosen = overlay(),
-    data = { x: [], y: [], folds: { x: [], y: [], hovertext: [] } };
+    data = { lines: [], folds: [] };
   if (!chosen) return data;
-  const add = ({ x, y }) => (data.x.push(...x, null), data.y.push(...y, null));
   if (chosen.family) {
-    for (const branch of chosen.family.branches) if (!branch.circle) add(branch.line(now.x, now.y));
+    data.lines = chosen.family.branches.filter(({ circle }) => !circle);
     return data;
   }
-  for (const { m, n, points: found, folds } of exactBranches(chosen)) {
-    add({ x: found.map((point) => point[now.x]), y: found.map((point) => point[now.y]) });
-    for (const fold of folds) {
-      data.folds.x.push(fold[now.x]);
-      data.folds.y.push(fold[now.y]);
-      data.folds.hovertext.push(
-        `<b>exact fold of (${m}, ${n})</b>, ${overlayName()}<br>${AXES.get("kappa_n").brief} = ${digits(fold.kappa_n)}<br>κ* = ${digits(fold.kappa_star)}`,
-      );
-    }
+  const limits = ends(now.family.branches.flatMap((branch) => [...branch.columns.kappa_n]));
+  let last = performance.now();
+  for (const [m, n] of shownModes()) {
+    const { points: found, folds } = exactCurve(chosen.law, m, n, chosen.nu, limits, chosen.Gamma);
+    data.lines.push(overlayLine(found));
+    data.folds.push(...folds.map((fold) => ({ ...fold, text: `<b>exact fold of (${m}, ${n})</b>, ${overlayName()}` })));
+    if (performance.now() - last < 100) continue;
+    await new Promise(setTimeout);
+    last = performance.now();
+    if (overlayWanted) return null;
   }
   return data;
 }
 
 function overlayName() {
   const chosen = overlay();
-  return chosen.family ? chosen.family.name : `${chosen.law}, ν = ${minus(String(chosen.nu))}`;
+  if (chosen.family) return chosen.family.name;
+  return `${chosen.law}, ν = ${minus(String(chosen.nu))}${chosen.Gamma ? `, Γ = ${short(chosen.Gamma)}` : ""}`;
 }
 
 const overlayText = () =>
@@ -77,41 +78,55 @@ const overlayEntries = () => {
 };
 
 function overlayTraces() {
-  laid = overlayData();
-  const { x, y, folds } = laid,
-    shape = overlay() && overlay().law ? "spline" : "linear";
-  const marker = { symbol: "star-open", size: 11, color: colour("overlay"), line: { width: 1.2 } };
+  const line = { x: [], y: [] },
+    folds = { x: laid.folds.map((fold) => fold[now.x]), y: laid.folds.map((fold) => fold[now.y]) };
+  for (const one of laid.lines) {
+    const { x, y } = one instanceof Branch ? one.line(now.x, now.y) : { x: one[now.x], y: one[now.y] };
+    (line.x.push(...x, null), line.y.push(...y, null));
+  }
+  const values = (fold) =>
+    ["kappa_n", "kappa_star"].map((name) => `<br>${AXES.get(name).brief} = ${digits(fold[name])}`).join("");
+  folds.hovertext = laid.folds.map((fold) => fold.text + values(fold));
+  const shape = overlay() && overlay().law ? "spline" : "linear",
+    marker = { symbol: "star-open", size: 11, color: colour("overlay"), line: { width: 1.2 } };
   return [
-    { ...QUIET, name: OVERLAY, x, y, line: { ...overlayStroke(), shape } },
+    { ...QUIET, name: OVERLAY, ...line, line: { ...overlayStroke(), shape } },
     { type: "scatter", mode: "markers", name: OVERLAY_FOLDS, ...folds, hoverinfo: "text", showlegend: false, marker },
   ];
+}
+
+/** Put the overlay on the map. */
+function restyleOverlay() {
+  const traces = overlayTraces(),
+    drawn = $("diagram").data,
+    columns = (name) => traces.map((trace) => trace[name] || []),
+    shapes = traces.map(({ line }) => line && line.shape);
+  return Plotly.restyle(
+    "diagram",
+    { x: columns("x"), y: columns("y"), hovertext: columns("hovertext"), "line.shape": shapes },
+    traces.map(({ name }) => drawn.findIndex((trace) => trace.name === name)),
+  );
 }
 
 let overlayBusy = false,
   overlayWanted = false;
 
-/** Draw the overlay again, as fast as it can follow the slider. */
+/** Compute and draw the overlay again, as fast as it can follow the sliders. */
 async function moveOverlay() {
-  $("nu-label").hidden = !(overlay() && overlay().law);
+  const exact = overlay() && overlay().law;
+  $("nu-label").hidden = !exact;
+  $("gamma-label").hidden = exact !== FINITE_WIDTH;
   $("nu-value").textContent = minus(Number($("nu").value).toFixed(2));
+  $("gamma-value").textContent = short(10 ** Number($("gamma").value));
   overlayWanted = true;
   if (overlayBusy) return;
   overlayBusy = true;
   while (overlayWanted) {
     overlayWanted = false;
-    const traces = overlayTraces(),
-      drawn = $("diagram").data,
-      columns = (name) => traces.map((trace) => trace[name] || []);
-    await Plotly.restyle(
-      "diagram",
-      {
-        x: columns("x"),
-        y: columns("y"),
-        hovertext: columns("hovertext"),
-        "line.shape": traces.map(({ line }) => line && line.shape),
-      },
-      traces.map(({ name }) => drawn.findIndex((trace) => trace.name === name)),
-    );
+    const data = await overlayData();
+    if (!data) continue;
+    laid = data;
+    await restyleOverlay();
   }
   overlayBusy = false;
   drawLegend();

@@ -134,7 +134,7 @@ function connect() {
   $("family").onchange = (event) => chooseFamily(Number(event.target.value)).then(update);
   $("colour").onchange = () => drawDiagram().then(remember);
   $("x").onchange = $("y").onchange = chooseAxes;
-  $("compare").onchange = $("nu").oninput = moveOverlay;
+  $("compare").onchange = $("nu").oninput = $("gamma").oninput = moveOverlay;
   $("branch").onchange = (event) => {
     const branch = now.family.branches[Number(event.target.value)];
     go(branch, branch.fromWay(0.45));

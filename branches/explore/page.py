@@ -8,8 +8,8 @@ from importlib import metadata, resources
 
 #: The page's own programs, in the order in which they build on each other.
 SCRIPTS = (
-    "shapes.js", "surface.js", "branch.js", "state.js", "lines.js", "exact.js", "follow.js", "diagram.js", "overlay.js",
-    "strip.js", "profile.js", "snap.js", "readout.js", "export.js", "link.js", "page.js",
+    "shapes.js", "surface.js", "branch.js", "state.js", "lines.js", "exact.js", "follow.js", "exact_width.js", "diagram.js",
+    "overlay.js", "strip.js", "profile.js", "snap.js", "readout.js", "export.js", "link.js", "page.js",
 )  # fmt: skip
 #: Words that depend on the kind of result.
 WORDS = {
