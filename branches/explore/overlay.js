@@ -19,10 +19,13 @@ function listOverlays() {
   $("compare-bar").hidden = options.length < 2;
 }
 
+/** Gamma of its slider, which is logarithmic, to three digits. */
+const roundGamma = () => Number((10 ** Number($("gamma").value)).toPrecision(3));
+
 /** What is chosen: {law, nu}, {family}, or null. */
 function overlay() {
   const [kind, which] = [$("compare").value.slice(0, 5), $("compare").value.slice(6)];
-  const Gamma = which === FINITE_WIDTH ? 10 ** Number($("gamma").value) : undefined;
+  const Gamma = which === FINITE_WIDTH ? roundGamma() : undefined;
   if (kind === "exact") return { law: which, nu: Number($("nu").value), Gamma };
   return kind === "famil" ? { family: FAMILIES[Number($("compare").value.slice(7))] } : null;
 }
@@ -62,7 +65,7 @@ async function overlayData() {
 function overlayName() {
   const chosen = overlay();
   if (chosen.family) return chosen.family.name;
-  return `${chosen.law}, ν = ${minus(String(chosen.nu))}${chosen.Gamma ? `, Γ = ${short(chosen.Gamma)}` : ""}`;
+  return `${chosen.law}, ν = ${minus(String(chosen.nu))}${chosen.Gamma ? `, Γ = ${chosen.Gamma}` : ""}`;
 }
 
 const overlayText = () =>
@@ -117,7 +120,7 @@ async function moveOverlay() {
   $("nu-label").hidden = !exact;
   $("gamma-label").hidden = exact !== FINITE_WIDTH;
   $("nu-value").textContent = minus(Number($("nu").value).toFixed(2));
-  $("gamma-value").textContent = short(10 ** Number($("gamma").value));
+  $("gamma-value").textContent = roundGamma().toString();
   overlayWanted = true;
   if (overlayBusy) return;
   overlayBusy = true;
