@@ -16,7 +16,7 @@ def arguments(argv=None):
     parser = argparse.ArgumentParser(
         prog="python -m branches.explore",
         allow_abbrev=False,
-        description="Write one self-contained HTML page that shows results: the diagram, and the strip or state at every point.",
+        description="Write one self-contained HTML page that shows results: the diagram, and the state at every point.",
     )
     parser.add_argument(
         "results", metavar="RESULT", nargs="+",

@@ -22,12 +22,13 @@ function listOverlays() {
 /** Gamma of its slider, which is logarithmic, to three digits. */
 const roundGamma = () => Number((10 ** Number($("gamma").value)).toPrecision(3));
 
-/** What is chosen: {law, nu}, {family}, or null. */
+/** What is chosen: {law, nu, Gamma}, {family}, or null. */
 function overlay() {
-  const [kind, which] = [$("compare").value.slice(0, 5), $("compare").value.slice(6)];
-  const Gamma = which === FINITE_WIDTH ? roundGamma() : undefined;
-  if (kind === "exact") return { law: which, nu: Number($("nu").value), Gamma };
-  return kind === "famil" ? { family: FAMILIES[Number($("compare").value.slice(7))] } : null;
+  const [kind, ...words] = $("compare").value.split(" "),
+    which = words.join(" ");
+  if (kind === "family") return { family: FAMILIES[Number(which)] };
+  if (kind !== "exact") return null;
+  return { law: which, nu: Number($("nu").value), Gamma: which === FINITE_WIDTH ? roundGamma() : undefined };
 }
 
 /** Modes of the primary branches that are shown, one for each curve. */
@@ -48,7 +49,8 @@ async function overlayData() {
     data.lines = chosen.family.branches.filter(({ circle }) => !circle);
     return data;
   }
-  const limits = ends(now.family.branches.flatMap((branch) => [...branch.columns.kappa_n]));
+  const [low, high] = ends(now.family.branches.flatMap((branch) => [...branch.columns.kappa_n])),
+    limits = [2 * low - high, 2 * high - low]; // with other parameters a branch may reach farther than the computed ones
   let last = performance.now();
   for (const [m, n] of shownModes()) {
     const { points: found, folds } = exactCurve(chosen.law, m, n, chosen.nu, limits, chosen.Gamma);
