@@ -416,6 +416,10 @@ def test_compare_with_another_material(pages, browser):
     browser.js(choose.format("compare", f"family {other}", "onchange"))
     browser.until(f"{lines}[0] === explore.families[{other}].branches[0].columns.kappa_n[0]")
     assert "computed: flat rod, ν = 0.3" in browser.js(legend)
+    browser.call("Emulation.setDeviceMetricsOverride", width=380, height=800, deviceScaleFactor=1, mobile=False)
+    browser.js(choose.format("compare", "exact finite width", "onchange"))
+    browser.until(f"{legend}.includes('finite width')")
+    assert browser.js("document.documentElement.scrollWidth") <= 380  # the longest entry of a legend
     assert browser.errors == []
 
 
