@@ -88,7 +88,7 @@ async function chooseFamily(i, compare) {
   range = extent(false);
   listBranches();
   listOverlays();
-  if (compare) $("compare").value = compare;
+  if ([...$("compare").options].some(({ value }) => value === compare)) $("compare").value = compare;
   await drawDiagram();
   await moveOverlay();
 }

@@ -55,9 +55,10 @@ def _read(path: Path) -> StoredColumns:
         raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
     if len(stored.labels) < 2:
         raise StoreError(f"{str(path)!r} holds {len(stored.labels)} point; a branch has two at least")
-    columns = stored.columns | {NORM: np.array([np.sqrt(np.mean(states**2)) for _, states in stored.profiles])}
+    more = {NORM: np.array([np.sqrt(np.mean(states**2)) for _, states in stored.profiles])}
     if all(len(times) == 1 for times, _ in stored.profiles):  # an algebraic problem: its states are columns, too
-        columns |= dict(zip(stored.states, np.array([states[0] for _, states in stored.profiles]).T))
+        more |= dict(zip(stored.states, np.array([states[0] for _, states in stored.profiles]).T))
+    columns = stored.columns | {name: values for name, values in more.items() if name not in stored.columns}
     if bad := [name for name, values in columns.items() if not np.isfinite(values).all()]:
         raise StoreError(f"{str(path)!r}: the column {bad[0]!r} holds values that are no numbers")
     return replace(stored, columns=columns)

@@ -371,7 +371,7 @@ def test_a_link_shows_what_was_shown(pages, browser):
     browser.until("explore.now.branch.id === 'ribbon_nu0.3_m3_n4'")
     browser.open(pages / "fig12.html", address=link)
     assert browser.js(shown) == expected
-    browser.js("location.hash = '#branch=absent&point=many&width=x&material=9&map=1,2'")
+    browser.js("location.hash = '#branch=absent&point=many&width=x&material=9&map=1,2&compare=nobody'")
     browser.until("explore.now.branch.id === 'ribbon_nu0.3_m1_n2'")
     assert browser.js(shown)[2:5] == ["kappa_star", "3", ""]
     assert browser.errors == []
@@ -555,6 +555,8 @@ def test_kinds_of_results_are_not_mixed(results, stored, tmp_path, capsys):
     folder, _ = stored
     assert main([str(results / "m1_n2.h5"), str(folder / "bratu.npz"), "--out", str(tmp_path / "page.html")]) == 2
     assert "a page shows one kind of result" in capsys.readouterr().err
+    assert main([str(folder / "parabola"), str(folder / "bratu.npz"), "--out", str(tmp_path / "page.html")]) == 2
+    assert "the branches have no free parameter in common" in capsys.readouterr().err
     (tmp_path / "bad.npz").write_bytes(b"junk")
     assert main([str(tmp_path / "bad.npz"), "--out", str(tmp_path / "page.html")]) == 2
     assert "is no branch stored by contin, or damaged" in capsys.readouterr().err
