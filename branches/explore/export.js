@@ -71,12 +71,9 @@ function diagramFigure(paper) {
 
 /** The strip as shown, or the profiles: a figure of its own. */
 function stateFigure(paper) {
-  const { layout } = $("ribbon"),
-    shown = { ...layout, paper_bgcolor: paper, font: { ...layout.font, color: colour("ink") } };
-  return {
-    data: STRIPS ? ribbonTraces(shownStrip()) : profileTraces(),
-    layout: STRIPS ? shown : { ...profileLayout(), ...shown },
-  };
+  if (STRIPS) return { data: ribbonTraces(shownStrip()), layout: { ...$("ribbon").layout, paper_bgcolor: paper } };
+  const layout = profileLayout();
+  return { data: profileTraces(), layout: { ...layout, paper_bgcolor: paper, font: { ...layout.font, color: colour("ink") } } };
 }
 
 async function picture(figure, format, [width, height]) {
