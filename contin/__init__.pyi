@@ -21,6 +21,7 @@ from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
 from .problems.variational import VariationalProblem
 from .results.branch import Branch
+from .results.columns import StoredColumns, read_columns
 from .results.point import Point, point_of
 from .results.storage import load, save
 from .stepping.newton import Newton, correct
@@ -31,7 +32,8 @@ from .stepping.trial import Monitor, TestFunction, Trial
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
-    "ProblemError", "Settings", "State", "Stop", "TestFunction", "Trial", "VariationalProblem", "basis", "cache_directory",
-    "correct", "curve", "diagram", "exact_text", "follow", "gradient", "interpolation", "load", "locate_branch_point",
-    "point_of", "save",    "sensitivities", "solve", "temporary_name", "trace", "write_whole",
+    "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis",
+    "cache_directory", "correct", "curve", "diagram", "exact_text", "follow", "gradient", "interpolation", "load",
+    "locate_branch_point", "point_of", "read_columns", "save", "sensitivities", "solve", "temporary_name", "trace",
+    "write_whole",
 ]  # fmt: skip

@@ -16,9 +16,12 @@ def arguments(argv=None):
     parser = argparse.ArgumentParser(
         prog="python -m branches.explore",
         allow_abbrev=False,
-        description="Write one self-contained HTML page that shows results: the diagram, and the ribbon at every point of it.",
+        description="Write one self-contained HTML page that shows results: the diagram, and the state at every point.",
     )
-    parser.add_argument("results", metavar="RESULT", nargs="+", help="a branch file (.h5), or the folder of a diagram")
+    parser.add_argument(
+        "results", metavar="RESULT", nargs="+",
+        help="a branch file (.h5), the folder of a diagram, a file of contin.save (.npz), or a folder of those",
+    )  # fmt: skip
     parser.add_argument("--out", metavar="PAGE", default="explore.html", help="the page (default: explore.html)")
     return parser.parse_args(argv)
 

@@ -1,95 +1,43 @@
 "use strict";
-// The diagram in (kappa_n, kappa*), drawn by plotly; a marker above it says where we are.
+// The map, one column of the branches against another, drawn by plotly; a marker above it says where we are.
 
 const MARGIN = { l: 62, r: 12, t: 8, b: 54 };
-const WAVES = [
-  ["#cc79a7", "dot"],
-  ["#0072b2", "solid"],
-  ["#009e73", "dash"],
-  ["#d55e00", "dashdot"],
-  ["#56b4e9", "longdash"],
-  ["#e69f00", "longdashdot"],
-  ["#882255", "4px 2px"],
-];
-
 let range = { x: [0, 1], y: [0, 1] }; // of the axes when the page, or another material, was opened
 
-const FINE = 8; // pieces between neighbouring points
-
-/** Lines of all branches, grouped by how they are drawn: Map of style name to {x, y}. */
-function lines() {
-  const groups = new Map();
-  for (const branch of now.family.branches) {
-    let last = null;
-    for (let i = 0; i + 1 < branch.size; i++) {
-      const group = groupOf(branch, i + 0.5);
-      if (!groups.has(group)) groups.set(group, { x: [], y: [] });
-      const { x, y } = groups.get(group),
-        steps = branch.circle ? 1 : FINE;
-      if (group !== last) (x.push(null), y.push(null));
-      for (let j = group === last ? 1 : 0; j <= steps; j++) {
-        x.push(branch.value("kappa_n", i + j / steps));
-        y.push(branch.value("kappa_star", i + j / steps));
-      }
-      last = group;
-    }
-  }
-  return groups;
-}
-
-function groupOf(branch, s) {
-  if ($("colour").value === "stability") return stability(branch, s)[0];
-  return branch.circle ? "flat rings" : "origin" in branch ? "secondary" : `n = ${branch.n}`;
-}
-
-function styleOf(group) {
-  const found = {
-    stable: ["stable", "solid", 4],
-    unstable: ["unstable", "5px,3px", 1.5],
-    unknown: ["unknown", "solid", 1.8],
-    "flat rings": ["soft", "solid", 1.2],
-    secondary: ["mark", "2px,3px", 1.8],
-  }[group];
-  if (found) return { color: colour(found[0]), dash: found[1], width: found[2] };
-  const [hue, dash] = WAVES[(Number(group.slice(4)) - 1) % WAVES.length];
-  return { color: hue, dash, width: 1.8 };
-}
-
-const SYMBOLS = {
-  circle: ["circle", 7, "meets a flat ring"],
-  fold: ["star", 12, "fold"],
-  secondary: ["diamond", 9, "secondary bifurcation"],
-  user: ["square", 7, ""],
-};
+const shownRange = (axis) => ($("diagram").layout ? $("diagram").layout[`${axis}axis`].range : range[axis]);
 
 /** Every computed point, to hover and click: a line that is not seen, since markers by the thousand are slow. */
 function points() {
   const trace = { x: [], y: [], customdata: [], hovertext: [] };
   now.family.branches.forEach((branch, b) => {
-    const { kappa_n, kappa_star, energy } = branch.columns;
     for (let i = 0; i < branch.size; i++) {
-      const mark = markAt(branch, i),
-        [kind, word, index] = stability(branch, i);
-      const special = mark && mark.kind in SYMBOLS ? `<br>${SYMBOLS[mark.kind][2] || mark.name}` : "";
-      trace.x.push(kappa_n[i]);
-      trace.y.push(kappa_star[i]);
+      trace.x.push(branch.columns[now.x][i]);
+      trace.y.push(branch.columns[now.y][i]);
       trace.customdata.push([b, i]);
-      trace.hovertext.push(
-        `<b>${nameOf(branch)}</b>${special}<br>κ<sub>n</sub>L/2π = ${digits(kappa_n[i])}<br>κ* = ${digits(kappa_star[i])}<br>energy = ${digits(energy[i])}<br>${word}${index && kind !== "unknown" ? `, index ${index}` : ""}`,
-      );
+      trace.hovertext.push(hoverText(branch, i));
     }
   });
   return { type: "scatter", mode: "lines", line: { width: 0 }, hoverinfo: "text", showlegend: false, ...trace };
 }
 
+function hoverText(branch, i) {
+  const mark = markAt(branch, i),
+    [kind, word, index] = stability(branch, i);
+  const special = mark && mark.kind in SYMBOLS ? `<br>${(mark.kind !== "user" && SYMBOLS[mark.kind][2]) || mark.name}` : "";
+  const columns = STRIPS ? COLUMNS : [now.x, now.y];
+  const values = columns.map((name) => `<br>${AXES.get(name).brief} = ${digits(branch.columns[name][i])}`).join("");
+  const known = branch.columns.index ? `<br>${word}${index && kind !== "unknown" ? `, index ${index}` : ""}` : "";
+  return `<b>${escaped(nameOf(branch))}</b>${special}${values}${known}`;
+}
+
 /** Folds, bifurcations and other labelled points, to be seen. */
 function specialPoints() {
-  const found = now.family.branches.flatMap((branch) => branch.marks || []).filter((mark) => mark.kind in SYMBOLS);
+  const found = marks();
   return {
     type: "scatter",
     mode: "markers",
-    x: found.map((mark) => mark.kappa_n),
-    y: found.map((mark) => mark.kappa_star),
+    x: found.map((mark) => mark.x),
+    y: found.map((mark) => mark.y),
     hoverinfo: "skip",
     showlegend: false,
     marker: {
@@ -102,38 +50,18 @@ function specialPoints() {
   };
 }
 
+const QUIET = { type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false };
+
+/** What is drawn of the branches themselves, in pictures too. */
+const branchTraces = (groups) => [
+  ...overlayTraces(),
+  ...groups.map((group) => ({ ...QUIET, name: group.key, x: group.x, y: group.y, line: strokeOf(group) })),
+];
+
 function diagramTraces() {
-  const drawn = [...lines()].map(([group, { x, y }]) => ({
-    type: "scatter",
-    mode: "lines",
-    name: group,
-    x,
-    y,
-    line: styleOf(group),
-    hoverinfo: "skip",
-    showlegend: false,
-  }));
-  const order = ["unknown", "unstable", "stable"];
-  drawn.sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name));
-  const halo = {
-    type: "scatter",
-    mode: "lines",
-    ...selected(),
-    line: { color: colour("front"), width: 9 },
-    opacity: 0.38,
-    hoverinfo: "skip",
-    showlegend: false,
-  };
-  const here = {
-    type: "scatter",
-    mode: "markers",
-    x: [],
-    y: [],
-    hoverinfo: "skip",
-    showlegend: false,
-    marker: { size: 13, color: colour("front"), line: { width: 2, color: colour("mark") } },
-  };
-  return [halo, ...drawn, points(), specialPoints(), here];
+  const line = { color: colour("front"), width: 9, simplify: false };
+  const halo = { ...QUIET, ...now.branch.line(now.x, now.y), line, opacity: 0.38 };
+  return [halo, ...branchTraces(lines()), points(), specialPoints()];
 }
 
 function diagramLayout() {
@@ -149,8 +77,8 @@ function diagramLayout() {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: "system-ui, sans-serif", size: 13, color: colour("soft") },
-    xaxis: { ...axis, title: { text: "natural curvature κ<sub>n</sub>L/2π", standoff: 8 }, range: range.x },
-    yaxis: { ...axis, title: { text: "conjugate curvature κ*", standoff: 10 }, range: range.y },
+    xaxis: { ...axis, title: { text: AXES.get(now.x).title, standoff: 8 }, range: range.x },
+    yaxis: { ...axis, title: { text: AXES.get(now.y).title, standoff: 10 }, range: range.y },
     annotations: ringNames(),
     hovermode: "closest",
     hoverdistance: 30,
@@ -159,8 +87,9 @@ function diagramLayout() {
   };
 }
 
-/** Names of the rings, at the right end of what is shown first of their lines. */
+/** Names of the rings, at the right end of what is shown first of their lines; their energies lie too near each other. */
 function ringNames() {
+  if (now.x !== "kappa_n" || now.y !== "kappa_star") return [];
   return now.family.branches
     .filter((branch) => branch.circle)
     .map((ring) => {
@@ -184,12 +113,16 @@ function ringNames() {
 
 const ends = (values) => [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
 
+const lowThird = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 3)] ?? Infinity;
+
 /** The part of the diagram that is shown: all of it, or of many branches the neighbourhood of the rings. */
 function extent(whole) {
-  const places = now.family.branches.flatMap(({ columns }) => [...columns.kappa_n].map((k, i) => [k, columns.kappa_star[i]]));
-  let [low, high] = ends(places.map(([k]) => k));
-  if (!whole && now.family.branches.length > 4) [low, high] = [Math.max(low, -8), Math.min(high, 14)];
-  const [bottom, top] = ends(places.filter(([k]) => k >= low && k <= high).map(([, star]) => star));
+  const places = now.family.branches.flatMap(({ columns }) => [...columns[now.x]].map((x, i) => [x, columns[now.y][i]]));
+  let [low, high] = ends(places.map(([x]) => x));
+  if (!whole && STRIPS && now.x === "kappa_n" && now.family.branches.length > 4)
+    [low, high] = [Math.max(low, -8), Math.min(high, 14)];
+  let [bottom, top] = ends(places.filter(([x]) => x >= low && x <= high).map(([, y]) => y));
+  if (!whole && STRIPS && now.y !== "kappa_star") top = Math.min(top, lowThird(marks().map((mark) => mark.y))); // low states matter
   const across = 0.06 * (high - low || 1),
     up = 0.08 * (top - bottom || 1);
   return { x: [low - across, high + across], y: [bottom - up, top + up] };
@@ -207,49 +140,32 @@ async function drawDiagram() {
 }
 
 function drawLegend() {
-  const groups = [...lines().keys()].sort(),
-    svg = ({ color, dash, width }) =>
-      `<svg width="34" height="10" aria-hidden="true"><path d="M1 5H33" stroke="${color}" stroke-width="${width}" stroke-dasharray="${{ solid: "none", dot: "2 3", dash: "7 4", longdash: "11 4", dashdot: "7 3 2 3", longdashdot: "11 3 2 3" }[dash] || dash.replaceAll("px", "")}"/></svg>`;
-  const words = { stable: "stable", unstable: "unstable", unknown: "index not known" };
-  const marks = new Set(now.family.branches.flatMap((branch) => (branch.marks || []).map((mark) => mark.kind)));
-  $("legend").innerHTML =
-    groups.map((group) => `<span>${svg(styleOf(group))}${words[group] || group}</span>`).join("") +
-    [
-      ["circle", "● meets a flat ring"],
-      ["fold", "★ fold"],
-      ["secondary", "◆ secondary bifurcation"],
-    ]
-      .filter(([kind]) => marks.has(kind))
-      .map(([, text]) => `<span>${text}</span>`)
-      .join("");
-}
-
-/** The line of the branch that is selected. */
-function selected() {
-  const { branch } = now,
-    x = [],
-    y = [],
-    steps = branch.circle ? 1 : FINE;
-  for (let i = 0; i <= (branch.size - 1) * steps; i++) {
-    x.push(branch.value("kappa_n", i / steps));
-    y.push(branch.value("kappa_star", i / steps));
-  }
-  return { x, y };
+  $("legend").innerHTML = [...legendEntries(lines()), ...overlayEntries()]
+    .map((entry) => {
+      if (entry.symbol) return `<span>${SYMBOLS[entry.symbol][3]} ${entry.text}</span>`;
+      const { color, dash, width } = entry.stroke || strokeOf(entry),
+        pattern = dash === "solid" ? "none" : dash.replaceAll("px", "");
+      const path = `<path d="M1 5H33" stroke="${color}" stroke-width="${width}" stroke-dasharray="${pattern}"/>`;
+      return `<span><svg width="34" height="10" aria-hidden="true">${path}</svg>${escaped(entry.text)}</span>`;
+    })
+    .join("");
 }
 
 /** Lay the halo under the branch that is selected now. */
 function highlight() {
-  const { x, y } = selected();
+  const { x, y } = now.branch.line(now.x, now.y);
   return Plotly.restyle("diagram", { x: [x], y: [y] }, [0]);
 }
 
+/** Show this part of the map. */
+const zoom = (part) => Plotly.relayout("diagram", { "xaxis.range": [...part.x], "yaxis.range": [...part.y] });
+
 /** Where the place s of a branch is in the diagram's frame: pixels, and whether it is inside the axes. */
 function pixel(branch, s) {
-  const { clientWidth: w, clientHeight: h } = $("diagram"),
-    { xaxis, yaxis } = $("diagram").layout;
-  const part = (name, { range: [low, high] }) => (branch.value(name, s) - low) / (high - low);
-  const across = part("kappa_n", xaxis),
-    up = part("kappa_star", yaxis);
+  const { clientWidth: w, clientHeight: h } = $("diagram");
+  const part = (name, [low, high]) => (branch.value(name, s) - low) / (high - low);
+  const across = part(now.x, shownRange("x")),
+    up = part(now.y, shownRange("y"));
   return {
     x: MARGIN.l + across * (w - MARGIN.l - MARGIN.r),
     y: h - MARGIN.b - up * (h - MARGIN.t - MARGIN.b),

@@ -1,5 +1,5 @@
 "use strict";
-// Moving along branches, files to take away, and the controls.
+// Moving along branches, and the controls.
 
 const FOLDING_TIME = 9000; // milliseconds from one end of a branch to the other
 let busy = false,
@@ -8,28 +8,31 @@ let busy = false,
 /** Go to a place; what is drawn follows as fast as it can. */
 function go(branch, s) {
   const other = branch !== now.branch;
+  if (other) writeAddress(false); // the browser's back returns there
   now.branch = branch;
   now.s = Math.min(Math.max(s, 0), branch.size - 1);
   if (other) {
     $("branch").value = String(now.family.branches.indexOf(branch));
     highlight();
+    writeAddress(true);
   }
   return update();
 }
 
 async function update() {
   $("slider").value = String(Math.round(1000 * now.branch.toWay(now.s)));
-  $("slider").setAttribute("aria-valuetext", `κ_n ${short(now.branch.value("kappa_n", now.s))}`);
+  $("slider").setAttribute("aria-valuetext", `${now.x} ${short(now.branch.value(now.x, now.s))}`);
   placeMarker();
   readOut();
   clearTimeout(idle);
   if (!now.playing) idle = setTimeout(drawStates, 150);
+  remember();
   wanted = true;
   if (busy) return;
   busy = true;
   while (wanted) {
     wanted = false;
-    await updateRibbon();
+    await updateState();
   }
   busy = false;
 }
@@ -66,57 +69,6 @@ async function play() {
   }
 }
 
-// --- files ---------------------------------------------------------------------------------------------------------
-
-function csv(branch) {
-  const names = Object.keys(branch.columns),
-    head = [...(branch.circle ? [] : ["label"]), ...names].join(",");
-  const rows = Array.from({ length: branch.size }, (_, i) =>
-    [...(branch.circle ? [] : [branch.labels[i]]), ...names.map((name) => branch.columns[name][i])].join(","),
-  );
-  return [head, ...rows, ""].join("\n");
-}
-
-function download(name, content, type) {
-  const link = document.createElement("a");
-  link.href =
-    typeof content === "string" && content.startsWith("data:") ? content : URL.createObjectURL(new Blob([content], { type }));
-  link.download = name;
-  link.click();
-  if (link.href.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-}
-
-const decoded = (dataUrl) => decodeURIComponent(dataUrl.slice(dataUrl.indexOf(",") + 1));
-
-async function save(what) {
-  const { branch } = now,
-    base = branch.circle ? `circle_${branch.m}` : branch.file.replace(/\.h5$/, "");
-  if (what === "csv") return download(`${base}.csv`, csv(branch), "text/csv");
-  if (what === "yaml")
-    return download(
-      `${base}.yaml`,
-      branch.circle ? "# A planar circle has a closed formula; nothing was computed.\n" : branch.config,
-      "text/yaml",
-    );
-  const format = what.split(".")[1],
-    size = { format, width: 1000, height: 700, scale: format === "png" ? 2 : 1 };
-  if (what === "ribbon.svg") return download(`${base}_strip.svg`, ribbonSvg(), "image/svg+xml");
-  if (what === "ribbon.png")
-    return download(
-      `${base}_strip.png`,
-      flat ? $("ribbon").querySelector("canvas").toDataURL() : await Plotly.toImage("ribbon", { ...size, height: 1000 }),
-    );
-  const traces = $("diagram").data.length - 1;
-  await Plotly.restyle("diagram", { x: [[branch.value("kappa_n", now.s)]], y: [[branch.value("kappa_star", now.s)]] }, [
-    traces,
-  ]);
-  const picture = await Plotly.toImage("diagram", size);
-  await Plotly.restyle("diagram", { x: [[]], y: [[]] }, [traces]);
-  return format === "svg"
-    ? download(`${base}_diagram.svg`, decoded(picture), "image/svg+xml")
-    : download(`${base}_diagram.png`, picture);
-}
-
 // --- controls ------------------------------------------------------------------------------------------------------
 
 function listBranches() {
@@ -127,45 +79,81 @@ function listBranches() {
   );
 }
 
-async function chooseFamily(i) {
+async function chooseFamily(i, compare) {
   now.family = FAMILIES[i];
+  $("family").value = String(i);
   now.branch = now.family.branches[0];
   now.s = now.branch.fromWay(0.45);
-  $("colour").value = now.family.branches.some((branch) => !branch.circle && branch.columns.index) ? "stability" : "wave";
+  [now.x, now.y] = [$("x").value, $("y").value];
   range = extent(false);
   listBranches();
+  listOverlays();
+  if ([...$("compare").options].some(({ value }) => value === compare)) $("compare").value = compare;
   await drawDiagram();
+  await moveOverlay();
+}
+
+/** Draw the map against other columns. */
+async function chooseAxes() {
+  [now.x, now.y] = [$("x").value, $("y").value];
+  range = extent(false);
+  await drawDiagram();
+  await update();
+}
+
+function listChoices() {
+  FAMILIES.forEach(({ name }, i) => $("family").add(new Option(name, String(i))));
+  $("family-label").hidden = FAMILIES.length < 2;
+  for (const id of ["x", "y"]) {
+    for (const [name, { brief }] of AXES) {
+      const plain = Object.assign(document.createElement("span"), { innerHTML: brief }).textContent;
+      if (!STRIPS || id === "y" || name === "kappa_n") $(id).add(new Option(plain, name));
+    }
+    $(id).value = now[id];
+    FIRST_VALUES[id] = now[id];
+  }
+  $("x-label").hidden = STRIPS;
+  $("colour").parentElement.hidden = !FAMILIES.some(({ branches }) => branches.some((branch) => branch.columns.index));
+}
+
+/** Show all of the map, or the part that was shown first. */
+function wholeOrPart() {
+  const all = extent(true),
+    [low, high] = shownRange("x");
+  range = low <= all.x[0] && high >= all.x[1] ? extent(false) : all;
+  return zoom(range);
+}
+
+function resized() {
+  $("width-value").textContent = `${$("width").value} % of length`;
+  update();
 }
 
 function connect() {
-  FAMILIES.forEach(({ law, nu }, i) => $("family").add(new Option(`${law}, ν = ${nu}`, String(i))));
-  $("family-label").hidden = FAMILIES.length < 2;
+  listChoices();
   $("family").onchange = (event) => chooseFamily(Number(event.target.value)).then(update);
-  $("colour").onchange = drawDiagram;
+  $("colour").onchange = () => drawDiagram().then(remember);
+  $("x").onchange = $("y").onchange = chooseAxes;
+  $("compare").onchange = $("nu").oninput = $("gamma").oninput = moveOverlay;
   $("branch").onchange = (event) => {
     const branch = now.family.branches[Number(event.target.value)];
     go(branch, branch.fromWay(0.45));
   };
-  $("whole").onclick = () => {
-    const all = extent(true),
-      shown = $("diagram").layout.xaxis.range;
-    range = shown[0] <= all.x[0] && shown[1] >= all.x[1] ? extent(false) : all;
-    Plotly.relayout("diagram", { "xaxis.range": range.x, "yaxis.range": range.y });
-  };
-  $("width").oninput = () => {
-    $("width-value").textContent = `${$("width").value} % of length`;
-    update();
-  };
+  $("whole").onclick = wholeOrPart;
+  $("width").oninput = resized;
   if (flat) $("triads").parentElement.hidden = true;
-  $("triads").onchange = () => !flat && Plotly.react("ribbon", ribbonTraces(now.branch.strip(now.s)), $("ribbon").layout);
-  $("view").onclick = () => look(EYE);
-  $("ribbon").addEventListener("keydown", turnByKey);
+  $("triads").onchange = () => redraw();
+  $("view").onclick = () => (STRIPS ? look(EYE) : drawProfile());
+  if (STRIPS) $("ribbon").addEventListener("keydown", turnByKey);
   $("slider").oninput = (event) => go(now.branch, now.branch.fromWay(Number(event.target.value) / 1000));
   $("previous").onclick = () => step(-1, false);
   $("next").onclick = () => step(1, false);
   $("play").onclick = play;
+  $("snap").onclick = snap;
+  $("copy").onclick = copyLink;
   $("save").onclick = (event) => event.target.dataset.save && save(event.target.dataset.save);
   document.addEventListener("keydown", keyPressed);
+  window.addEventListener("popstate", () => restore(location.hash));
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   new ResizeObserver(placeMarker).observe($("diagram"));
 }
@@ -186,6 +174,7 @@ function keyPressed(event) {
     Home: () => go(now.branch, 0),
     End: () => go(now.branch, now.branch.size - 1),
     " ": play,
+    s: snap,
   };
   if (!(event.key in actions)) return;
   event.preventDefault();
@@ -194,24 +183,29 @@ function keyPressed(event) {
 
 async function redraw() {
   await drawDiagram();
-  if (!flat) await Plotly.react("ribbon", ribbonTraces(now.branch.strip(now.s)), $("ribbon").layout);
+  if (STRIPS && !flat) await Plotly.react("ribbon", ribbonTraces(shownStrip()), $("ribbon").layout);
   await update();
+}
+
+/** The map was moved: its marker and its legend follow. */
+function mapMoved() {
+  placeMarker();
+  drawLegend();
+  remember();
 }
 
 async function start() {
   connect();
   $("width-value").textContent = `${$("width").value} % of length`;
-  await chooseFamily(0);
+  await restore(location.hash);
   now.diagramTime = performance.now();
   $("diagram").on("plotly_click", clicked);
-  $("diagram").on("plotly_relayout", placeMarker);
+  $("diagram").on("plotly_relayout", mapMoved);
   $("diagram").on("plotly_relayouting", placeMarker);
-  await createRibbon();
-  if (!flat) $("ribbon").on("plotly_relayout", () => !now.playing && drawStates());
-  await update();
+  if (STRIPS && !flat) $("ribbon").on("plotly_relayout", () => !now.playing && (drawStates(), remember()));
   drawStates();
   return performance.now();
 }
 
 /** For tests, and for whoever opens the console: the state, and how long the first picture took in milliseconds. */
-window.explore = { now, go, coexisting, csv, families: FAMILIES, ready: start() };
+window.explore = { now, go, coexisting, csv, exactCurve, snapTarget, families: FAMILIES, ready: start() };

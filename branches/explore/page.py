@@ -7,7 +7,18 @@ import json
 from importlib import metadata, resources
 
 #: The page's own programs, in the order in which they build on each other.
-SCRIPTS = ("shapes.js", "state.js", "diagram.js", "strip.js", "readout.js", "page.js")
+SCRIPTS = (
+    "shapes.js", "surface.js", "branch.js", "state.js", "lines.js", "exact.js", "follow.js", "exact_width.js", "diagram.js",
+    "overlay.js", "strip.js", "profile.js", "snap.js", "readout.js", "export.js", "link.js", "page.js",
+)  # fmt: skip
+#: Words that depend on the kind of result.
+WORDS = {
+    "strips": {
+        "hue": "wavenumber",
+        "state": "The strip in space; drag it or use the arrow keys to turn it, scroll or press plus to zoom",
+    },
+    "branches": {"hue": "branch", "state": "The states at the chosen point"},
+}
 
 
 class MissingLibraryError(Exception):
@@ -44,6 +55,7 @@ def assemble(data: dict) -> str:
         "licence": html.escape(licence).replace("--", "- -"), "program": "\n".join(scripts),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }  # fmt: skip
+    parts |= {"kind": data["kind"]} | WORDS[data["kind"]]
     pieces = template.split("{{")
     filled = [pieces[0]]
     for piece in pieces[1:]:

@@ -5,40 +5,34 @@ let idle = 0; // timer: pictures of the other states are drawn when nothing has 
 
 function readOut() {
   const { branch, s } = now,
-    whole = Math.abs(s - Math.round(s)) < 1e-9,
     [kind, word, index] = stability(branch, s);
+  const tag = `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`;
   const rows = [
-    ["branch", nameOf(branch)],
-    ["κ<sub>n</sub> L/2π", digits(branch.value("kappa_n", s)), "kappa_n"],
-    ["κ*", digits(branch.value("kappa_star", s)), "kappa_star"],
-    ["energy", digits(branch.value("energy", s)), "energy"],
-    [
-      "stability",
-      `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`,
-      "stability",
-    ],
-    ...(branch.ruled ? [["rulings cross beyond", percent(widest(branch.strip(s))), "widest"]] : []),
-    [
-      "point",
-      branch.circle
-        ? "exact"
-        : whole
-          ? `${Math.round(s)} of ${branch.size - 1}${branch.labels[Math.round(s)] ? ` (${branch.labels[Math.round(s)]})` : ""}`
-          : `${Math.floor(s)} – ${Math.ceil(s)}`,
-      "point",
-    ],
+    ["branch", escaped(nameOf(branch))],
+    ...COLUMNS.map((name) => [AXES.get(name).brief, digits(branch.value(name, s)), name]),
+    ...(STRIPS || branch.columns.index ? [["stability", tag, "stability"]] : []),
+    ...(STRIPS && branch.ruled ? [["rulings cross beyond", percent(widest(shownStrip())), "widest"]] : []),
+    ["point", pointName(branch, s), "point"],
   ];
   $("readout").innerHTML = rows
-    .map(([name, value, id]) => `<div><dt>${name}</dt><dd${id ? ` data-value="${id}"` : ""}>${value}</dd></div>`)
+    .map(([name, value, id]) => `<div><dt>${name}</dt><dd${id ? ` data-value="${escaped(id)}"` : ""}>${value}</dd></div>`)
     .join("");
   const text = story();
   if (!now.playing && $("story").textContent !== text) $("story").textContent = text;
+  $("snap").hidden = !canSnap();
 }
 
-/** All states of the family at the present kappa_n, by energy. */
-function coexisting() {
-  const kappa = now.branch.value("kappa_n", now.s),
-    found = [{ branch: now.branch, s: now.s }];
+function pointName(branch, s) {
+  if (branch.circle) return "exact";
+  if (Math.abs(s - Math.round(s)) > 1e-9) return `${Math.floor(s)} – ${Math.ceil(s)}`;
+  const label = branch.labels[Math.round(s)];
+  return `${Math.round(s)} of ${branch.size - 1}${label ? ` (${escaped(label)})` : ""}`;
+}
+
+/** All states of the family at the kappa_n of a place, by energy. */
+function coexisting(from = now.branch, place = now.s) {
+  const kappa = from.value("kappa_n", place),
+    found = [{ branch: from, s: place }];
   for (const branch of now.family.branches)
     for (const s of branch.places(kappa))
       if (!found.some((one) => one.branch === branch && Math.abs(one.s - s) < 0.02)) found.push({ branch, s });
@@ -48,6 +42,7 @@ function coexisting() {
 
 function drawStates() {
   clearTimeout(idle);
+  if (!STRIPS) return;
   const found = coexisting();
   $("states-note").textContent = `${found.length} at κₙL/2π = ${short(now.branch.value("kappa_n", now.s))}, least energy first`;
   $("states").replaceChildren(

@@ -3,14 +3,17 @@
 
 const $ = (id) => document.getElementById(id);
 const DATA = JSON.parse($("data").textContent);
+const STRIPS = DATA.kind === "strips"; // else branches of any problem, without shapes in space
 const FAMILIES = DATA.families.map((family) => ({
   ...family,
   branches: [
-    ...family.branches.map((about) => new Branch(about, family.law)),
-    ...family.circles.map((about) => new Branch(about, family.law)),
+    ...family.branches.map((about) => new Branch(about, family)),
+    ...family.circles.map((about) => new Branch(about, family)),
   ],
 }));
-const now = { family: FAMILIES[0], branch: null, s: 0, playing: false };
+const AXES = new Map(DATA.axes.map(([name, title, brief]) => [name, { title, brief }]));
+const COLUMNS = [...AXES.keys()].filter((name) => name !== "elastic" && name !== "index"); // in read-outs
+const now = { family: FAMILIES[0], branch: null, s: 0, playing: false, x: DATA.shown[0], y: DATA.shown[1] };
 
 // --- words ---------------------------------------------------------------------------------------------------------
 
@@ -35,17 +38,19 @@ const short = (value) =>
       .replace(/(\.\d*?)0+$/, "$1")
       .replace(/\.$/, ""),
   );
-const digits = (value) => minus(value.toFixed(8));
+const digits = (value) => minus(Math.abs(value) < 1e6 ? value.toFixed(8) : value.toPrecision(9));
+const escaped = (text) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
 const loopName = (m) => (m < 0 ? `${LOOPS[-m] || -m + "-fold"} loop, curled the wrong way` : `${LOOPS[m] || m + "-fold"} loop`);
 const percent = (width) => (width < 2 * Math.PI ? `${((100 * width) / (2 * Math.PI)).toPrecision(2)} % width` : "never");
 const nameOf = (branch) => {
+  if (branch.profile) return branch.name;
   if (branch.circle) return loopName(branch.m);
   return "origin" in branch ? `from (${branch.m}, ${branch.n}) at ${short(branch.origin)}` : `(${branch.m}, ${branch.n})`;
 };
 
 function stability(branch, s) {
   const index = branch.index(s);
-  const there = Math.abs(s - Math.round(s)) < 1e-6 && branch.m > 0; // a point where some direction is neutral
+  const there = Math.abs(s - Math.round(s)) < 1e-6 && !(branch.m <= 0); // a point where some direction is neutral
   if (index === null) return ["unknown", !branch.columns.index ? "not computed" : there ? "on the verge" : "not known", ""];
   return index === 0 ? ["stable", "stable", "0"] : ["unstable", "unstable", index === -2 ? "∞" : String(index)];
 }
@@ -59,17 +64,19 @@ const MARK_WORDS = {
   limit: "The computation was told to stop here; the branch goes on.",
 };
 
+const STEADY = {
+  stable: "It is stable: push it a little and it comes back.",
+  unstable: "It is unstable: it can rest here, but the least push makes it leave.",
+  unknown: "",
+};
+
 function story() {
   const { branch, s } = now,
     mark = markAt(branch, s),
     [kind] = stability(branch, s);
-  const steady = {
-    stable: "It is stable: push it a little and it comes back.",
-    unstable: "It is unstable: it can rest here, but the least push makes it leave.",
-    unknown: "",
-  }[kind];
+  if (branch.profile) return mark ? `Special point: ${mark.name}.` : branch.stop && `The run stopped: ${branch.stop}.`;
   if (branch.circle)
-    return `A flat ring: the strip goes round ${Math.abs(branch.m) === 1 ? "once" : `${Math.abs(branch.m)} times`} (${loopName(branch.m)}). ${steady}`;
+    return `A flat ring: the strip goes round ${Math.abs(branch.m) === 1 ? "once" : `${Math.abs(branch.m)} times`} (${loopName(branch.m)}). ${STEADY[kind]}`;
   if (mark && mark.kind === "circle")
     return `Here the branch meets the ${loopName(mark.covering)}, flat again. Beyond it, waves grow.`;
   const to = branch.to === null ? "does not come back" : `ends on the ${loopName(branch.to)}`;
@@ -77,5 +84,5 @@ function story() {
     "origin" in branch
       ? `This shape has less symmetry than the branch (${branch.m}, ${branch.n}) that it comes from.`
       : `This branch leaves the ${loopName(branch.m)} with ${branch.n} wave${branch.n > 1 ? "s" : ""} round the strip, and ${to}.`;
-  return `${way} ${(mark && MARK_WORDS[mark.kind]) || steady}`;
+  return `${way} ${(mark && MARK_WORDS[mark.kind]) || STEADY[kind]}`;
 }

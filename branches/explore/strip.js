@@ -65,8 +65,12 @@ function triadLines(strip, scale) {
 
 const sceneAxis = { visible: false, range: [-1, 1], autorange: false };
 
-async function createRibbon() {
-  const strip = now.branch.strip(now.s);
+/** The strip at the chosen place, or on its way to another one. */
+const shownStrip = () => now.morph || now.branch.strip(now.s);
+
+async function createState() {
+  if (!STRIPS) return drawProfile();
+  const strip = shownStrip();
   if (flat) return drawFlat(strip);
   const scene = {
     xaxis: sceneAxis,
@@ -84,10 +88,10 @@ async function createRibbon() {
   );
 }
 
-async function updateRibbon() {
-  const strip = now.branch.strip(now.s);
-  if (flat) return drawFlat(strip);
-  const scale = scaleOf(strip),
+async function updateState() {
+  if (!STRIPS || flat || !$("ribbon").data) return createState();
+  const strip = shownStrip(),
+    scale = scaleOf(strip),
     mesh = sheets(strip, width(), scale),
     n = count(strip);
   if (4 * n !== $("ribbon").data[0].x.length) return Plotly.react("ribbon", ribbonTraces(strip), $("ribbon").layout);
@@ -150,8 +154,7 @@ function fills() {
 function paint(canvas, strip, eye, scale, every) {
   const ratio = window.devicePixelRatio || 1,
     context = canvas.getContext("2d");
-  canvas.width = (canvas.clientWidth || 120) * ratio;
-  canvas.height = (canvas.clientHeight || 92) * ratio;
+  if (canvas.isConnected) [canvas.width, canvas.height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio];
   const size = Math.min(canvas.width, canvas.height) * 0.46,
     fill = fills();
   context.translate(canvas.width / 2, canvas.height / 2);
@@ -172,13 +175,14 @@ function drawFlat(strip) {
   paint(canvas, strip, eyeNow(), scaleOf(strip), 1);
 }
 
-function ribbonSvg() {
-  const strip = now.branch.strip(now.s),
+function ribbonSvg(paper) {
+  const strip = shownStrip(),
     round = (x) => (400 + 340 * x).toFixed(2),
     fill = fills();
   const shapes = polygons(strip, width(), scaleOf(strip), eyeNow(), 1).map((polygon) => {
     const tint = fill(polygon);
     return `<path fill="${tint}" stroke="${tint}" d="M${polygon.points.map(([x, y]) => `${round(x)} ${round(y)}`).join("L")}Z"/>`;
   });
-  return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 800 800" stroke-width=".6" stroke-linejoin="round">${shapes.join("")}</svg>`;
+  const ground = `<rect width="800" height="800" fill="${paper}"/>`;
+  return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 800 800" stroke-width=".6" stroke-linejoin="round">${ground}${shapes.join("")}</svg>`;
 }

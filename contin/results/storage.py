@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from contin.problems.boundary_value import BoundaryValueProblem
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.state import Stop
+
+Result = TypeVar("Result")
 
 #: First entry of every file; another number where an older version could not read it.
 _FORMAT = "contin branch 1"
@@ -97,6 +100,27 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
         It is no branch, or one of a problem with other states or parameters.
     """
     checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
+
+    def branch(head: dict[str, Any], arrays: dict[str, Array]) -> Branch:
+        if tuple(head["states"]) != problem.state_names or head["names"] != list(problem.parameters):
+            raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
+        systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
+        points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
+        return Branch(points, Stop(*head["stop"]) if head["stop"] else None)
+
+    return contents(path, branch)
+
+
+def contents(path: str | Path, make: Callable[[dict[str, Any], dict[str, Array]], Result]) -> Result:
+    """Return ``make(head, arrays)`` of what a file of `save` holds.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    ProblemError
+        It is no branch, or ``make`` fails.
+    """
     with open(path, "rb"):
         pass  # a file that cannot be read is an OSError; whatever goes wrong below is in what it holds
     try:
@@ -104,12 +128,7 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
             head = json.loads(file["head"].tobytes())
             if head["format"] != _FORMAT:
                 raise KeyError("format")
-            arrays = {name: file[name] for name in file.files}
-        if tuple(head["states"]) != problem.state_names or head["names"] != list(problem.parameters):
-            raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
-        systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
-        points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
-        return Branch(points, Stop(*head["stop"]) if head["stop"] else None)
+            return make(head, {name: file[name] for name in file.files})
     except ProblemError:
         raise
     except Exception as error:  # zip, zlib, json, numpy, and memory have many ways to say that a file is damaged

@@ -10,6 +10,8 @@ from types import SimpleNamespace
 import h5py
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parent))  # makes the browser of tests (tests/branches/browser.py) importable
+
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = ("points", "events", "solutions/index", "solutions/t", "solutions/states")
 

@@ -3,25 +3,31 @@
 import base64
 import csv
 import json
+import math
 import shutil
-import subprocess
-import time
-import urllib.request
+from io import BytesIO
+from xml.etree import ElementTree
 
 import h5py
 import numpy as np
 import pytest
+from browser import CHROMIUM, Browser
+from matplotlib.image import imread
 
+import contin
 from branches.config import Config, parse
 from branches.diagram import run_diagram
 from branches.display import Display
 from branches.explore.__main__ import main
-from branches.explore.gather import CHANNELS, gather, shapes
+from branches.explore.gather import gather
+from branches.explore.strips import CHANNELS, shapes
 from branches.files import StoreError
 from branches.job import run_branch
 from branches.read import read_branch
+from ribbon_model import exact
 
 FIG_12 = "{title: Fig. 12a, law: ribbon, nu: 0.3, m: [1, 3, 5, 7], n: [1, 2, 3, 4, 5, 6, 7], stride: 10}"
+SVG = "{http://www.w3.org/2000/svg}"
 LAWS = "{law: [ribbon, flat rod, isotropic rod], nu: [0.1, 0.3], m: 1, n: 2, limits: {kappa_n: [-30, 30]}}"
 
 
@@ -143,111 +149,7 @@ def test_bad_input_is_one_sentence(what, results, tmp_path, capsys):
 
 # --- what the page does -------------------------------------------------------------------------------------------
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the PATH (Debian: apt-get install chromium)")
-_FLAGS = (
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--remote-debugging-port=0",
-)  # fmt: skip
-
-
-class Browser:
-    """A headless Chromium with one tab, driven through the DevTools protocol."""
-
-    def __init__(self, folder):
-        from websocket import create_connection
-
-        self.downloads, profile = folder / "downloads", folder / "profile"
-        command = [CHROMIUM, *_FLAGS, f"--user-data-dir={profile}", "about:blank"]
-        self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        port = self._wait(lambda: (profile / "DevToolsActivePort").read_text().split()[0], (OSError, IndexError))
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
-            tab = next(tab for tab in json.load(answer) if tab["type"] == "page")
-        self._socket = create_connection(tab["webSocketDebuggerUrl"], timeout=60, suppress_origin=True)
-        self._number, self.errors = 0, []
-        self.requests = []
-        for domain in ("Page", "Runtime", "Log", "Network"):
-            self.call(f"{domain}.enable")
-        self.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(self.downloads))
-
-    @staticmethod
-    def _wait(ready, errors=()):
-        for _ in range(600):
-            try:
-                if found := ready():
-                    return found
-            except errors:
-                pass
-            time.sleep(0.05)
-        raise TimeoutError("Chromium did not do it within 30 s")
-
-    def call(self, method, **parameters):
-        self._number += 1
-        self._socket.send(json.dumps({"id": self._number, "method": method, "params": parameters}))
-        while True:
-            message = json.loads(self._socket.recv())
-            if message.get("id") == self._number:
-                assert "error" not in message, message["error"]
-                return message["result"]
-            self._note(message)
-
-    def _note(self, message):
-        values = message["params"]
-        if message["method"] == "Network.requestWillBeSent":
-            self.requests.append(values["request"]["url"])
-        elif message["method"] == "Runtime.exceptionThrown":
-            self.errors.append(values["exceptionDetails"])
-        elif message["method"] == "Runtime.consoleAPICalled" and values["type"] in ("error", "assert"):
-            self.errors.append(values["args"])
-        elif message["method"] == "Log.entryAdded" and values["entry"]["level"] == "error":
-            self.errors.append(values["entry"])
-
-    def js(self, expression):
-        """The value of an expression, or of the promise that it is."""
-        answer = self.call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
-        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
-        return answer["result"].get("value")
-
-    def open(self, path, width=1300, height=900):
-        self.errors.clear()
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
-        self.call("Page.navigate", url=path.as_uri())
-        self._wait(lambda: self.js("Boolean(window.explore)"))
-        self.js("explore.ready")
-
-    def until(self, expression):
-        self._wait(lambda: self.js(expression))
-
-    def click(self, x, y):
-        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
-            time.sleep(0.15)  # hover first, as a hand does: plotly finds what is under the pointer then
-            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
-
-    def key(self, name):
-        for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=name)
-
-    def colours(self, selector):
-        """Return the number of different colours in a part of the page."""
-        from io import BytesIO
-
-        from matplotlib.image import imread
-
-        place = self.js(f"(() => {{ const r = document.querySelector({selector!r}).getBoundingClientRect();"
-                        "return {x: r.x, y: r.y, width: r.width, height: r.height, scale: 1}; })()")  # fmt: skip
-        picture = self.call("Page.captureScreenshot", format="png", clip=place)["data"]
-        pixels = (imread(BytesIO(base64.b64decode(picture)))[..., :3] * 255).round().astype(int)
-        return len(np.unique(pixels @ [1, 256, 65536]))
-
-    def downloaded(self, name):
-        path = self.downloads / name
-        self._wait(lambda: path.exists() and path.stat().st_size)
-        return path.read_bytes()
-
-    def close(self):
-        self._socket.close()
-        self._process.terminate()
-        self._process.wait(20)
 
 
 @pytest.fixture(scope="module")
@@ -266,6 +168,8 @@ def test_page_draws_without_errors(name, pages, browser):
     assert browser.colours("#ribbon") > 200  # a lit surface
     assert browser.errors == []
     assert {url.partition(":")[0] for url in browser.requests} <= {"file", "data", "blob"}  # nothing from a network
+    if name != "fig12":
+        return  # the longest legend is in Fig. 12
     browser.open(pages / f"{name}.html", width=380, height=800)
     assert browser.js("document.documentElement.scrollWidth") <= 380  # nothing sticks out of a narrow screen
 
@@ -385,7 +289,7 @@ def test_material_can_be_switched(pages, browser):
 @needs_chromium
 def test_export(pages, browser):
     browser.open(pages / "m1_n2.html")
-    for button in ("csv", "yaml", "diagram.svg", "diagram.png", "ribbon.svg", "ribbon.png"):
+    for button in ("csv", "yaml", "diagram.svg", "diagram.png", "strip.svg", "strip.png"):
         browser.js(f"document.querySelector('[data-save=\"{button}\"]').click()")
     points = read_branch(pages / "m1_n2.h5").points
     rows = list(csv.DictReader(browser.downloaded("m1_n2.csv").decode().splitlines()))
@@ -401,18 +305,273 @@ def test_export(pages, browser):
     assert browser.errors == []
 
 
+@needs_chromium
+def test_exported_pictures_have_the_chosen_ground_and_a_legend(pages, browser):
+    """Dark, white and transparent; the legend names what is inside the axes; curves have FINE = 8 pieces between points."""
+    browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+    try:
+        browser.open(pages / "m1_n2.html")
+        for ground, corner in (("screen", [0x18, 0x1E, 0x28, 255]), ("white", [255, 255, 255, 255]), ("clear", [0, 0, 0, 0])):
+            browser.js(f"document.getElementById('ground').value = '{ground}'")
+            for button in ("diagram", "strip") if ground == "screen" else ("diagram",):
+                browser.js(f"document.querySelector('[data-save=\"{button}.png\"]').click()")
+                picture = imread(BytesIO(browser.downloaded(f"m1_n2_{button}.png")))
+                pixel = (picture[0, 0] * 255).round().tolist()
+                assert (pixel if len(pixel) == 4 else [*pixel, 255]) == corner  # the card of the dark theme, in page.css
+        browser.js("document.getElementById('ground').value = 'white'")
+        browser.js("document.querySelector('[data-save=\"diagram.svg\"]').click()")
+    finally:
+        browser.call("Emulation.setEmulatedMedia", features=[])
+    picture = ElementTree.fromstring(browser.downloaded("m1_n2_diagram.svg").decode())
+    legends = [group for name in ("legend", "legend2") for group in picture.iterfind(f".//{SVG}g[@class='{name}']")]
+    texts = [text.text for legend in legends for text in legend.iter(f"{SVG}text")]
+    assert texts == ["flat rings", "n = 2", "stable", "unstable", "meets a flat ring", "fold", "chosen: (1, 2)"]
+    branch = read_branch(pages / "m1_n2.h5")
+    curves = [path.get("d") for path in picture.iterfind(f".//{SVG}path[@class='js-line']")]
+    assert sum(path.count("L") for path in curves) > 8 * (len(branch.points) - 1)
+    assert browser.errors == []
+
+
+@needs_chromium
+def test_stable_is_solid_and_unstable_dashed(pages, browser):
+    """The index of (1, 2) is 0 up to its fold and 1 beyond, in the file; the colour is that of n = 2."""
+    browser.open(pages / "m1_n2.html")
+    found = browser.js("""Object.fromEntries(document.getElementById('diagram').data
+        .filter(({name}) => (name || '').startsWith('n = 2'))
+        .map(({name, x, line}) => [name, [x.filter((x) => x !== null).length, line.dash, line.color]]))""")
+    index = read_branch(pages / "m1_n2.h5").points["index"]
+    assert set(found) == {"n = 2|stable", "n = 2|unstable"} and set(index) == {-1, 0, 1}
+    assert (found["n = 2|stable"][1], found["n = 2|unstable"][1]) == ("solid", "5px,3px")
+    assert found["n = 2|stable"][2] == found["n = 2|unstable"][2]
+    fold = np.flatnonzero(index == 0).max() + 1
+    assert found["n = 2|stable"][0] == 8 * fold + 1  # 8 pieces between points
+
+
+@needs_chromium
+def test_a_link_shows_what_was_shown(pages, browser):
+    """The address holds the place and the controls; back and forward move between branches; a wrong address does no harm."""
+    browser.open(pages / "fig12.html")
+    browser.js("""(() => {
+        const set = (id, value, event) => { const e = document.getElementById(id); e.value = value; e[event](); };
+        set('y', 'energy', 'onchange'); set('width', '6.5', 'oninput'); set('compare', 'exact ribbon', 'onchange');
+        set('nu', '0.25', 'oninput');
+        explore.go(explore.families[0].branches.find(({m, n}) => m === 3 && n === 4), 7.25); })()""")
+    browser.until("location.hash.includes('point=7.25')")
+    browser.until("location.hash.includes('nu=0.25')")
+    link = browser.js("location.hash")
+    browser.js("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
+    browser.js("document.getElementById('copy').click()")
+    browser.until("window.copied === location.href && document.getElementById('copy').textContent === 'Copied'")
+    controls = "...['width', 'compare', 'nu'].map((id) => document.getElementById(id).value)"
+    shown = f"[explore.now.branch.id, explore.now.s, explore.now.y, {controls}]"
+    expected = ["ribbon_nu0.3_m3_n4", 7.25, "energy", "6.5", "exact ribbon", "0.25"]
+    browser.js("history.back()")
+    browser.until("explore.now.branch.id === 'ribbon_nu0.3_m1_n2'")
+    browser.js("history.forward()")
+    browser.until("explore.now.branch.id === 'ribbon_nu0.3_m3_n4'")
+    browser.open(pages / "fig12.html", address=link)
+    assert browser.js(shown) == expected
+    browser.js("location.hash = '#branch=absent&point=many&width=x&material=9&map=1,2&compare=nobody'")
+    browser.until("explore.now.branch.id === 'ribbon_nu0.3_m1_n2'")
+    assert browser.js(shown)[2:5] == ["kappa_star", "3", ""]
+    assert browser.errors == []
+
+
+EXACT = [(law, nu, None) for law in ("ribbon", "flat rod", "isotropic rod") for nu in (-0.3, 0.0, 0.3)]
+EXACT += [("finite width", 0.3, 8.0)]
+
+
+@needs_chromium
+def test_exact_solution_of_the_page_is_that_of_the_model(pages, browser):
+    """Within 1e-10 of `ribbon_model.exact`, tested there with 30 digits; at equal amplitudes, and folds."""
+    browser.open(pages / "m1_n2.html")
+    for law, nu, Gamma in EXACT:
+        for m, n in ((1, 2), (3, 4)) if Gamma is None else ((1, 2),):  # the model takes seconds for a branch of finite width
+            curve = exact.curve(m, n, nu, step=0.2, law=law, Gamma=Gamma)
+            found = browser.js(f"explore.exactCurve({law!r}, {m}, {n}, {nu}, [-100, 100], {json.dumps(Gamma)})")
+            for point in found["points"][2:-1:25]:
+                near = min(curve, key=lambda one: math.dist(*[[at["kappa_n"], at["kappa_star"]] for at in (vars(one), point)]))
+                there = exact.solve(m, n, nu, near, amplitude=point["amplitude"], law=law)
+                for name in ("kappa_n", "kappa_star", "energy"):
+                    assert point[name] == pytest.approx(getattr(there, name), rel=1e-10, abs=1e-10)
+            folds = [point.kappa_n for point in curve if point.label == "LP"]
+            assert [fold["kappa_n"] for fold in found["folds"]] == pytest.approx(folds, rel=1e-10)
+            last = found["points"][-1 if curve[-1].label == "BP" else 0]
+            assert last["kappa_n"] == pytest.approx(curve[-1 if curve[-1].label == "BP" else 0].kappa_n, rel=1e-10)
+
+
+@needs_chromium
+def test_compare_with_another_material(pages, browser):
+    """The exact solution at the nu of the slider, and the branches of another material on the page, as thin lines."""
+    browser.open(pages / "laws.html")
+    choose = "(() => {{ const e = document.getElementById('{}'); e.value = '{}'; e.{}(); }})()"
+    browser.js(choose.format("compare", "exact flat rod", "onchange"))
+    browser.js(choose.format("nu", "0.1", "oninput"))
+    lines = "document.getElementById('diagram').data.find(({name}) => name === 'overlay').x.filter((x) => x !== null)"
+    start = 1 + 3 / (1.1 / 2)  # (26) of the flat rod: 1 + ((n/m)^2 - 1)/((1 + nu)/2)
+    browser.until(f"Math.abs({lines}[0] - {start}) < 1e-9")
+    legend = "document.getElementById('legend').textContent"
+    assert "exact solution, computed in this page: flat rod, ν = 0.1" in browser.js(legend)
+    other = browser.js("explore.families.findIndex(({law, nu}) => law === 'flat rod' && nu === 0.3)")
+    browser.js(choose.format("compare", f"family {other}", "onchange"))
+    browser.until(f"{lines}[0] === explore.families[{other}].branches[0].columns.kappa_n[0]")
+    assert "computed: flat rod, ν = 0.3" in browser.js(legend)
+    browser.call("Emulation.setDeviceMetricsOverride", width=380, height=800, deviceScaleFactor=1, mobile=False)
+    browser.js(choose.format("compare", "exact finite width", "onchange"))
+    browser.until(f"{legend}.includes('finite width')")
+    assert browser.js("document.documentElement.scrollWidth") <= 380  # the longest entry of a legend
+    assert browser.errors == []
+
+
+@needs_chromium
+def test_energy_and_snap(pages, browser):
+    """Energy as the vertical axis; from the fold of (1, 2) the strip snaps to the triple loop, as in the paper's experiments.
+
+    The elastic energy of the m-fold loop is (m - kappa_n)^2 / 2.
+    """
+    browser.open(pages / "m1_n2.html")
+    browser.js("(() => { const e = document.getElementById('y'); e.value = 'elastic'; e.onchange(); })()")
+    rings = browser.js("""explore.families[0].branches.filter(({circle}) => circle)
+        .map(({m, columns}) => [m, [...columns.kappa_n], [...columns.elastic]])""")
+    for m, kappa_n, elastic in rings:
+        assert np.array(elastic) == pytest.approx((m - np.array(kappa_n)) ** 2 / 2, abs=1e-9)
+    assert browser.js("document.getElementById('snap').hidden")
+    browser.js("explore.go(explore.now.branch, explore.now.branch.marks.find(({kind}) => kind === 'fold').point)")
+    way, ends = browser.js("""(() => { const {branch, s} = explore.now, {path, ...to} = explore.snapTarget(branch, s);
+        return [[0, 0.3, 0.6, 1].map(path.at), [branch.strip(s), to.branch.strip(to.s)]]
+            .map((strips) => strips.map((strip) => Array.from(strip))); })()""")
+    way, ends = ([np.reshape(strip, (-1, 13)) for strip in strips] for strips in (way, ends))
+    for strip in way:  # chords of 384 stations; what closes the gap changes lengths
+        steps = np.linalg.norm(strip[:, :3] - np.roll(strip[:, :3], 1, axis=0), axis=1)
+        assert steps.sum() == pytest.approx(2 * np.pi, rel=5e-3)
+    for found, strip in zip((way[0], way[-1]), ends):
+        assert distances(found) == pytest.approx(distances(strip), abs=2e-2)
+    energy = browser.js("explore.now.branch.value('energy', explore.now.s)")
+    browser.js("document.getElementById('snap').click()")
+    browser.until("document.getElementById('story').textContent.includes('not the dynamics')")
+    browser.until("explore.now.branch.id === 'circle_3'")
+    assert browser.js("explore.now.snaps.energy") < energy
+    assert browser.errors == []
+
+
+@needs_chromium
+def test_strip_as_a_solid(pages, browser):
+    """Watertight, of volume length * width * thickness: 200 mm, 3 % of it, and 0.8 mm, the first values of the page."""
+    trimesh = pytest.importorskip("trimesh")
+    browser.open(pages / "m1_n2.html")
+    browser.js("document.querySelector('[data-save=stl]').click()")
+    mesh = trimesh.load(BytesIO(browser.downloaded("m1_n2.stl")), file_type="stl")
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(200 * 6 * 0.8, rel=1e-3)
+
+
+@needs_chromium
+def test_keyboard_touch_and_names(pages, browser):
+    """The map takes the focus and shows it; at 390 px controls are 44 px high; every control has a name."""
+    browser.open(pages / "m1_n2.html", width=390, height=844)
+    touched = "button, select, summary, label:has(input), input:not([type=checkbox])"
+    small = browser.js(f"""[...document.querySelectorAll('{touched}')]
+        .filter((e) => e.offsetParent && e.getBoundingClientRect().height < 44).map((e) => e.id || e.textContent)""")
+    assert small == []
+    unnamed = browser.js("""[...document.querySelectorAll('button, select, input, [tabindex]')].filter((e) =>
+        !(e.ariaLabel || e.textContent.trim() && e.tagName === 'BUTTON' || e.labels && e.labels.length)).map((e) => e.id)""")
+    assert unnamed == []
+    browser.js("explore.go(explore.now.branch, 3)")
+    browser.js("document.getElementById('family').focus()")
+    for _ in range(12):
+        browser.key("Tab")
+        if browser.js("document.activeElement.id") == "diagram":
+            break
+    assert browser.js("document.activeElement.id") == "diagram"
+    assert browser.js("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    browser.key("ArrowRight")
+    assert browser.js("explore.now.s") == 4
+
+
+# --- branches of other problems -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """A folder of two branches of one algebraic problem, and a branch of a boundary value problem."""
+    folder = tmp_path_factory.mktemp("stored")
+    (folder / "parabola").mkdir()
+    parabola = contin.AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    first = contin.solve(parabola, [1.0])
+    contin.save(contin.trace(first, free=["a"], direction=-1, limits={"a": (-1, 4)}), folder / "parabola" / "down.npz")
+    contin.save(contin.trace(first, free=["a"], limits={"a": (-1, 4)}), folder / "parabola" / "up.npz")
+    bratu = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.lam * math.exp(u.u)), lambda a, b, p: (a.u, b.u), states=["u", "v"],
+        parameters={"lam": 0.1}, functionals={"mean": lambda t, u, p: u.u},
+    )  # fmt: skip
+    branch = contin.trace(contin.solve(bratu, [0, 0]), free=["lam"], limits={"mean": (-1, 5)})
+    contin.save(branch, folder / "bratu.npz")
+    for name in ("bratu.npz", "parabola"):
+        assert main([str(folder / name), "--out", str(folder / f"{name.removesuffix('.npz')}.html")]) == 0
+    return folder, branch
+
+
+def test_page_of_a_stored_branch_holds_its_columns_and_states(stored):
+    """Columns to the last digit; the states are those at the nodes, within half of a 32767th of the largest."""
+    folder, branch = stored
+    data = data_of(folder / "bratu.html")
+    ((about,),) = [family["branches"] for family in data["families"]]
+    assert (data["kind"], data["shown"], [axis[0] for axis in data["axes"]]) == (
+        "branches", ["lam", "mean"], ["arclength", "lam", "mean", "norm"],
+    )  # fmt: skip
+    for name in ("lam", "mean"):
+        assert np.array_equal(numbers(about["columns"][name]), branch.column(name))
+    assert [mark["kind"] for mark in about["marks"]] == ["end", "fold", "end"]
+    packed = numbers(about["shapes"], "<i2").reshape(-1, about["nodes"], 3) * numbers(about["scale"]).reshape(-1, 1, 3)
+    assert len(packed) == len(branch)
+    for found, point in zip(packed, branch):
+        states = point.system.evaluate(point.x, found[:, 0])
+        assert np.abs(found[:, 1:] - states).max() < 1e-2 * np.abs(states).max()  # between nodes the page draws chords
+        assert np.abs(found[-1, 1:] - states[-1]).max() < 5e-5 * np.abs(states).max()
+
+
+@needs_chromium
+def test_page_of_stored_branches(stored, browser):
+    folder, branch = stored
+    browser.open(folder / "bratu.html")
+    fold = next(i for i, point in enumerate(branch) if point.label == "LP")
+    browser.js(f"explore.go(explore.now.branch, {fold})")
+    assert browser.js("document.querySelector('[data-value=lam]').textContent") == f"{branch.points[fold]['lam']:.8f}"
+    browser.until("document.getElementById('story').textContent.startsWith('Special point: LP')")
+    assert browser.js("document.getElementById('ribbon').data.map(({name}) => name)") == ["u", "v"]
+    browser.js("(() => { const e = document.getElementById('x'); e.value = 'norm'; e.onchange(); })()")
+    assert browser.js("document.getElementById('diagram').layout.xaxis.title.text") == "norm"
+    browser.js("document.querySelector('[data-save=\"state.svg\"]').click()")
+    assert browser.downloaded("bratu_state.svg").startswith(b"<svg")
+    assert browser.js("[...document.querySelectorAll('.strips')].every((e) => !e.offsetParent)")
+    assert browser.errors == []
+    browser.open(folder / "parabola.html")  # states of an algebraic problem are columns, and bars
+    assert browser.js("[explore.now.y, document.getElementById('ribbon').data[0].type]") == ["x", "bar"]
+    assert browser.js("document.getElementById('branch').options.length") == 2
+    assert browser.errors == []
+
+
+def test_kinds_of_results_are_not_mixed(results, stored, tmp_path, capsys):
+    folder, _ = stored
+    assert main([str(results / "m1_n2.h5"), str(folder / "bratu.npz"), "--out", str(tmp_path / "page.html")]) == 2
+    assert "a page shows one kind of result" in capsys.readouterr().err
+    assert main([str(folder / "parabola"), str(folder / "bratu.npz"), "--out", str(tmp_path / "page.html")]) == 2
+    assert "the branches have no free parameter in common" in capsys.readouterr().err
+    (tmp_path / "bad.npz").write_bytes(b"junk")
+    assert main([str(tmp_path / "bad.npz"), "--out", str(tmp_path / "page.html")]) == 2
+    assert "is no branch stored by contin, or damaged" in capsys.readouterr().err
+
+
 # --- a stored branch in a notebook --------------------------------------------------------------------------------
 
 
 def test_stored_branch_in_a_notebook(results):
-    from xml.etree import ElementTree
-
     branch = read_branch(results / "m1_n2.h5")
     table = branch.to_pandas()
     assert np.array_equal(table["kappa_n"], branch.points["kappa_n"]) and "LP" in set(table["label"])
     assert len(branch.plot(shapes=2).axes) == 3
     root = ElementTree.fromstring(branch._repr_html_())
-    assert root.find("{http://www.w3.org/2000/svg}svg") is not None
+    assert root.find(f"{SVG}svg") is not None
     assert [row[1].text for row in root.iterfind("table/tbody/tr")] == ["BP", "LP", "EP"]
 
 

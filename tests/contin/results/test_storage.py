@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bank.closed_forms import elastica, parabola
 
-from contin import ProblemError, load, save, solve, trace
+from contin import AlgebraicProblem, ProblemError, load, read_columns, save, solve, trace
 
 
 def test_a_stored_branch_point_can_be_left_again(tmp_path):
@@ -39,3 +39,30 @@ def test_what_is_no_branch_of_this_problem_is_refused(tmp_path):
         load(elastica(), tmp_path / "a.npz")
     with pytest.raises(FileNotFoundError):
         load(problem, tmp_path / "absent.npz")
+
+
+def test_columns_and_states_without_the_problem(tmp_path):
+    """Those of the branch itself, on its meshes; a file that is no branch is refused as `load` refuses it."""
+    branch = trace(solve(elastica(), [0, 0], intervals=8, degree=6), free=["lam"], limits={"lam": (1, 20)})
+    other = trace(branch.labelled("BP")[0], branch=1, limits={"lam": (1, 15)})
+    save(other, tmp_path / "b.npz")
+    stored = read_columns(tmp_path / "b.npz")
+    assert stored.labels == [point.label for point in other] and stored.stop == str(other.stop)
+    for name in ("lam", "k", "mode"):
+        assert np.array_equal(stored.columns[name], other.column(name))
+    for (times, states), point in zip(stored.profiles, other, strict=True):
+        assert np.array_equal(times, point.system.nodes) and np.array_equal(states, point.system.states(point.x))
+    (tmp_path / "junk.npz").write_bytes(b"junk")
+    with pytest.raises(ProblemError, match="no branch stored"):
+        read_columns(tmp_path / "junk.npz")
+
+
+def test_columns_of_scaled_and_algebraic_problems(tmp_path):
+    """A problem of large numbers is stored divided by its sizes; its columns are not."""
+    problem = AlgebraicProblem(lambda u, p: (p.a - 1e-6 * u.x**2,), ["x"], {"a": 1e12})
+    branch = trace(solve(problem, [1e9]), free=["a"], direction=-1, limits={"a": (5e11, 2e12)})
+    save(branch, tmp_path / "a.npz")
+    stored = read_columns(tmp_path / "a.npz")
+    assert np.array_equal(stored.columns["a"], branch.column("a"))
+    for (times, states), point in zip(stored.profiles, branch, strict=True):
+        assert len(times) == 1 and np.array_equal(states, point.system.states(point.x))

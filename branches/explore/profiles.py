@@ -1,0 +1,86 @@
+"""Branches that contin stored, of any problem, for the page: their columns, and the states at every point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from branches.explore.packing import packed, quantised
+from branches.files import StoreError
+from contin import StoredColumns, read_columns
+
+#: The column of the size of the states, their root mean square over the nodes.
+NORM = "norm"
+#: Nodes of a profile, at most. Twice as many make pages twice as large; a quarter of them shows corners at steep layers.
+_MOST_NODES = 161
+#: Kinds of labelled points, as the page knows them.
+_KINDS = {"LP": "fold", "BP": "secondary", "HB": "hopf", "UZ": "user"}
+
+
+def gathered(files: list[Path]) -> dict:
+    """Return the data of a page of stored branches; see `branches.explore.gather.gather`.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be read or has fewer than two points, or the files have no free parameter in common.
+    """
+    stored = {path: _read(path) for path in files}
+    first = next(iter(stored.values()))
+    common = [name for name in first.columns if all(name in one.columns for one in stored.values())]
+    free = [name for name in first.free if all(name in one.free for one in stored.values())]
+    if not free:
+        raise StoreError(f"the branches have no free parameter in common; that of {str(files[0])!r} is {', '.join(first.free)}")
+    axes = [name for name in common if name != "index" and _varies(name, stored)]
+    upwards = [name for name in axes if name not in (*free, "arclength", NORM)] + [NORM]
+    branches = [_branch(path, one, axes) for path, one in stored.items()]
+    family = {"name": "branches", "parameter": free[0], "branches": branches, "circles": []}
+    return {
+        "title": ", ".join(path.stem for path in files[:3]) + (" …" if len(files) > 3 else ""), "kind": "branches",
+        "axes": [(name, name, name) for name in axes], "shown": [free[0], upwards[0]], "families": [family],
+    }  # fmt: skip
+
+
+def _varies(name: str, stored: dict[Path, StoredColumns]) -> bool:
+    values = np.concatenate([one.columns[name] for one in stored.values()])
+    return bool(np.ptp(values) > 0) or any(name in one.free for one in stored.values())
+
+
+def _read(path: Path) -> StoredColumns:
+    try:
+        stored = read_columns(path)
+    except OSError as error:
+        raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error
+    if len(stored.labels) < 2:
+        raise StoreError(f"{str(path)!r} holds {len(stored.labels)} point; a branch has two at least")
+    more = {NORM: np.array([np.sqrt(np.mean(states**2)) for _, states in stored.profiles])}
+    if all(len(times) == 1 for times, _ in stored.profiles):  # an algebraic problem: its states are columns, too
+        more |= dict(zip(stored.states, np.array([states[0] for _, states in stored.profiles]).T))
+    columns = stored.columns | {name: values for name, values in more.items() if name not in stored.columns}
+    if bad := [name for name, values in columns.items() if not np.isfinite(values).all()]:
+        raise StoreError(f"{str(path)!r}: the column {bad[0]!r} holds values that are no numbers")
+    return replace(stored, columns=columns)
+
+
+def _branch(path: Path, stored: StoredColumns, axes: list[str]) -> dict:
+    kept = [*axes, *(name for name in ("arclength", "index") if name in stored.columns and name not in axes)]
+    count = min(max(len(times) for times, _ in stored.profiles), _MOST_NODES)
+    values, scale = quantised(np.array([_sampled(times, states, count) for times, states in stored.profiles]))
+    marks = [
+        {"point": number, "kind": _KINDS.get(label, "end"), "name": " ".join(filter(None, (label, stored.names[number])))}
+        for number, label in enumerate(stored.labels)
+        if label
+    ]
+    return {
+        "profile": True, "name": path.stem, "file": path.name, "stop": stored.stop, "marks": marks, "labels": stored.labels,
+        "columns": {name: packed(stored.columns[name], "<f8") for name in kept}, "components": stored.states,
+        "nodes": count, "channels": values.shape[2], "shapes": packed(values, "<i2"), "scale": packed(scale, "<f8"),
+    }  # fmt: skip
+
+
+def _sampled(times: np.ndarray, states: np.ndarray, count: int) -> np.ndarray:
+    """Return the time and the states at ``count`` of the nodes, shape (count, 1 + states); they are dense where the mesh is."""
+    at, table = np.linspace(0, len(times) - 1, count), np.column_stack([times, states])
+    return np.array([np.interp(at, np.arange(len(times)), column) for column in table.T]).T
