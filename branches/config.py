@@ -91,6 +91,9 @@ class Config(_Strict):
     law: Literal[*LAWS] = RIBBON.name
     nu: float = Field(0.3, gt=-1, le=0.5, description="Poisson's ratio")
     Gamma: float | None = Field(None, ge=0, le=1e12, description="w^2 / (h L/2pi), width and thickness; law finite width only")
+    strip: dict[str, Annotated[float, Field(allow_inf_nan=True)]] | None = Field(
+        None, description="dimensions in SI units, from which law, nu and Gamma follow"
+    )
     m: int = Field(ge=1, le=1000, description="covering index of the circle that the branch leaves")
     n: int = Field(ge=1, le=1000, description="wavenumber of the mode")
     domain: Literal["cell", "half loop", "half loop between axes"] = "cell"
@@ -305,6 +308,10 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
         raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
 
 
+#: Fields that follow from ``strip``, in the order in which `_of_strip` sets them.
+_FROM_STRIP = ("law", "nu", "Gamma")
+
+
 def _of_strip(values: dict, name: str) -> dict:
     """The scene with the dimensionless numbers of its ``strip``, in SI units: law, nu, Gamma; its kappa_n is labelled UZ."""
     from ribbon_model.strip import NAMES, Strip
@@ -318,18 +325,18 @@ def _of_strip(values: dict, name: str) -> dict:
     for field in NAMES:
         if field not in strip:
             raise ConfigError(f"{name}: the field 'strip.{field}' is missing")
-    for field in ("law", "nu", "Gamma"):
+    for field in _FROM_STRIP:
         if field in values:
             raise ConfigError(f"{name}: {field}: stands beside strip, which says it already")
     try:
         found = Strip(**strip)
     except ValueError as error:
         raise ConfigError(f"{name}: strip: {error}") from error
-    rest = {key: value for key, value in values.items() if key != "strip"}
-    rest |= {"law": FINITE_WIDTH.name, "nu": found.poisson_ratio, "Gamma": found.Gamma}
+    rest = values | dict(zip(_FROM_STRIP, (FINITE_WIDTH.name, found.poisson_ratio, found.Gamma)))
     zeros = rest.get("zeros", {})
-    if isinstance(zeros, dict) and isinstance(zeros.get("kappa_n", []), list):  # else its own check complains
-        rest["zeros"] = {**zeros, "kappa_n": [*zeros.get("kappa_n", []), found.kappa_n]}
+    known = zeros.get("kappa_n", []) if isinstance(zeros, dict) else None
+    if isinstance(known, list) and found.kappa_n not in known:  # else its own check complains
+        rest["zeros"] = {**zeros, "kappa_n": [*known, found.kappa_n]}
     return rest
 
 
@@ -386,6 +393,8 @@ class _Dumper(yaml.SafeDumper):
 def dump(config: Config | DiagramConfig) -> str:
     """The YAML text of a scene, fields at their defaults left out; `parse` reads it back."""
     values = config.values if isinstance(config, DiagramConfig) else config.model_dump(mode="json", exclude_defaults=True)
+    if "strip" in values:
+        values = {key: value for key, value in values.items() if key not in _FROM_STRIP}
     return yaml.dump(values, Dumper=_Dumper, sort_keys=False)
 
 

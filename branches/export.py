@@ -23,11 +23,6 @@ if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and mistakes in th
 EXIT_BAD_INPUT = 2
 #: Endings of what --out and --movie write.
 SURFACES, MOVIES = (".stl", ".obj", ".glb", ".gltf", ".vtk", ".vtu"), (".gif", ".mp4")
-#: Width where the result knows none and none is given, in units of L: that of the pictures, 0.3 L/2 pi.
-_WIDTH = 0.3 / (2 * math.pi)
-#: Part of the largest possible width that a width of our own choice stays below: where generators nearly cross, cells
-#: degenerate. At .99 the narrowest cells of the branch (1, 2) are a hundredth of the others.
-_ROOM = 0.8
 #: Frames of a film: fewer than 2 show nothing move, and more than 2000 take minutes and hundreds of megabytes.
 _FRAMES = (2, 2000)
 
@@ -159,16 +154,11 @@ def labelled_point(branch: StoredBranch, text: str) -> int:
 
 def placed(branch: StoredBranch, point: int, length: float) -> tuple[Shape, ndarray]:
     """The closed strip of a point, scaled and upright, and its strains (K, 3) in radians per unit of that length."""
-    from dataclasses import replace
-
-    import numpy as np
-
+    from branches.draw_strip import flat_across
     from ribbon_model.domains import LOOP
 
     solution = branch.solution(point).on(LOOP)
-    shape = solution.shape().placed(length)
-    if not solution.law.has_rulings:  # its cross sections stay straight along d1
-        shape = replace(shape, eta=np.zeros_like(shape.eta))
+    shape = flat_across(solution.shape(), solution.law).placed(length)
     return shape, solution.strains() * (2 * math.pi / length)
 
 
@@ -203,10 +193,11 @@ def _table(shape: Shape, strains) -> bytes:
 def _mesh(branch: StoredBranch, shape: Shape, options):
     from branches import solid
     from branches.config import ConfigError
+    from branches.draw_strip import ROOM, WIDTH
 
     width, most = _width(branch, options), solid.widest(shape)
     if width is None:
-        width = min(_WIDTH * options.length, _ROOM * most)
+        width = min(WIDTH / (2 * math.pi) * options.length, ROOM * most)
         write_output(f"width {width:.6g}: the result knows none; change it with --width\n")
     if width >= most:
         raise ConfigError(f"--width {width:g}: must be below {most:.6g}, where generators of the surface begin to cross")
