@@ -9,11 +9,14 @@ import numpy as np
 
 from branches.diagram_graph import common_index
 from branches.draw_diagram import CONJUGATE, LINES, NATURAL, colour_of, in_words, smooth
-from branches.draw_strip import draw_strip, reach_of, strip_of, width_of
+from branches.draw_strip import draw_strip, reach_of, steady, strip_of, width_of
 from branches.labels import SPECIAL, kind_of, label_of
 from ribbon_model.laws import label as name_law
+from ribbon_model.strip import Strip
 
 #: Kinds of `branches.labels` that the legend says in other words.
+#: Strips that are compared to see from which side to look; a tenth of them may miss how a strip turns over.
+_BETWEEN = 60
 _WORDS = {"leaves": "limit of the scene", "circle": "bifurcation of a circle"}
 
 
@@ -34,7 +37,7 @@ def figure(branch, shapes: int = 6, width: float | None = None):
     columns = max(len(chosen), 1)
     result = Figure(figsize=(9, 5.9 if chosen else 4.2), layout="constrained")
     grid = result.add_gridspec(2 if chosen else 1, columns, height_ratios=[1, 2.6] if chosen else [1])
-    strips = [strip_of(branch, point) for point in chosen]
+    strips = _strips(branch, chosen)
     width = width_of(branch.config, strips, width)
     reach = reach_of(strips, width) if strips else 1.0
     for column, strip in enumerate(strips):
@@ -43,6 +46,14 @@ def figure(branch, shapes: int = 6, width: float | None = None):
         axes.set_title(chr(ord("a") + column), fontsize=12, y=0.95)
     curve(result.add_subplot(grid[-1, :]), branch, chosen)
     return result
+
+
+def _strips(branch, chosen) -> list:
+    """The strips of these points, looked at from one side: each is turned onto the one before, along points between them."""
+    kept = branch.kept().tolist() if chosen else []
+    between = sorted({*kept[:: max(1, len(kept) // _BETWEEN)], *chosen})
+    turned = steady({point: strip_of(branch, point) for point in between})
+    return [turned[point] for point in chosen]
 
 
 def choose(branch, count: int) -> list[int]:
@@ -64,7 +75,7 @@ def choose(branch, count: int) -> list[int]:
 
 def title_of(config: dict) -> str:
     """What the branch is, in words: the strip with its dimensions or the law, the mode and Poisson's ratio."""
-    what, strip = name_law(config["law"], config["Gamma"]), config["strip"]
+    what, strip = name_law(config["law"], config["Gamma"]).replace("Gamma", "Γ"), config["strip"]
     if strip:
         sizes = " × ".join(f"{1e3 * strip[name]:.4g}" for name in ("width", "thickness", "length"))
         what = f"strip of {sizes} mm"
@@ -93,7 +104,7 @@ def curve(axes, branch, chosen) -> None:
     axes.set_title(title_of(config), fontsize=12)
     axes.tick_params(labelsize=11)
     axes.grid(alpha=0.25)
-    axes.margins(0.1)
+    axes.margins(0.16, 0.1)
     axes.legend(frameon=False, fontsize=11)
     place = np.column_stack([unit * points["kappa_n"], unit * points["kappa_star"]])
     letters(axes, place, points["label"], chosen, colour)
@@ -103,13 +114,20 @@ def _mark(axes, event, unit: float, branch, seen: set) -> None:
     """The mark of a labelled point, with kappa_n at a fold, and a word for the legend where the mark has none yet."""
     letters, name = event["label"].decode(), event["name"].decode()
     mark, kind = label_of(letters), kind_of(letters, name, branch.reason, bool(branch.config["origin"]))
-    label = _once(_WORDS.get(kind, kind), seen)
+    label = _once(_word(kind, event, branch.config), seen)
     place = unit * event["kappa_n"], unit * event["kappa_star"]
     fill = "white" if kind == "leaves" else mark.colour  # open: the branch goes on there
     colours = {"color": mark.colour} if mark.marker == "x" else {"facecolor": fill, "edgecolor": mark.colour}
     axes.scatter(*place, marker=mark.marker, s=mark.size, zorder=3, label=label, **colours)
     if letters == "LP":
         axes.annotate(in_words(f"{place[0]:.4f}"), place, (9, -3), textcoords="offset points", fontsize=11)
+
+
+def _word(kind: str, event, config: dict) -> str:
+    """What the legend calls a labelled point."""
+    if kind == "user value" and config["strip"] and math.isclose(event["kappa_n"], Strip(**config["strip"]).kappa_n):
+        return "natural curvature of the strip"
+    return _WORDS.get(kind, kind)
 
 
 def _once(name, seen: set):

@@ -177,8 +177,8 @@ def _height_at(mark: Mark, placed) -> float | None:
 def _draw(axes, line: Line, height) -> None:
     colour = colour_of(line.n) if line.n else _NO_WAVE
     for stable, part in line.parts():
-        dashes, _ = LINES[stable]
-        axes.plot(line.kappa_n[part], height[part], color=colour, ls=dashes, lw=_WIDTHS[stable], zorder=2, solid_capstyle="butt")
+        style = {"ls": LINES[stable][0], "lw": _WIDTHS[stable], "solid_capstyle": "butt"}
+        axes.plot(line.kappa_n[part], height[part], color=colour, zorder=2, **style)
     for mark in line.marks:
         if mark.kind in MARKS:
             marker, colour, size = MARKS[mark.kind]
@@ -256,10 +256,10 @@ def lines(graph, law: str, nu: float) -> list[Line]:
 
 def _line(graph, n: int, edges) -> Line:
     """The branch that these edges make up, end to end."""
-    curves = [smooth(d["arclength"], d["kappa_n"], d["kappa_star"]) for _, _, d in edges]
-    curves = [curves[0], *([column[1:] for column in curve] for curve in curves[1:])]  # pieces share their ends
-    index = np.concatenate([np.full(len(curve[0]), d.get("index", -1)) for curve, (_, _, d) in zip(curves, edges)])
-    kappa_n, kappa_star = (np.concatenate([curve[i] for curve in curves]) for i in (0, 1))
+    s, *columns = (np.concatenate([data[name] for _, _, data in edges]) for name in ("arclength", "kappa_n", "kappa_star"))
+    s, kappa_n, kappa_star = smooth(s, s, *columns)
+    piece = np.searchsorted([data["arclength"][-1] for _, _, data in edges[:-1]], s)
+    index = np.array([data.get("index", -1) for _, _, data in edges])[piece]
     kappa_n, kappa_star, index = _refined(kappa_n, kappa_star, index)
     nodes = (graph.nodes[name] for name in dict.fromkeys(node for a, b, _ in edges for node in (a, b)))
     marks = [Mark(node["kappa_n"], node["kappa_star"], node["kind"], node.get("covering")) for node in nodes]

@@ -24,6 +24,8 @@ _LINE, _LINE_PART = 1.3, 0.12
 #: The way to the eye (azimuth -45, elevation 32 degrees), and to the lamp, which stands to its left and a little above.
 _EYE = np.array([0.59967, -0.59967, 0.52992])
 _LAMP = np.array([0.29, -0.65, 0.70]) / math.hypot(0.29, 0.65, 0.70)
+#: Stations along a strip at which two strips are compared: the turn between them is a mean over all.
+_STATIONS = 200
 #: Light from everywhere; the rest is the lamp's.
 _AMBIENT = 0.45
 
@@ -40,6 +42,25 @@ def strip_of(branch, point: int):
 def flat_across(shape, law):
     """The shape with its sections straight along d1 if the law has no generators."""
     return shape if law.has_rulings else replace(shape, eta=np.zeros_like(shape.eta))
+
+
+def steady(strips: dict) -> dict:
+    """The strips, each turned so that it moves as little as possible from the one before (Kabsch's rotation)."""
+    result: dict = {}
+    before = None
+    for point, strip in strips.items():
+        if before is not None:
+            u, _, v = np.linalg.svd(places(strip).T @ before)
+            turn = (u * [1, 1, np.sign(np.linalg.det(u @ v))]) @ v
+            strip = replace(strip, centreline=strip.centreline @ turn, directors=strip.directors @ turn)
+        result[point], before = strip, places(strip)
+    return result
+
+
+def places(strip) -> np.ndarray:
+    """Points of the centreline at equal distances, shape (_STATIONS, 3)."""
+    stations = np.linspace(0, 2 * math.pi, _STATIONS)
+    return np.column_stack([np.interp(stations, strip.arclength, x) for x in strip.centreline.T])
 
 
 def width_of(config: dict, shapes, asked: float | None = None) -> float:
@@ -60,13 +81,13 @@ def reach_of(shapes, width: float) -> float:
     return 1.03 * float(np.abs(corners @ np.column_stack([right, up])).max())
 
 
-def draw_strip(axes, shape, width: float, reach: float) -> None:
+def draw_strip(axes, shape, width: float, reach: float, pixels: int = PIXELS) -> None:
     """Draw a strip, seen from above at an angle, as far as ``reach`` from the middle of its centreline."""
-    axes.imshow(rendered(shape, width, reach), extent=(-reach, reach, -reach, reach), interpolation="antialiased")
+    axes.imshow(rendered(shape, width, reach, pixels), extent=(-reach, reach, -reach, reach), interpolation="antialiased")
     axes.set_axis_off()
 
 
-def rendered(shape, width: float, reach: float, pixels: int = PIXELS) -> np.ndarray:
+def rendered(shape, width: float, reach: float, pixels: int) -> np.ndarray:
     """The picture of a strip, shape (pixels, pixels, 4), between 0 and 1; alpha is the part of a pixel that is covered.
 
     The surface is sampled more densely than the pixels, and of the samples in a pixel the one nearest to the eye is seen: no

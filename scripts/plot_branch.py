@@ -17,8 +17,8 @@ def main(argv=None) -> int:
     parser.add_argument("--shapes", type=int, default=6, help="number of strips drawn (default 6)")
     parser.add_argument(
         "--width", type=float,
-        help="width of the drawn strip, in units of L / 2 pi (default: the strip's own if the scene gives its dimensions, else 0.3);"
-        " narrower where its generators would cross",
+        help="width of the drawn strip, in units of L / 2 pi (default: that of the scene's strip if it has one, otherwise 0.3); "
+        "narrower where its generators would cross",
     )  # fmt: skip
     options = parser.parse_args(argv)
     from branches.draw_branch import figure

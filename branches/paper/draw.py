@@ -8,6 +8,8 @@ from branches.files import write_picture
 
 STABLE, UNSTABLE, MODES, RIGID = "#0072B2", "#D55E00", "#8a6d3b", "#000000"
 UNSTABLE_FILL = "#F3B48B"
+#: Stable states that are buckled, beside stable circles.
+BUCKLED = "#56B4E9"
 
 
 def keep(figure, folder: Path, name: str) -> str:
