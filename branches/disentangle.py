@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -33,7 +34,7 @@ _TOUCHING, _NEAR, _CLIMB = 0.3, 0.02, 0.02
 _STRAIGHTENED, _BEYOND_STRAIGHT, _APART = 50, 1.5, 0.08
 #: Steps in kappa_n smaller than this are rounding errors of the splines, and columns closer than the second number are one.
 _STILL, _SAME = 1e-4, 1e-4
-_OUTSIDE = -1
+_OUTSIDE, _NOBODY = -1, np.zeros((0, 2))
 
 
 @dataclass
@@ -59,10 +60,20 @@ class Course:
     sense: int
     height: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    @property
+    @cached_property
     def seen(self) -> np.ndarray:
         """Which steps lie between neighbouring columns, shape (T - 1,)."""
         return (np.abs(np.diff(self.column)) == 1) & (self.column[1:] != _OUTSIDE) & (self.column[:-1] != _OUTSIDE)
+
+    @cached_property
+    def interval(self) -> np.ndarray:
+        """The left column of each step that is seen, shape (S,)."""
+        return np.minimum(self.column[:-1], self.column[1:])[self.seen]
+
+    def strands(self) -> np.ndarray:
+        """Heights at the left and at the right column of each step that is seen, shape (S, 2)."""
+        pairs = np.column_stack([self.height[:-1], self.height[1:]])[self.seen]
+        return np.where((np.diff(self.column)[self.seen] > 0)[:, None], pairs, pairs[:, ::-1])
 
 
 def heights(curves, ends, window) -> list[np.ndarray]:
@@ -81,11 +92,14 @@ def heights(curves, ends, window) -> list[np.ndarray]:
     -------
     list of ndarray, shape (K,)
     """
+    from threadpoolctl import threadpool_limits
+
     columns = _columns(curves, window)
     courses = [_course(curve, columns, *end) for curve, end in zip(curves, ends)]
     circles = np.array(sorted({height for end in ends for height in end[:2] if height is not None}))
     levels = _levels(circles)
-    _search(courses, levels, np.isin(levels, circles))
+    with threadpool_limits(1, "blas"):  # the matrices are small
+        _search(courses, levels, np.isin(levels, circles))
     _straighten(courses, columns, circles)
     return [_along(course, curve) for course, curve in zip(courses, curves)]
 
@@ -179,31 +193,31 @@ def _place(courses, order, levels, circles) -> None:
 
 def _crossed_each(courses) -> np.ndarray:
     """How often each branch crosses others; one that touches another above a column and goes back crosses it half twice."""
-    between: dict = {}
-    for number, course in enumerate(courses):
-        for t in np.flatnonzero(course.seen).tolist():
-            here, beyond = course.column[t : t + 2].tolist()
-            between.setdefault(min(here, beyond), []).append((number, *course.height[t : t + 2][:: beyond - here].tolist()))
-    found = np.zeros(len(courses))
-    for strands in between.values():
-        number, left, right = np.array(strands).T
-        crossed = (1 - np.sign(left[:, None] - left) * np.sign(right[:, None] - right)) / 2
-        np.add.at(found, number.astype(int), np.sum(crossed * (number[:, None] != number), axis=1))
+    interval = np.concatenate([course.interval for course in courses])
+    owner = np.repeat(np.arange(len(courses)), [len(course.interval) for course in courses])
+    strands, found = np.concatenate([course.strands() for course in courses]), np.zeros(len(courses))
+    for here in map(np.flatnonzero, interval == np.unique(interval)[:, None]):
+        left, right = np.sign(strands[here, None] - strands[here]).transpose(2, 0, 1)
+        other = owner[here, None] != owner[here]
+        np.add.at(found, owner[here], np.sum((1 - left * right) / 2 * other, axis=1))
     return found
 
 
+def _grouped(keys, values) -> dict:
+    """The values of each key, as arrays."""
+    order = np.argsort(keys, kind="stable")
+    known, first = np.unique(keys[order], return_index=True)
+    return dict(zip(known.tolist(), np.split(values[order], first[1:])))
+
+
 def _others(courses, mine: int) -> tuple[dict, dict]:
-    """Heights of all other branches above each column, and at both columns of each interval (left column -> [(2,)])."""
-    above, between = {}, {}
-    for number, course in enumerate(courses):
-        if number == mine or not len(course.height):
-            continue
-        for column, height in zip(course.column, course.height):
-            above.setdefault(column, []).append(height)
-        for t in np.flatnonzero(course.seen):
-            way = course.column[t + 1] - course.column[t]
-            between.setdefault(min(course.column[t : t + 2]), []).append(course.height[t : t + 2][::way])
-    return above, between
+    """Heights of all other branches above each column (S,), and at both ends of each interval, by its left column (S, 2)."""
+    others = [course for i, course in enumerate(courses) if i != mine and len(course.height)]
+    if not others:
+        return {}, {}
+    above = _grouped(np.concatenate([course.column for course in others]), np.concatenate([course.height for course in others]))
+    strands = np.concatenate([course.strands() for course in others])
+    return above, _grouped(np.concatenate([course.interval for course in others]), strands)
 
 
 def _shortest(courses, mine: int, levels, circles) -> None:
@@ -219,14 +233,14 @@ def _shortest(courses, mine: int, levels, circles) -> None:
         step = np.where(wrong, np.inf, 0.0)
         if course.seen[t]:
             here, beyond = course.column[t : t + 2]
-            step = step + climb + _crossed(levels, between.get(min(here, beyond), []), here < beyond)
+            step = step + climb + _crossed(levels, between.get(min(here, beyond), _NOBODY), here < beyond)
         total = np.round(cost[:, None] + step, 6)
         came.append(np.argmin(total, axis=0))
         cost = total.min(axis=0)
         if t + 1 < last or course.ends[1] is None:
             cost = cost + np.where(circles, np.inf, 0.0)
             if course.column[t + 1] != _OUTSIDE:
-                distance = np.abs(levels[:, None] - np.array(above.get(course.column[t + 1], []))) / spacing
+                distance = np.abs(levels[:, None] - above.get(course.column[t + 1], _NOBODY[:, 0])) / spacing
                 cost = cost + _TOUCHING * (distance < 0.5).sum(axis=1) + _NEAR * (distance < 1.5).sum(axis=1)
     level = int(np.argmin(cost)) if course.ends[1] is None else int(np.argmin(np.abs(levels - course.ends[1])))
     way = [level]
@@ -237,9 +251,7 @@ def _shortest(courses, mine: int, levels, circles) -> None:
 
 def _crossed(levels, pairs, rightwards) -> np.ndarray:
     """How many of the others a step from one level (row) to another (column) crosses; half for one that it touches."""
-    if not pairs:
-        return np.zeros((len(levels), len(levels)))
-    left, right = np.sign(levels[:, None, None] - np.array(pairs)).transpose(2, 0, 1)
+    left, right = np.sign(levels[:, None, None] - pairs).transpose(2, 0, 1)
     crossed = (left.shape[1] - left @ right.T) / 2
     return crossed if rightwards else crossed.T
 
@@ -271,17 +283,18 @@ def _straighten(courses, columns, circles) -> None:
 
 def _straighter(course: Course, t: int, columns, beside, apart: float) -> float:
     """A height nearer to the straight line between the places before and after it that are seen."""
-    height, column, seen = course.height, course.column, np.concatenate([[False], course.seen, [False]])
-    linked = [k for k, there in ((t - 1, seen[t]), (t + 1, seen[t + 1])) if there]
+    height, column, here = course.height, course.column, course.height[t]
+    linked = [k for k in (t - 1, t + 1) if k < len(height) and course.seen[min(k, t)]]
     if not linked:
-        return height[t]
+        return here
     near = [1 / abs(columns[column[k]] - columns[column[t]]) for k in linked]
-    goal = height[t] + _BEYOND_STRAIGHT * (np.average(height[linked], weights=near) - height[t])
+    straight = sum(weight * height[k] for weight, k in zip(near, linked)) / sum(near)
+    goal = here + _BEYOND_STRAIGHT * (straight - here)
     if course.sense:
-        follows = height[t + 1] if t + 1 < len(height) else course.sense * np.inf
-        goal = np.clip(goal, *sorted((height[t - 1], follows)))
-    low, high = beside[beside < height[t]].max(initial=-np.inf), beside[beside > height[t]].min(initial=np.inf)
-    return float(np.clip(goal, min(height[t], low + apart), max(height[t], high - apart)))
+        ends = sorted((height[t - 1], height[t + 1] if t + 1 < len(height) else course.sense * np.inf))
+        goal = min(max(goal, ends[0]), ends[1])
+    low, high = beside[beside < here].max(initial=-np.inf), beside[beside > here].min(initial=np.inf)
+    return min(max(goal, min(here, low + apart)), max(here, high - apart))
 
 
 def _along(course: Course, curve) -> np.ndarray:

@@ -14,9 +14,9 @@ from branches.labels import SPECIAL, kind_of, label_of
 from ribbon_model.laws import label as name_law
 from ribbon_model.strip import Strip
 
-#: Kinds of `branches.labels` that the legend says in other words.
 #: Strips that are compared to see from which side to look; a tenth of them may miss how a strip turns over.
 _BETWEEN = 60
+#: Kinds of `branches.labels` that the legend says in other words.
 _WORDS = {"leaves": "limit of the scene", "circle": "bifurcation of a circle"}
 
 

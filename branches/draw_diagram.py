@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from branches import disentangle
+from branches import disentangle as layered
 from branches.diagram_graph import families, pieces, secondaries
 from branches.labels import END, FOLD, MARKS, SECONDARY
 from contin import exact_text
@@ -85,7 +85,7 @@ class Line:
             first = last
 
 
-def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangled: bool = True):
+def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = True):
     """The diagram of one law and nu.
 
     Parameters
@@ -94,7 +94,7 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangled: bool =
         As of `branches.diagram_graph`.
     window : (float, float)
         Of kappa_n.
-    disentangled : bool
+    disentangle : bool
         Add the panel where the heights between the circles are free (`branches.disentangle`).
 
     Returns
@@ -103,11 +103,11 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangled: bool =
     """
     from matplotlib.figure import Figure
 
-    result = Figure(figsize=(13 if disentangled else 7.5, 7), layout="constrained")
-    panels = result.subplots(1, 2 if disentangled else 1, sharex=True, squeeze=False)[0]
+    result = Figure(figsize=(13 if disentangle else 7.5, 7), layout="constrained")
+    panels = result.subplots(1, 2 if disentangle else 1, sharex=True, squeeze=False)[0]
     conjugate(panels[0], graph, law, nu, window)
     panels[0].set_ylabel(CONJUGATE, fontsize=13)
-    if disentangled:
+    if disentangle:
         panels[0].set_title("in conjugate coordinates", fontsize=13)
         schematic(panels[1], graph, law, nu, window)
         panels[1].set_ylabel("covering index of the circles (heights between: free)", fontsize=13)
@@ -115,7 +115,7 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangled: bool =
     for axes in panels:
         axes.set_xlabel(NATURAL, fontsize=13)
         axes.tick_params(labelsize=12)
-    handles, columns = legend(graph, law, nu), 6 if disentangled else 3
+    handles, columns = legend(graph, law, nu), 6 if disentangle else 3
     result.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=12)
     result.suptitle(f"Equilibria of a closed strip: {law}, $\\nu$ = {in_words(nu)}{note(graph)}", fontsize=15)
     return result
@@ -155,7 +155,7 @@ def heights(found: list[Line], window) -> list[np.ndarray]:
     for line in primary:
         rises = 1 if line.kappa_star[-1] >= line.kappa_star[0] else -1
         ends.append((line.marks[0].covering, line.marks[-1].covering, rises))
-    result = disentangle.heights([line.kappa_n for line in primary], ends, window)
+    result = layered.heights([line.kappa_n for line in primary], ends, window)
     for line in found[len(primary) :]:
         a, b = (_height_at(mark, zip(primary, result)) for mark in (line.marks[0], line.marks[-1]))
         climbed = line.kappa_star - line.kappa_star[0]

@@ -17,7 +17,7 @@ def main(argv=None) -> int:
     parser.add_argument("--shapes", type=int, default=6, help="number of strips drawn (default 6)")
     parser.add_argument(
         "--width", type=float,
-        help="width of the drawn strip, in units of L / 2 pi (default: that of the scene's strip if it has one, otherwise 0.3); "
+        help="width of the drawn strip, in units of L / 2 pi (default: that of the scene's strip if it has one, or 0.3); "
         "narrower where its generators would cross",
     )  # fmt: skip
     options = parser.parse_args(argv)
