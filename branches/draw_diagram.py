@@ -275,7 +275,9 @@ def _refined(kappa_n, kappa_star, index) -> tuple[np.ndarray, np.ndarray, np.nda
     """The same polyline with more points: steps in kappa_n are at most `_STEP`, so that heights can change between them."""
     parts = np.clip(np.ceil(np.abs(np.diff(kappa_n)) / _STEP), 1, _MOST_PARTS).astype(int)
     number = np.arange(len(kappa_n))
-    fine = np.append(np.repeat(number[:-1], parts) + np.concatenate([np.arange(k) / k for k in parts]), number[-1])
+    within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    fine = np.append(np.repeat(number[:-1], parts) + within / np.repeat(parts, parts), number[-1])
+    fine = np.repeat(fine, 2) if len(fine) == 1 else fine  # a branch that ends where it begins
     return np.interp(fine, number, kappa_n), np.interp(fine, number, kappa_star), index[np.ceil(fine).astype(int)]
 
 

@@ -47,7 +47,7 @@ def arguments(argv=None):
     parser.add_argument("--length", type=float, default=1.0, metavar="X", help="length of the strip in the files (default: 1)")
     parser.add_argument("--width", type=float, metavar="X", help="width, in the same unit: of L, unless there is a --length")
     parser.add_argument("--thickness", type=float, metavar="X", help="thickness, in the same unit; makes a closed solid")
-    parser.add_argument("--frames", type=int, default=60, metavar="N", help="frames of the film, at most (default: 60)")
+    parser.add_argument("--frames", type=int, default=60, metavar="N", help="frames from end to end, at most (default: 60)")
     return parser.parse_args(argv)
 
 

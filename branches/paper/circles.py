@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from branches.draw_diagram import in_words
 from branches.paper.draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, keep
 from branches.paper.page import Row, Section
 from ribbon_model.dispersion import coefficients, squared_frequencies
@@ -210,7 +211,7 @@ def _write_ends(axes, row, interval, window):
     """The ends of a bar in numbers, just outside it."""
     for end, side in zip(interval, (-1, 1)):
         if window[0] < end < window[1]:
-            axes.text(end + 0.12 * side, row, f"{end:.2f}", ha="right" if side < 0 else "left", va="center", fontsize=9,
+            axes.text(end + 0.12 * side, row, in_words(f"{end:.2f}"), ha="right" if side < 0 else "left", va="center", fontsize=9,
                       bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
 
 
