@@ -211,8 +211,9 @@ def _write_ends(axes, row, interval, window):
     """The ends of a bar in numbers, just outside it."""
     for end, side in zip(interval, (-1, 1)):
         if window[0] < end < window[1]:
-            axes.text(end + 0.12 * side, row, in_words(f"{end:.2f}"), ha="right" if side < 0 else "left", va="center", fontsize=9,
-                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
+            style = {"ha": "right" if side < 0 else "left", "va": "center", "fontsize": 9}
+            box = {"facecolor": "white", "edgecolor": "none", "pad": 1}
+            axes.text(end + 0.12 * side, row, in_words(f"{end:.2f}"), bbox=box, **style)
 
 
 def _legend10(figure):

@@ -26,7 +26,8 @@ from branches.solid import widest
 
 def branch_of(folder, scene):
     """The branch of a scene, given as text or read already."""
-    run_branch(parse(scene, "scene") if isinstance(scene, str) else scene, folder / "x.h5", Display(silent=True))
+    config = parse(scene, "scene") if isinstance(scene, str) else scene
+    run_branch(config, folder / "x.h5", Display(silent=True), overwrite=True)
     return read_branch(folder / "x.h5")
 
 
