@@ -91,9 +91,6 @@ class Config(_Strict):
     law: Literal[*LAWS] = RIBBON.name
     nu: float = Field(0.3, gt=-1, le=0.5, description="Poisson's ratio")
     Gamma: float | None = Field(None, ge=0, le=1e12, description="w^2 / (h L/2pi), width and thickness; law finite width only")
-    strip: dict[str, Annotated[float, Field(allow_inf_nan=True)]] | None = Field(
-        None, description="dimensions in SI units, from which law, nu and Gamma follow"
-    )
     m: int = Field(ge=1, le=1000, description="covering index of the circle that the branch leaves")
     n: int = Field(ge=1, le=1000, description="wavenumber of the mode")
     domain: Literal["cell", "half loop", "half loop between axes"] = "cell"
@@ -106,6 +103,9 @@ class Config(_Strict):
     steps: StepConfig = StepConfig()
     stability: bool = Field(False, description="compute the index of every point, and where it changes")
     stride: int = Field(1, ge=1, description="the full solution is kept at every stride-th point and at labelled ones")
+    strip: dict[str, Annotated[float, Field(allow_inf_nan=True)]] | None = Field(
+        None, description="dimensions in SI units, from which law, nu and Gamma follow"
+    )
 
     @model_validator(mode="after")
     def _bifurcation_exists(self):
