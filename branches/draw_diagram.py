@@ -115,7 +115,9 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = 
     for axes in panels:
         axes.set_xlabel(NATURAL, fontsize=13)
         axes.tick_params(labelsize=12)
-    handles, columns = legend(graph, law, nu), 6 if disentangle else 3
+    handles, columns = legend(graph, law, nu), 3
+    if disentangle:
+        columns = 4 if secondaries(graph, law, nu) else 6  # their words are longer
     result.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=12)
     result.suptitle(f"Equilibria of a closed strip: {law}, $\\nu$ = {in_words(nu)}{note(graph)}", fontsize=15)
     return result
