@@ -105,6 +105,9 @@ class Config(_Strict):
     steps: StepConfig = StepConfig()
     stability: bool = Field(False, description="compute the index of every point, and the points where it changes")
     stride: int = Field(1, ge=1, description="the full solution is kept at every stride-th point and at labelled ones")
+    strip: dict[str, Annotated[float, Field(allow_inf_nan=True)]] | None = Field(
+        None, description="dimensions in SI units, from which law, nu and Gamma follow"
+    )
 
     @model_validator(mode="after")
     def _bifurcation_exists(self):
@@ -309,6 +312,10 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
         raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
 
 
+#: Fields that follow from ``strip``, in the order in which `_of_strip` sets them.
+_FROM_STRIP = ("law", "nu", "Gamma")
+
+
 def _of_strip(values: dict, name: str) -> dict:
     """Replace the ``strip`` of a scene (SI units) by law, nu and Gamma; its kappa_n is labelled UZ."""
     from ribbon_model.strip import NAMES, Strip
@@ -322,18 +329,18 @@ def _of_strip(values: dict, name: str) -> dict:
     for field in NAMES:
         if field not in strip:
             raise ConfigError(f"{name}: the field 'strip.{field}' is missing")
-    for field in ("law", "nu", "Gamma"):
+    for field in _FROM_STRIP:
         if field in values:
             raise ConfigError(f"{name}: {field}: must not be given together with strip, which determines it")
     try:
         found = Strip(**strip)
     except ValueError as error:
         raise ConfigError(f"{name}: strip: {error}") from error
-    rest = {key: value for key, value in values.items() if key != "strip"}
-    rest |= {"law": FINITE_WIDTH.name, "nu": found.poisson_ratio, "Gamma": found.Gamma}
+    rest = values | dict(zip(_FROM_STRIP, (FINITE_WIDTH.name, found.poisson_ratio, found.Gamma)))
     zeros = rest.get("zeros", {})
-    if isinstance(zeros, dict) and isinstance(zeros.get("kappa_n", []), list):  # otherwise the check of the field rejects it
-        rest["zeros"] = {**zeros, "kappa_n": [*zeros.get("kappa_n", []), found.kappa_n]}
+    known = zeros.get("kappa_n", []) if isinstance(zeros, dict) else None
+    if isinstance(known, list) and found.kappa_n not in known:  # otherwise the check of the field rejects it
+        rest["zeros"] = {**zeros, "kappa_n": [*known, found.kappa_n]}
     return rest
 
 
@@ -390,6 +397,8 @@ class _Dumper(yaml.SafeDumper):
 def dump(config: Config | DiagramConfig) -> str:
     """Return the YAML text of a scene without fields at their defaults; `parse` reads it back."""
     values = config.values if isinstance(config, DiagramConfig) else config.model_dump(mode="json", exclude_defaults=True)
+    if "strip" in values:
+        values = {key: value for key, value in values.items() if key not in _FROM_STRIP}
     return yaml.dump(values, Dumper=_Dumper, sort_keys=False)
 
 

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
 
 from branches.diagram_graph import common_index
-from branches.draw_diagram import colour_of, smooth
+from branches.draw_diagram import CONJUGATE, LINES, NATURAL, colour_of, in_words, smooth
+from branches.draw_strip import draw_strip, reach_of, steady, strip_of, width_of
 from branches.labels import SPECIAL, kind_of, label_of
-from contin import exact_text
 from ribbon_model.laws import label as name_law
+from ribbon_model.strip import Strip
 
-SHAPE, BACK = "#E8A33D", "#7A5195"
-#: Dashes and legend of pieces, by whether they are stable; None: not known.
-_LINES = {True: ("-", "stable"), False: ((0, (4, 2)), "unstable"), None: ("-", None)}
+#: Strips that are compared to see from which side to look; a tenth of them may miss how a strip turns over.
+_BETWEEN = 60
 #: Kinds of `branches.labels` that the legend says in other words.
 _WORDS = {"leaves": "limit of the scene", "circle": "bifurcation of a circle"}
 
 
-def figure(branch, shapes: int = 6, width: float = 0.3):
+def figure(branch, shapes: int = 6, width: float | None = None):
     """The figure of a branch.
 
     Parameters
@@ -27,21 +28,32 @@ def figure(branch, shapes: int = 6, width: float = 0.3):
     branch : branches.read.StoredBranch
     shapes : int
         Number of strips, at equal distances along the branch; labelled points are among them where they fit.
-    width : float
-        Width of the drawn strip, in units of L / 2 pi.
+    width : float, optional
+        Width of the drawn strip, in units of L / 2 pi; see `branches.draw_strip.width_of`.
     """
     from matplotlib.figure import Figure
 
     chosen = choose(branch, shapes)
     columns = max(len(chosen), 1)
-    result = Figure(figsize=(9, 6.2 if chosen else 4.2), layout="constrained")
-    grid = result.add_gridspec(2 if chosen else 1, columns, height_ratios=[1, 2.2] if chosen else [1])
-    for column, point in enumerate(chosen):
-        axes = result.add_subplot(grid[0, column], projection="3d")
-        draw_strip(axes, branch.shape(point), width)
-        axes.set_title(chr(ord("a") + column), fontsize=10, y=0.98)
+    result = Figure(figsize=(9, 5.9 if chosen else 4.2), layout="constrained")
+    grid = result.add_gridspec(2 if chosen else 1, columns, height_ratios=[1, 2.6] if chosen else [1])
+    strips = _strips(branch, chosen)
+    width = width_of(branch.config, strips, width)
+    reach = reach_of(strips, width) if strips else 1.0
+    for column, strip in enumerate(strips):
+        axes = result.add_subplot(grid[0, column])
+        draw_strip(axes, strip, width, reach)
+        axes.set_title(chr(ord("a") + column), fontsize=12, y=0.95)
     curve(result.add_subplot(grid[-1, :]), branch, chosen)
     return result
+
+
+def _strips(branch, chosen) -> list:
+    """The strips of these points, looked at from one side: each is turned onto the one before, along points between them."""
+    kept = branch.kept().tolist() if chosen else []
+    between = sorted({*kept[:: max(1, len(kept) // _BETWEEN)], *chosen})
+    turned = steady({point: strip_of(branch, point) for point in between})
+    return [turned[point] for point in chosen]
 
 
 def choose(branch, count: int) -> list[int]:
@@ -61,31 +73,61 @@ def choose(branch, count: int) -> list[int]:
     return sorted(chosen)
 
 
+def title_of(config: dict) -> str:
+    """What the branch is, in words: the strip with its dimensions or the law, the mode and Poisson's ratio."""
+    what, strip = name_law(config["law"], config["Gamma"]).replace("Gamma", "Γ"), config["strip"]
+    if strip:
+        sizes = " × ".join(f"{1e3 * strip[name]:.4g}" for name in ("width", "thickness", "length"))
+        what = f"strip of {sizes} mm"
+    secondary = "secondary branch of " if config["origin"] else ""
+    return f"{what}, {secondary}(m, n) = ({config['m']}, {config['n']}), $\\nu$ = {in_words(config['nu'])}"
+
+
+def unit_of(config: dict) -> float:
+    """The unit of curvature on the axes: 2 pi/L in 1/m if the dimensions of the strip are known, otherwise 1."""
+    return 2 * math.pi / config["strip"]["length"] if config["strip"] else 1.0
+
+
 def curve(axes, branch, chosen) -> None:
-    """kappa* against kappa_n, with marks at labelled points and letters at the strips drawn."""
+    """kappa* against kappa_n, with marks at labelled points and letters at the strips drawn; in 1/m for a strip with sizes."""
     points, config = branch.points, branch.config
+    colour, unit = colour_of(config["n"]), unit_of(config)
     seen = {None, "branch point"}
     for stable, kappa_n, kappa_star in lines(branch):
-        dashes, name = _LINES[stable]
-        axes.plot(kappa_n, kappa_star, color=colour_of(config["n"]), ls=dashes, lw=1.6, zorder=1, label=_once(name, seen))
+        dashes, name = LINES[stable]
+        axes.plot(unit * kappa_n, unit * kappa_star, color=colour, ls=dashes, lw=1.8, zorder=1, label=_once(name, seen))
     for event in branch.events:
-        mark, name = label_of(event["label"].decode()), event["name"].decode()
-        kind = kind_of(event["label"].decode(), name, branch.reason, bool(config["origin"]))
-        label = _once(_WORDS.get(kind, kind), seen)
-        place = event["kappa_n"], event["kappa_star"]
-        fill = "white" if kind == "leaves" else mark.colour  # open: the branch goes on there
-        colours = {"color": mark.colour} if mark.marker == "x" else {"facecolor": fill, "edgecolor": mark.colour}
-        axes.scatter(*place, marker=mark.marker, s=mark.size, zorder=3, label=label, **colours)
-        if event["label"] == b"LP":
-            axes.annotate(f"{event['kappa_n']:.4f}", place, (9, -3), textcoords="offset points", fontsize=9)
-    axes.set_xlabel(r"natural curvature $\kappa_n L/2\pi$")
-    axes.set_ylabel(r"conjugate curvature $\bar\kappa^*$")
-    material = name_law(config["law"], config["Gamma"])
-    axes.set_title(f"{material}, (m, n) = ({config['m']}, {config['n']}), $\\nu$ = {exact_text(config['nu'])}", fontsize=11)
+        _mark(axes, event, unit, branch, seen)
+    si = " in 1/m" if config["strip"] else ""
+    axes.set_xlabel(r"natural curvature $\kappa_n$" + si if si else NATURAL, fontsize=12)
+    axes.set_ylabel(r"conjugate curvature $\kappa^*$" + si if si else CONJUGATE, fontsize=12)
+    axes.set_title(title_of(config), fontsize=12)
+    axes.tick_params(labelsize=11)
     axes.grid(alpha=0.25)
-    axes.margins(0.1)
-    axes.legend(frameon=False)
-    letters(axes, points, chosen, colour_of(config["n"]))
+    axes.margins(0.16, 0.1)
+    axes.legend(frameon=False, fontsize=11)
+    place = np.column_stack([unit * points["kappa_n"], unit * points["kappa_star"]])
+    letters(axes, place, points["label"], chosen, colour)
+
+
+def _mark(axes, event, unit: float, branch, seen: set) -> None:
+    """The mark of a labelled point, with kappa_n at a fold, and a word for the legend where the mark has none yet."""
+    letters, name = event["label"].decode(), event["name"].decode()
+    mark, kind = label_of(letters), kind_of(letters, name, branch.reason, bool(branch.config["origin"]))
+    label = _once(_word(kind, event, branch.config), seen)
+    place = unit * event["kappa_n"], unit * event["kappa_star"]
+    fill = "white" if kind == "leaves" else mark.colour  # open: the branch goes on there
+    colours = {"color": mark.colour} if mark.marker == "x" else {"facecolor": fill, "edgecolor": mark.colour}
+    axes.scatter(*place, marker=mark.marker, s=mark.size, zorder=3, label=label, **colours)
+    if letters == "LP":
+        axes.annotate(in_words(f"{place[0]:.4f}"), place, (9, -3), textcoords="offset points", fontsize=11)
+
+
+def _word(kind: str, event, config: dict) -> str:
+    """What the legend calls a labelled point."""
+    if kind == "user value" and config["strip"] and math.isclose(event["kappa_n"], Strip(**config["strip"]).kappa_n):
+        return "natural curvature of the strip"
+    return _WORDS.get(kind, kind)
 
 
 def _once(name, seen: set):
@@ -115,43 +157,14 @@ def lines(branch) -> list[tuple]:
     return found
 
 
-def letters(axes, points, chosen, colour) -> None:
+def letters(axes, points, labels, chosen, colour) -> None:
     """Letters of the strips drawn, to the right of the curve as it goes; at a fold, which has a number there, to its left."""
     axes.autoscale_view()
-    place = axes.transData.transform(np.column_stack([points["kappa_n"], points["kappa_star"]]))
+    place = axes.transData.transform(points)
     for column, number in enumerate(chosen):
-        label, here = points["label"][number], (points["kappa_n"][number], points["kappa_star"][number])
-        if label == b"":
-            axes.scatter(*here, s=14, color=colour, zorder=2)
+        if labels[number] == b"":
+            axes.scatter(*points[number], s=18, color=colour, zorder=2)
         way = place[min(number + 1, len(place) - 1)] - place[max(number - 1, 0)]
-        right = np.array([way[1], -way[0]]) / (np.hypot(*way) or 1.0) * (-13 if label == b"LP" else 13)
-        axes.annotate(
-            chr(ord("a") + column), here, tuple(right), textcoords="offset points", ha="center", va="center", fontsize=10
-        )
-
-
-def draw_strip(axes, shape, width: float) -> None:
-    """A closed strip as a lit surface, one colour a side, seen from above at an angle, at equal scale."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    step = max(1, len(shape.arclength) // 400)
-    keep = np.unique(np.append(np.arange(0, len(shape.arclength), step), len(shape.arclength) - 1))
-    # the axis of the moment points up, and the strip is looked at from the same side at every point
-    surface = (shape.surface(width)[keep] - shape.centreline.mean(axis=0)) @ shape.upright().T
-    a, b = surface[:, 0], surface[:, -1]
-    quads = np.stack([a[:-1], a[1:], b[1:], b[:-1]], axis=1)
-    normals = np.cross(a[1:] - a[:-1], b[:-1] - a[:-1])
-    normals /= np.linalg.norm(normals, axis=1)[:, None] + 1e-300
-    light, eye = np.array([0.3, -0.4, 0.85]), np.array([0.55, -0.55, 0.63])
-    light /= np.linalg.norm(light)
-    from matplotlib.colors import to_rgb
-
-    front = (normals @ eye > 0)[:, None]
-    shade = (0.45 + 0.55 * np.abs(normals @ light))[:, None]
-    colours = np.where(front, to_rgb(SHAPE), to_rgb(BACK)) * shade
-    axes.add_collection3d(Poly3DCollection(quads, facecolors=colours, edgecolors=colours, linewidths=0.2))
-    reach = 0.8  # the same for all: the m-covered circle has radius 1 / m
-    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
-    axes.set_box_aspect((1, 1, 1), zoom=1.25)
-    axes.view_init(elev=32, azim=-45)
-    axes.set_axis_off()
+        right = np.array([way[1], -way[0]]) / (np.hypot(*way) or 1.0) * (-13 if labels[number] == b"LP" else 13)
+        letter, style = chr(ord("a") + column), {"ha": "center", "va": "center", "fontsize": 12}
+        axes.annotate(letter, points[number], tuple(right), textcoords="offset points", **style)

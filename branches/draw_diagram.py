@@ -3,33 +3,55 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
+from branches import disentangle as layered
 from branches.diagram_graph import families, pieces, secondaries
 from branches.labels import END, FOLD, MARKS, SECONDARY
 from contin import exact_text
 
-STABLE, UNSTABLE = "#000000", "#9a9a9a"
-#: Okabe-Ito colours and a line style for each wavenumber: told apart without colour too.
-STYLES = {
-    1: ("#CC79A7", (0, (1, 1))), 2: ("#0072B2", "-"), 3: ("#009E73", "-"), 4: ("#D55E00", (0, (6, 1.5))),
-    5: ("#56B4E9", (0, (6, 1.5))), 6: ("#E69F00", (0, (4, 1, 1, 1))), 7: ("#882255", (0, (4, 1, 1, 1))),
-}  # fmt: skip
-_OTHER = ("#444444", ":")
-_SECONDARY_STYLE = (SECONDARY, (0, (3, 1)))
-#: Shapes of the way of a branch from one circle to the other in the disentangled picture, sigma -> sigma ** power.
-_POWERS = (1.0, 1.7, 0.6, 3.0, 0.35)
+STABLE, UNSTABLE = "#000000", "#8a8a8a"
+#: A colour for each wavenumber, of Okabe-Ito's and Tol's sets: told apart by the colour-blind.
+_COLOURS = {1: "#CC79A7", 2: "#0072B2", 3: "#009E73", 4: "#D55E00", 5: "#56B4E9", 6: "#E69F00", 7: "#882255"}
+_OTHER = "#444444"
+#: Colour of secondary branches, which have no wavenumber.
+_NO_WAVE = "#000000"
+#: Dashes and legend of pieces in all pictures, by whether they are stable; None: not known.
+LINES = {True: ("-", "stable"), False: ((0, (4, 2)), "unstable"), None: ("-", None)}
+#: Largest step in kappa_n of what is drawn, far less than the diagrams' 22; and into how many parts a step is cut at most.
+_STEP, _MOST_PARTS = 0.05, 200
+#: Marks closer than this to a branch, in (kappa_n, kappa*), are on it: branches are drawn by splines through their points.
+_SAME_PLACE = 1e-3
+#: Widths of branches in a diagram, by the same.
+_WIDTHS = {True: 3.4, False: 1.4, None: 1.4}
+NATURAL, CONJUGATE = r"natural curvature $\kappa_n L/2\pi$", r"conjugate curvature $\bar\kappa^*$"
 
 
 def colour_of(n: int) -> str:
     """The colour of a wavenumber."""
-    return STYLES.get(n, _OTHER)[0]
+    return _COLOURS.get(n, _OTHER)
+
+
+def in_words(number: float | str) -> str:
+    """A number as text in a picture, with a minus sign."""
+    return (number if isinstance(number, str) else exact_text(number)).replace("-", "\u2212")
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A special point of a branch: where it is in (kappa_n, kappa*), its kind, and the covering index if it is a circle."""
+
+    kappa_n: float
+    kappa_star: float
+    kind: str
+    covering: int | None
 
 
 @dataclass(frozen=True)
 class Line:
-    """A branch to draw.
+    """A branch to draw; one between two circles begins at that of the lower covering index.
 
     Attributes
     ----------
@@ -37,20 +59,30 @@ class Line:
         Wavenumber; 0 for a secondary branch.
     kappa_n, kappa_star : ndarray, shape (K,)
         From end to end.
-    stable : ndarray of bool, shape (K,)
-        Where the index is known to be 0.
-    marks : list
-        Its special points (kappa_n, kappa_star, kind).
-    returns : bool
-        Whether both ends are circles.
+    index : ndarray of int, shape (K,)
+        -1 where it is not known.
+    marks : list of Mark
+        Its special points, from end to end.
     """
 
     n: int
     kappa_n: np.ndarray
     kappa_star: np.ndarray
-    stable: np.ndarray
-    marks: list[tuple[float, float, str]]
-    returns: bool
+    index: np.ndarray
+    marks: list[Mark]
+
+    def place(self, mark: Mark) -> int:
+        """The number of the point that is nearest to a mark."""
+        return int(np.argmin((self.kappa_n - mark.kappa_n) ** 2 + (self.kappa_star - mark.kappa_star) ** 2))
+
+    def parts(self):
+        """Where it is stable, unstable and unknown: True, False or None, and the points, which neighbours share an end of."""
+        known = [None if index < 0 else index == 0 for index in self.index.tolist()]
+        first = 0
+        for stable, run in groupby(known):
+            last = first + len(list(run))
+            yield stable, slice(first, last + 1)
+            first = last
 
 
 def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = True):
@@ -63,7 +95,7 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = 
     window : (float, float)
         Of kappa_n.
     disentangle : bool
-        Add the schematic panel.
+        Add the panel where the heights between the circles are free (`branches.disentangle`).
 
     Returns
     -------
@@ -74,16 +106,20 @@ def figure(graph, law: str, nu: float, window=(-8.0, 14.0), disentangle: bool = 
     result = Figure(figsize=(13 if disentangle else 7.5, 7), layout="constrained")
     panels = result.subplots(1, 2 if disentangle else 1, sharex=True, squeeze=False)[0]
     conjugate(panels[0], graph, law, nu, window)
-    panels[0].set(xlabel=r"natural curvature $\kappa_n L/2\pi$", ylabel=r"conjugate curvature $\bar\kappa^*$")
+    panels[0].set_ylabel(CONJUGATE, fontsize=13)
     if disentangle:
-        panels[0].set_title("in conjugate coordinates")
+        panels[0].set_title("in conjugate coordinates", fontsize=13)
         schematic(panels[1], graph, law, nu, window)
-        panels[1].set(
-            xlabel=r"natural curvature $\kappa_n L/2\pi$", ylabel="covering index of the circles (heights between: free)"
-        )
-        panels[1].set_title("disentangled")
-    result.legend(handles=legend(graph, law, nu), loc="outside lower center", ncols=6 if disentangle else 4, frameon=False)
-    result.suptitle(f"Equilibria of a closed strip: {law}, $\\nu$ = {exact_text(nu)}{note(graph)}", fontsize=13)
+        panels[1].set_ylabel("covering index of the circles (heights between: free)", fontsize=13)
+        panels[1].set_title("disentangled", fontsize=13)
+    for axes in panels:
+        axes.set_xlabel(NATURAL, fontsize=13)
+        axes.tick_params(labelsize=12)
+    handles, columns = legend(graph, law, nu), 3
+    if disentangle:
+        columns = 4 if secondaries(graph, law, nu) else 6  # their words are longer
+    result.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=12)
+    result.suptitle(f"Equilibria of a closed strip: {law}, $\\nu$ = {in_words(nu)}{note(graph)}", fontsize=15)
     return result
 
 
@@ -95,33 +131,60 @@ def note(graph) -> str:
 
 def conjugate(axes, graph, law: str, nu: float, window) -> None:
     """Draw the branches in (kappa_n, kappa*)."""
-    found = lines(graph, law, nu)
     circles(axes, graph, law, nu, window)
-    for line in found:
-        _draw(axes, line, line.kappa_star, [height for _, height, _ in line.marks])
+    for line in lines(graph, law, nu):
+        _draw(axes, line, line.kappa_star)
     _frame(axes, graph, law, nu, window)
 
 
 def schematic(axes, graph, law: str, nu: float, window) -> None:
-    """Draw the branches with free heights, chosen so that they cross as little as they can."""
+    """Draw the branches with free heights, chosen so that few cross, and the circles at their covering indices."""
+    circles(axes, graph, law, nu, window, level=True)
     found = lines(graph, law, nu)
-    circles(axes, graph, law, nu, window)
     for line, height in zip(found, heights(found, window)):
-        at = [height[np.argmin((line.kappa_n - x) ** 2 + (line.kappa_star - y) ** 2)] for x, y, _ in line.marks]
-        _draw(axes, line, height, at)
+        _draw(axes, line, height)
     _frame(axes, graph, law, nu, window)
     axes.set_yticks(_coverings(graph, law, nu))
 
 
-def _draw(axes, line, height, at):
-    colour, dashes = STYLES.get(line.n, _OTHER) if line.n else _SECONDARY_STYLE
-    axes.plot(line.kappa_n, height, color=colour, linestyle=dashes, lw=1.3, zorder=2)
-    if line.stable.any():
-        axes.plot(line.kappa_n, np.where(line.stable, height, np.nan), color=colour, lw=4, zorder=2, solid_capstyle="butt")
-    for (x, _, kind), y in zip(line.marks, at):
-        if kind in MARKS:
-            marker, colour, size = MARKS[kind]
-            axes.scatter(x, y, marker=marker, color=colour, s=size, zorder=3, linewidths=0)
+def heights(found: list[Line], window) -> list[np.ndarray]:
+    """Heights of all lines in the disentangled picture, of shape (K,) each.
+
+    A secondary branch goes straight from the height of the point where it leaves to that of the one where it arrives.
+    """
+    primary = [line for line in found if line.n]
+    ends = []
+    for line in primary:
+        rises = 1 if line.kappa_star[-1] >= line.kappa_star[0] else -1
+        ends.append((line.marks[0].covering, line.marks[-1].covering, rises))
+    result = layered.heights([line.kappa_n for line in primary], ends, window)
+    for line in found[len(primary) :]:
+        a, b = (_height_at(mark, zip(primary, result)) for mark in (line.marks[0], line.marks[-1]))
+        climbed = line.kappa_star - line.kappa_star[0]
+        if b is not None:
+            climbed = climbed + (b - a - climbed[-1]) * np.linspace(0, 1, len(climbed))
+        result.append(a + climbed)
+    return result
+
+
+def _height_at(mark: Mark, placed) -> float | None:
+    """The height of a mark on one of the lines that have theirs; that of a mark that no line has is kappa*, or free."""
+    for line, height in placed:
+        number = line.place(mark)
+        if np.hypot(line.kappa_n[number] - mark.kappa_n, line.kappa_star[number] - mark.kappa_star) < _SAME_PLACE:
+            return float(height[number])
+    return None if mark.kind == "leaves" else mark.kappa_star
+
+
+def _draw(axes, line: Line, height) -> None:
+    colour = colour_of(line.n) if line.n else _NO_WAVE
+    for stable, part in line.parts():
+        style = {"ls": LINES[stable][0], "lw": _WIDTHS[stable], "solid_capstyle": "butt"}
+        axes.plot(line.kappa_n[part], height[part], color=colour, zorder=2, **style)
+    for mark in line.marks:
+        if mark.kind in MARKS:
+            marker, colour, size = MARKS[mark.kind]
+            axes.scatter(mark.kappa_n, height[line.place(mark)], marker=marker, color=colour, s=size, zorder=3, linewidths=0)
 
 
 def _frame(axes, graph, law, nu, window):
@@ -136,18 +199,19 @@ def _coverings(graph, law, nu):
     return sorted({data["covering"] for data in nodes if data["kind"] == "circle"})
 
 
-def circles(axes, graph, law: str, nu: float, window) -> None:
-    """The planar circles: thick where the published linear theory has them stable, thin elsewhere."""
+def circles(axes, graph, law: str, nu: float, window, level: bool = False) -> None:
+    """The planar circles, solid where the published linear theory has them stable, dashed elsewhere; all level if asked for."""
     from ribbon_model.laws import from_label
     from ribbon_model.linear import circle, stability_interval
 
     material, Gamma = from_label(law)
 
     def plot(m, ends, **style):
-        axes.plot(ends, [circle(material, m, kappa_n, nu, Gamma)["kappa_star"] for kappa_n in ends], zorder=1, **style)
+        height = [m if level else circle(material, m, kappa_n, nu, Gamma)["kappa_star"] for kappa_n in ends]
+        axes.plot(ends, height, zorder=1, **style)
 
     for m in _coverings(graph, law, nu):
-        plot(m, window, color=UNSTABLE, lw=0.8)
+        plot(m, window, color=UNSTABLE, lw=0.9, ls=LINES[False][0])
         if m < 1:  # curled against its natural curvature: the published intervals do not speak of these
             continue
         low, high = stability_interval(material, m, nu, Gamma)
@@ -156,27 +220,29 @@ def circles(axes, graph, law: str, nu: float, window) -> None:
 
 
 def legend(graph, law: str, nu: float) -> list:
-    """Handles for the wavenumbers and the marks that the diagram has."""
+    """Handles for the wavenumbers, the stability and the marks that the diagram has."""
     from matplotlib.lines import Line2D
 
     waves = sorted({family[3] for family in families(graph) if family[:2] == (law, nu)})
-    styles = [(n, *STYLES.get(n, _OTHER)) for n in waves]
-    handles = [Line2D([], [], color=colour, ls=dashes, label=f"n = {n}") for n, colour, dashes in styles]
+    handles = [Line2D([], [], color=colour_of(n), lw=2, label=f"n = {n}") for n in waves]
     handles += [
-        Line2D([], [], color=STABLE, lw=2.5, label="circle, stable"),
-        Line2D([], [], color=UNSTABLE, lw=1, label="circle, unstable"),
-        Line2D([], [], marker="o", color=END, ls="", ms=5, label="bifurcation of a circle"),
+        Line2D([], [], color=STABLE, lw=2.6, label="circle, stable"),
+        Line2D([], [], color=UNSTABLE, lw=0.9, ls=LINES[False][0], label="circle, unstable"),
     ]
-    if secondaries(graph, law, nu):
-        colour, dashes = _SECONDARY_STYLE
-        handles.append(Line2D([], [], color=colour, ls=dashes, label="secondary branch"))
-    kinds = {data["kind"] for _, data in graph.nodes(data=True) if (data["law"], data["nu"]) == (law, nu)}
-    if any(data.get("index") == 0 for _, _, data in graph.edges(data=True) if (data["law"], data["nu"]) == (law, nu)):
-        handles.append(Line2D([], [], color="#666666", lw=4, label="buckled, stable (index 0)"))
-    if "fold" in kinds:
-        handles.append(Line2D([], [], marker="*", color=FOLD, ls="", ms=11, label="fold"))
-    if "secondary bifurcation" in kinds:
-        handles.append(Line2D([], [], marker="D", color=SECONDARY, ls="", ms=6, label="secondary bifurcation"))
+    found = lines(graph, law, nu)
+    known = {stable for line in found for stable, _ in line.parts()}
+    words = {True: "branch, stable", False: "branch, unstable", None: "branch, stability not computed"}
+    handles += [
+        Line2D([], [], color=_OTHER, ls=LINES[stable][0], lw=_WIDTHS[stable], label=text)
+        for stable, text in words.items()
+        if stable in known
+    ]
+    if any(not line.n for line in found):
+        handles.append(Line2D([], [], color=_NO_WAVE, lw=2, label="secondary branch"))
+    kinds = {mark.kind for line in found for mark in line.marks}
+    marks = (("circle", "o", END, 5, "bifurcation of a circle"), ("fold", "*", FOLD, 11, "fold"),
+             ("secondary bifurcation", "D", SECONDARY, 6, "secondary bifurcation"))  # fmt: skip
+    handles += [Line2D([], [], marker=m, color=c, ls="", ms=size, label=text) for k, m, c, size, text in marks if k in kinds]
     return handles
 
 
@@ -184,20 +250,37 @@ def legend(graph, law: str, nu: float) -> list:
 
 
 def lines(graph, law: str, nu: float) -> list[Line]:
-    """The branches of one law and nu, smooth from end to end: the primary ones, then the secondary ones."""
-    branches = [(family[3], pieces(graph, family)) for family in families(graph) if family[:2] == (law, nu)]
-    branches += [(0, branch["edges"]) for branch in secondaries(graph, law, nu)]
-    result = []
-    for n, edges in branches:
-        curves = [smooth(d["arclength"], d["kappa_n"], d["kappa_star"]) for _, _, d in edges]
-        names = dict.fromkeys(node for a, b, _ in edges for node in (a, b))
-        nodes = [graph.nodes[name] for name in names]
-        marks = [(node["kappa_n"], node["kappa_star"], node["kind"]) for node in nodes]
-        kappa_n, kappa_star = (np.concatenate([curve[i] for curve in curves]) for i in (0, 1))
-        stable = np.concatenate([np.full(len(c[0]), d.get("index") == 0) for c, (_, _, d) in zip(curves, edges)])
-        returns = sum(node["kind"] == "circle" for node in nodes) > 1
-        result.append(Line(n, kappa_n, kappa_star, stable, marks, returns))
-    return result
+    """The branches of one law and nu, smooth from end to end: the primary ones by wavenumber, then the secondary ones."""
+    primary = [_line(graph, family[3], pieces(graph, family)) for family in families(graph) if family[:2] == (law, nu)]
+    secondary = [_line(graph, 0, branch["edges"]) for branch in secondaries(graph, law, nu)]
+    return sorted(primary, key=lambda line: (line.n, line.marks[0].covering, line.marks[0].kappa_n)) + secondary
+
+
+def _line(graph, n: int, edges) -> Line:
+    """The branch that these edges make up, end to end."""
+    s, *columns = (np.concatenate([data[name] for _, _, data in edges]) for name in ("arclength", "kappa_n", "kappa_star"))
+    s, kappa_n, kappa_star = smooth(s, s, *columns)
+    piece = np.searchsorted([data["arclength"][-1] for _, _, data in edges[:-1]], s)
+    index = np.array([data.get("index", -1) for _, _, data in edges])[piece]
+    kappa_n, kappa_star, index = _refined(kappa_n, kappa_star, index)
+    nodes = (graph.nodes[name] for name in dict.fromkeys(node for a, b, _ in edges for node in (a, b)))
+    marks = [Mark(node["kappa_n"], node["kappa_star"], node["kind"], node.get("covering")) for node in nodes]
+    line = Line(n, kappa_n, kappa_star, index, marks)
+    line.marks.sort(key=line.place)
+    first, last = line.marks[0].covering, line.marks[-1].covering
+    if first is None or (last is not None and last < first):
+        return Line(n, kappa_n[::-1], kappa_star[::-1], index[::-1], marks[::-1])
+    return line
+
+
+def _refined(kappa_n, kappa_star, index) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same polyline with more points: steps in kappa_n are at most `_STEP`, so that heights can change between them."""
+    parts = np.clip(np.ceil(np.abs(np.diff(kappa_n)) / _STEP), 1, _MOST_PARTS).astype(int)
+    number = np.arange(len(kappa_n))
+    within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    fine = np.append(np.repeat(number[:-1], parts) + within / np.repeat(parts, parts), number[-1])
+    fine = np.repeat(fine, 2) if len(fine) == 1 else fine  # a branch that ends where it begins
+    return np.interp(fine, number, kappa_n), np.interp(fine, number, kappa_star), index[np.ceil(fine).astype(int)]
 
 
 def smooth(s, *columns) -> list[np.ndarray]:
@@ -210,75 +293,3 @@ def smooth(s, *columns) -> list[np.ndarray]:
         return list(columns)
     fine = np.interp(np.arange(0, len(s) - 0.9, 0.1), np.arange(len(s)), s)
     return list(CubicSpline(s, columns, axis=1)(fine))
-
-
-# --- disentangling ------------------------------------------------------------------------------------------------
-
-
-def heights(found: list[Line], window) -> list[np.ndarray]:
-    """Heights (K,) for each line: from its first circle to its last, monotone, with few crossings; kappa_n is untouched.
-
-    Each line takes one of a few shapes, at first kappa* itself; lines change theirs in turn as long as the number of crossings
-    in the window falls.
-    """
-    shapes = [_shapes(line, window) for line in found]
-    polylines = [_thin(line, options, window) for line, options in zip(found, shapes)]
-    cost = {}
-    for i, ours in enumerate(polylines):
-        for j, theirs in enumerate(polylines[:i]):
-            cost[i, j] = crossings(ours, theirs)
-            cost[j, i] = cost[i, j].T
-    chosen = [0] * len(found)
-    for _ in range(20):
-        before = list(chosen)
-        for i in range(len(found)):
-            total = [sum(cost[i, j][a, chosen[j]] for j in range(len(found)) if j != i) for a in range(len(shapes[i]))]
-            chosen[i] = int(np.argmin(total))
-        if chosen == before:
-            break
-    return [options[i] for options, i in zip(shapes, chosen)]
-
-
-def _shapes(line, window):
-    start, end = line.kappa_star[0], line.kappa_star[-1]
-    result = [line.kappa_star]
-    for weight in (1.0, 0.2):  # of what is seen, against what is not: a line may climb out of sight
-        sigma = _way(line, window, weight)
-        if line.returns:
-            result += [start + (end - start) * sigma**power for power in _POWERS]
-        else:
-            result += [start + (np.sign(end - start) or 1.0) * goal * sigma for goal in (0.5, 0.8, 0.25)]
-    return result
-
-
-def _way(line, window, weight):
-    """The part of the way that lies behind, 0 ... 1, at the points of a line."""
-    margin = 0.02 * (window[1] - window[0])
-    low, high = window[0] - margin, window[1] + margin
-    seen = np.hypot(np.diff(np.clip(line.kappa_n, low, high)) / (high - low), np.diff(line.kappa_star) / 8)
-    outside = (line.kappa_n < low) | (line.kappa_n > high)
-    way = np.append(0, np.cumsum(seen * np.where(outside[:-1] & outside[1:], 1.0, weight)))
-    return way / way[-1]
-
-
-def _thin(line, options, window):
-    """The shapes (A, K) of a line at few points, those inside the window (where crossings matter): (A, K, 2)."""
-    inside = (line.kappa_n > window[0]) & (line.kappa_n < window[1])
-    kept = np.flatnonzero(inside | np.roll(inside, 1) | np.roll(inside, -1))
-    kept = kept[np.unique(np.linspace(0, len(kept) - 1, 40).astype(int))] if len(kept) else kept
-    x = np.clip(line.kappa_n[kept], window[0] - 1, window[1] + 1)
-    return np.array([np.column_stack([x, shape[kept]]) for shape in options])
-
-
-def crossings(first, second):
-    """How often each of the polylines first (A, K, 2) crosses each of the polylines second (B, J, 2): (A, B)."""
-    p, r = first[:, None, :-1, None], np.diff(first, axis=1)[:, None, :, None]
-    q, s = second[None, :, None, :-1], np.diff(second, axis=1)[None, :, None, :]
-
-    def cross(u, v):
-        return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gap, across = q - p, cross(r, s)
-        t, u = cross(gap, s) / across, cross(gap, r) / across
-    return np.sum((t > 0) & (t < 1) & (u > 0) & (u < 1), axis=(2, 3))

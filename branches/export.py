@@ -23,11 +23,6 @@ if TYPE_CHECKING:  # nothing heavy is imported here: `--help` and invalid comman
 EXIT_BAD_INPUT = 2
 #: Allowed endings of --out and --movie.
 SURFACES, MOVIES = (".stl", ".obj", ".glb", ".gltf", ".vtk", ".vtu"), (".gif", ".mp4")
-#: Default width, in units of L: that of the pictures, 0.3 L/2 pi.
-_WIDTH = 0.3 / (2 * math.pi)
-#: Largest default width, relative to the largest possible width: where generators nearly cross, cells
-#: degenerate. At .99 the narrowest cells of the branch (1, 2) are a hundredth of the others.
-_ROOM = 0.8
 #: Least and largest number of frames: fewer than 2 show no motion; more than 2000 take minutes and hundreds of megabytes.
 _FRAMES = (2, 2000)
 
@@ -53,7 +48,7 @@ def arguments(argv=None):
     parser.add_argument("--width", type=float, metavar="X", help="width, in the unit of --length (without it: relative to L)")
     parser.add_argument("--thickness", type=float, metavar="X", help="thickness, in the unit of --length; makes a closed solid")
     parser.add_argument(
-        "--frames", type=int, default=60, metavar="N", help="largest number of frames of the film (default: 60)"
+        "--frames", type=int, default=60, metavar="N", help="largest number of frames from end to end (default: 60)"
     )
     return parser.parse_args(argv)
 
@@ -161,16 +156,11 @@ def labelled_point(branch: StoredBranch, text: str) -> int:
 
 def placed(branch: StoredBranch, point: int, length: float) -> tuple[Shape, ndarray]:
     """Return the closed strip of a point, scaled and upright, and its strains (K, 3) in radians per unit of that length."""
-    from dataclasses import replace
-
-    import numpy as np
-
+    from branches.draw_strip import flat_across
     from ribbon_model.domains import LOOP
 
     solution = branch.solution(point).on(LOOP)
-    shape = solution.shape().placed(length)
-    if not solution.law.has_rulings:  # its cross sections stay straight along d1
-        shape = replace(shape, eta=np.zeros_like(shape.eta))
+    shape = flat_across(solution.shape(), solution.law).placed(length)
     return shape, solution.strains() * (2 * math.pi / length)
 
 
@@ -205,10 +195,11 @@ def _table(shape: Shape, strains) -> bytes:
 def _mesh(branch: StoredBranch, shape: Shape, options):
     from branches import solid
     from branches.config import ConfigError
+    from branches.draw_strip import ROOM, WIDTH
 
     width, most = _width(branch, options), solid.widest(shape)
     if width is None:
-        width = min(_WIDTH * options.length, _ROOM * most)
+        width = min(WIDTH / (2 * math.pi) * options.length, ROOM * most)
         write_output(f"width {width:.6g}: the default; change it with --width\n")
     if width >= most:
         raise ConfigError(f"--width {width:g}: must be below {most:.6g}, where generators of the surface begin to cross")

@@ -164,8 +164,17 @@ def check_picture(path: Path) -> None:
     prepare(path)
 
 
+#: How pictures are written. PDF: whole fonts (Type 42), which other programs can edit; SVG: letters as outlines, which look the
+#: same without the font, and the same names in the file for the same picture. Minus signs are minus signs, not hyphens.
+_STYLE = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "branches", "axes.unicode_minus": True}
+
+
 def write_picture(figure, path: Path) -> None:
-    """Write a matplotlib figure; raise StoreError if it cannot be written."""
-    picture = io.BytesIO()
-    figure.savefig(picture, format=path.suffix[1:].lower(), dpi=160)
+    """Write a matplotlib figure, the same bytes for the same figure; raise StoreError if it cannot be written."""
+    from matplotlib import rc_context
+
+    picture, suffix = io.BytesIO(), path.suffix[1:].lower()
+    metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(suffix)
+    with rc_context(_STYLE):
+        figure.savefig(picture, format=suffix, dpi=160, metadata=metadata)
     write_bytes(path, picture.getvalue())

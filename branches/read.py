@@ -83,7 +83,7 @@ class StoredBranch:
         about = {"config": dump(Config.model_validate(self.config)), "status": self.status, "stop": self.stop}
         return xarray.Dataset(variables, {"point": self.points["point"]}, about)
 
-    def plot(self, shapes: int = 6, width: float = 0.3):
+    def plot(self, shapes: int = 6, width: float | None = None):
         """Return the branch as a matplotlib figure; see `branches.draw_branch.figure`."""
         from branches.draw_branch import figure
 

@@ -37,9 +37,16 @@ class Mesh:
 
 
 def widest(shape: Shape) -> float:
-    """Return the width at which neighbouring generators of the surface begin to cross, 2/max|eta'|; inf if they never do."""
-    slope = np.abs(np.diff(shape.eta) / np.diff(shape.arclength)).max()
-    return float(2 / slope) if slope > 0 else np.inf
+    """Return the width at which neighbouring generators of the surface begin to cross; inf if they never do.
+
+    At a distance v along d1 from the centreline, the surface is 1 + v (eta' - omega_2 (1 + eta^2)) times as long as there; it
+    vanishes first at half the width. omega_2 is zero for strips that do not bend in their own plane.
+    """
+    step, d1, d3 = np.diff(shape.arclength), shape.directors[:, 0], shape.directors[:, 2]
+    sideways = np.vecdot(np.diff(d1, axis=0), (d3[1:] + d3[:-1]) / 2) / step  # -omega_2
+    eta = (shape.eta[1:] + shape.eta[:-1]) / 2
+    slope = np.abs(np.diff(shape.eta) / step + sideways * (1 + eta**2)).max()
+    return float(2 / slope) if slope > 1e-12 else np.inf
 
 
 def thickest(shape: Shape, width: float) -> float:

@@ -15,7 +15,11 @@ def main(argv=None) -> int:
     parser.add_argument("file", help="an HDF5 file written by branches.run")
     parser.add_argument("--out", help="picture to write, .pdf, .svg or .png (default: beside the file, .pdf)")
     parser.add_argument("--shapes", type=int, default=6, help="number of strips drawn (default 6)")
-    parser.add_argument("--width", type=float, default=0.3, help="width of the drawn strip, in units of L / 2 pi")
+    parser.add_argument(
+        "--width", type=float,
+        help="width of the drawn strip, in units of L / 2 pi (default: that of the scene's strip if it has one, or 0.3); "
+        "narrower where its generators would cross",
+    )  # fmt: skip
     options = parser.parse_args(argv)
     from branches.draw_branch import figure
     from branches.files import StoreError, check_picture, write_picture
@@ -37,7 +41,7 @@ def check(options) -> None:
     """Raise ValueError on an option that makes no picture."""
     if not 0 <= options.shapes <= 12:
         raise ValueError(f"--shapes {options.shapes}: must lie between 0 and 12")
-    if not 0 < options.width <= 2:
+    if options.width is not None and not 0 < options.width <= 2:
         raise ValueError(f"--width {options.width:g}: must lie between 0 and 2")
 
 

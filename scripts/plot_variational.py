@@ -47,7 +47,7 @@ def elastica(axes: Any) -> None:
         integrals={"offset": lambda t, x, w, p: math.sin(x.angle)},
         functionals={"chord": lambda t, x, w, p: math.cos(x.angle)},
     )
-    settings = contin.Settings(limits={"load": (20, 170), "chord": (0.0, 1.5)}, max_step=0.3, errors=False)
+    settings = contin.Settings(limits={"load": (20, 170), "chord": (0.0, 1.5)}, max_step=0.1, errors=False)
     straight = contin.trace(contin.solve(strip, [0.0], {"load": 20.0}), settings, free=["load"])
     draw(axes, straight, "chord", "load", math.pi**2)
     for point in straight.labelled("BP"):
@@ -63,7 +63,7 @@ def catenoid(axes: Any) -> None:
         parameters={"gap": 0.4},
         ends=lambda a, b, p: (a.r - 1, b.r - 1),
     )
-    settings = contin.Settings(limits={"gap": (0.4, 1.5)}, max_step=0.1, errors=False)
+    settings = contin.Settings(limits={"gap": (0.4, 1.5)}, max_step=0.05, errors=False)
     draw(axes, contin.trace(contin.solve(film, [1.0]), settings, free=["gap"]), "gap", "energy")
     axes.set(xlabel="gap of the rings / radius", ylabel="area / 2π", title="Soap film between two rings")
 
@@ -75,6 +75,7 @@ def main() -> None:
     catenoid(right)
     for index, name in ((0, "index 0: stable"), (1, "index 1"), (2, "index 2"), (3, "index 3 or more")):
         left.plot([], [], ls="-" if index == 0 else (0, (3, 2)), color=COLOURS[index], lw=1.8, label=name)
+    left.plot([], [], "o", ms=5, color="black", label="fold or branch point")
     left.legend(frameon=False, fontsize=8, loc="upper right")
     for axes in (left, right):
         axes.spines[["top", "right"]].set_visible(False)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.paper.draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, pyplot, save
+from branches.draw_diagram import in_words
+from branches.paper.draw import MODES, RIGID, STABLE, UNSTABLE, UNSTABLE_FILL, keep
 from branches.paper.page import Row, Section
 from ribbon_model.dispersion import coefficients, squared_frequencies
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
@@ -66,8 +67,9 @@ def fig10(folder: Path) -> Section:
 
 
 def _draw_fig9(folder: Path) -> str:
-    plt = pyplot()
-    figure = plt.figure(figsize=(12, 6), layout="constrained")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12, 6), layout="constrained")
     grid = figure.add_gridspec(2, 4, width_ratios=(1, 1, 1, 3), height_ratios=(1, 0.09))
     first = None
     for column, ratio in enumerate((0.0, 1.0, 2.0)):
@@ -88,7 +90,7 @@ def _draw_fig9(folder: Path) -> str:
     _bars(below, [(RIBBON, 3)], (-3, 4))
     below.set(xlabel=f"natural over actual curvature {LOAD}", yticks=[], ylabel="(b')")
     _legend9(figure)
-    return save(figure, folder, "fig9")
+    return keep(figure, folder, "fig9")
 
 
 def _frequencies(axes, ratio):
@@ -184,9 +186,11 @@ def _bars(axes, cases, window, energy=False):
 
 
 def _draw_fig10(folder: Path) -> str:
-    plt = pyplot()
+    from matplotlib.figure import Figure
+
     window, top = (-4.0, 7.0), 2.3
-    figure, panels = plt.subplots(2, 3, figsize=(14, 8), layout="constrained", sharex=True, height_ratios=(1.6, 1))
+    figure = Figure(figsize=(14, 8), layout="constrained")
+    panels = figure.subplots(2, 3, sharex=True, height_ratios=(1.6, 1))
     for column, (law, letter) in enumerate(((RIBBON, "a"), (FLAT_ROD, "b"), (ISOTROPIC_ROD, "c"))):
         region, bars = panels[0, column], panels[1, column]
         _region(region, law, window, top)
@@ -200,15 +204,16 @@ def _draw_fig10(folder: Path) -> str:
         for row, m in enumerate(COVERINGS):
             _write_ends(bars, row, stability_interval(law, m, NU), window)
     _legend10(figure)
-    return save(figure, folder, "fig10")
+    return keep(figure, folder, "fig10")
 
 
 def _write_ends(axes, row, interval, window):
     """The ends of a bar in numbers, just outside it."""
     for end, side in zip(interval, (-1, 1)):
         if window[0] < end < window[1]:
-            axes.text(end + 0.12 * side, row, f"{end:.2f}", ha="right" if side < 0 else "left", va="center", fontsize=9,
-                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
+            style = {"ha": "right" if side < 0 else "left", "va": "center", "fontsize": 9}
+            box = {"facecolor": "white", "edgecolor": "none", "pad": 1}
+            axes.text(end + 0.12 * side, row, in_words(f"{end:.2f}"), bbox=box, **style)
 
 
 def _legend10(figure):

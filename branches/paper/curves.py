@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from branches.paper.draw import STABLE, UNSTABLE, keep
+from branches.draw_diagram import colour_of
+from branches.paper.draw import STABLE, keep
 from branches.paper.page import Row, Section
 from branches.stability import LABEL, Watch
 from contin import Settings, curve, follow, locate_branch_point
@@ -109,9 +110,10 @@ def _draw(lines, secondary, last, folder: Path) -> str:
 
     figure = Figure(figsize=(11, 4.5), layout="constrained")
     panels = figure.subplots(1, 2)
-    for ((m, n), line), colour, dashes in zip(lines.items(), (STABLE, UNSTABLE), ("-", "--")):
+    for (m, n), line in lines.items():
+        colour = colour_of(n)
         fine = np.linspace(line[0, 0], line[-1, 0], 300)
-        panels[0].plot(fine, CubicSpline(*line.T)(fine), color=colour, ls=dashes, label=f"fold of ({m}, {n})")
+        panels[0].plot(fine, CubicSpline(*line.T)(fine), color=colour, label=f"fold of ({m}, {n})")
         panels[0].plot(
             fine, [exact.bifurcation(m, n, nu) for nu in fine], color=colour, ls=":", lw=1, label=f"threshold of ({m}, {n})"
         )

@@ -13,7 +13,7 @@ from branches import diagram_graph as diagram
 from branches.config import parse
 from branches.diagram import run_diagram
 from branches.display import Display
-from branches.draw_diagram import STYLES, conjugate, legend
+from branches.draw_diagram import CONJUGATE, NATURAL, colour_of, conjugate, legend
 from branches.paper.draw import keep
 from branches.paper.page import Row, Section
 from contin import Settings, curve, follow
@@ -111,15 +111,17 @@ def _draw_curves(fold, birth, folder: Path) -> str:
     axes = figure.subplots()
     Gammas = np.geomspace(0.05, 1000, 400)
     for m, n in MODES:
-        colour, _ = STYLES[n]
-        style = {1: "-", 3: "--", 5: ":"}[m]
-        axes.plot(Gammas, [threshold(m, n, Gamma) for Gamma in Gammas], style, color=colour, label=f"threshold of ({m}, {n})")
+        colour, values = colour_of(n), np.array([threshold(m, n, Gamma) for Gamma in Gammas])
+        axes.plot(Gammas, values, color=colour)
+        first = int(np.argmax(values < _TOP - 1))
+        axes.annotate(f"({m}, {n})", (Gammas[first], values[first]), (8, 5), textcoords="offset points", color=colour)
         for law, at, marker in ((FLAT_ROD, 0.05, "<"), (RIBBON, 1000, ">")):
             limit = thresholds(law, m, n, NU)[0]
             if limit < _TOP:
                 axes.plot(at, limit, marker, color=colour, clip_on=False, ms=6)
     axes.plot(*_fine(fold).T, color="k", lw=2, label="fold of (1, 2)")
     axes.plot(*birth, "o", color="k", label=f"its birth, Γ = {birth[0]:.3f}")
+    axes.plot([], [], color="0.4", label="threshold of (m, n)")
     axes.plot([], [], "<", color="0.4", label="flat rod")
     axes.plot([], [], ">", color="0.4", label="ribbon")
     axes.set(xscale="log", xlim=(0.05, 1000), ylim=(-1, _TOP), xlabel=r"$\Gamma = w^2/(h L/2\pi)$", ylabel=r"$\kappa_n L/2\pi$")
@@ -139,13 +141,13 @@ def _fine(points: np.ndarray) -> np.ndarray:
 def _draw_diagrams(graph, folder: Path) -> str:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(18, 6.5), layout="constrained")
+    figure = Figure(figsize=(15, 6), layout="constrained")
     panels = figure.subplots(1, len(GAMMAS) + 1, sharex=True, sharey=True)
     for axes, Gamma in zip(panels, (*GAMMAS, None)):
         name = label("ribbon") if Gamma is None else label("finite width", Gamma)
         conjugate(axes, graph, name, NU, WINDOW)
-        axes.set(title="ribbon, Γ = ∞" if Gamma is None else f"Γ = {Gamma:g}", xlabel=r"natural curvature $\kappa_n L/2\pi$")
+        axes.set(title="ribbon, Γ = ∞" if Gamma is None else f"Γ = {Gamma:g}", xlabel=NATURAL)
         axes.label_outer()
-    panels[0].set_ylabel(r"conjugate curvature $\bar\kappa^*$")
+    panels[0].set_ylabel(CONJUGATE)
     figure.legend(handles=legend(graph, "ribbon", NU), loc="outside lower center", ncols=8, frameon=False)
     return keep(figure, folder, "finite_width_fig12a")

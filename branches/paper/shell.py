@@ -149,7 +149,8 @@ def _draw(outcomes: list[Outcome], folder: Path) -> str:
 def _draw_laws(axes):
     """First roots by the law of finite width, each curve to its ribbon; dotted where t vanishes for the ribbon."""
     for nu in NUS:
-        numbers = np.geomspace(_narrowest_unstable(nu), 1000, 30)
+        least = _narrowest_unstable(nu)
+        numbers = least * (1000 / least) ** (np.linspace(0, 1, 80) ** 3)  # the curve is steep where it begins
         axes.plot(
             numbers, [law_root(nu, number) for number in numbers], color=COLOURS[nu], lw=1.8, label=f"finite width, ν = {nu:g}"
         )
@@ -212,13 +213,15 @@ def _draw_paper(axes, direct):
         xi, value = np.array(outcome.samples).T
         style = {5.0: "-", 20.0: "--", 50.0: ":"}.get(thinness, "-.")
         axes.plot(xi, value, style, marker=".", color=COLOURS.get(nu, "k"), label=f"w/h = {thinness:g}, ν = {nu:g}")
-    axes.axhline(0, color="0.2", lw=0.9)
     axes.set(
         xlabel=r"$\xi$", ylabel=r"$\omega^2$ in $D/(\rho h R^4)$", title="the paper's strips: lowest out-of-plane vibration"
     )
     if longest:
-        axes.set_yscale("symlog", linthresh=10)
-        axes.set_ylim(bottom=min(-20, *axes.get_ylim()))
+        if min(value for outcome in longest.values() for _, value in outcome.samples) > 0:
+            axes.set_yscale("log")  # all are stable: nothing is below
+        else:
+            axes.set_yscale("symlog", linthresh=10)
+            axes.axhline(0, color="0.2", lw=0.9)
         axes.legend(frameon=False, fontsize=9, ncols=2)
     else:
         axes.text(0.5, 0.5, "not computed: no CalculiX", transform=axes.transAxes, ha="center")

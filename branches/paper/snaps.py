@@ -165,19 +165,20 @@ def _draw(films, folder: Path, frames: int = 6) -> str:
     """The strips on their way, at equal distances in the strains; the experiments' single loop first."""
     from matplotlib.figure import Figure
 
-    from branches.draw_branch import draw_strip
+    from branches.draw_diagram import in_words
+    from branches.draw_strip import draw_strip, reach_of, width_of
 
     films = sorted(films, key=lambda film: film[0].m)
     figure = Figure(figsize=(2 * frames, 2.3 * len(films)), layout="constrained")
     for line, (start, descent) in zip(figure.subfigures(len(films), 1, squeeze=False)[:, 0], films):
-        line.suptitle(f"{start.what}, let go at $\\kappa_n L/2\\pi$ = {start.kappa_n:.3f}", fontsize=11)
+        line.suptitle(f"{start.what}, let go at $\\kappa_n L/2\\pi$ = {in_words(f'{start.kappa_n:.3f}')}", fontsize=12)
         shown = _frames(descent, frames)
-        shapes = [strip.shape(241) for strip in shown]
-        reach = 0.85 * max(np.abs(shape.centreline - shape.centreline.mean(axis=0)).max() for shape in shapes)
-        for axes, strip, shape in zip(line.subplots(1, frames, subplot_kw={"projection": "3d"}), shown, shapes):
-            draw_strip(axes, shape, 0.25 * reach)
-            axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
-            axes.set_title(f"energy {strip.energy:.3f}", fontsize=9, y=0.95)
+        shapes = [strip.shape(241).placed(2 * math.pi) for strip in shown]
+        width = width_of({}, shapes, 0.25 / start.m)  # a circle of m turns has the radius 1/m
+        reach = reach_of(shapes, width)
+        for axes, strip, shape in zip(line.subplots(1, frames), shown, shapes):
+            draw_strip(axes, shape, width, reach)
+            axes.set_title(in_words(f"energy {strip.energy:.3f}"), fontsize=10, y=0.95)
     return keep(figure, folder, "snaps")
 
 

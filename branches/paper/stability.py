@@ -14,7 +14,7 @@ from branches.diagram import run_diagram
 from branches.display import Display
 from branches.job import whole_branch
 from branches.paper.diagram import FIG12, LAWS, NU, WINDOW
-from branches.paper.draw import STABLE, UNSTABLE, keep
+from branches.paper.draw import BUCKLED, STABLE, keep
 from branches.paper.page import Row, Section
 from branches.read import read_branch
 from ribbon_model.laws import LAWS as LAW_OBJECTS
@@ -142,13 +142,13 @@ def _draw(found, folder: Path) -> str:
             axes.barh(row, high - low, left=low, height=0.36, color=STABLE, lw=0)
         for (m, n), low, high in ((branch, *piece) for branch, pieces in found[law].items() for piece in pieces):
             row = COVERINGS.index(m)
-            axes.barh(row + 0.34, high - low, left=low, height=0.24, facecolor=UNSTABLE, hatch="////", edgecolor="white", lw=0)
+            axes.barh(row + 0.34, high - low, left=low, height=0.24, facecolor=BUCKLED, hatch="////", edgecolor="white", lw=0)
             axes.annotate(f"({m}, {n})", (high, row + 0.34), xytext=(4, 0), textcoords="offset points", va="center", fontsize=9)
         axes.set(yticks=range(len(COVERINGS)), yticklabels=COVERINGS, ylim=(-0.5, len(COVERINGS) - 0.2), xlim=WINDOW)
         axes.set(ylabel="covering index", title=law)
         axes.grid(alpha=0.2, axis="x")
     panels[-1].set_xlabel(r"natural curvature $\kappa_n L/2\pi$")
-    handles = [Patch(facecolor=STABLE, label="stable circle"), Patch(facecolor=UNSTABLE, hatch="////", edgecolor="white",
+    handles = [Patch(facecolor=STABLE, label="stable circle"), Patch(facecolor=BUCKLED, hatch="////", edgecolor="white",
                label="stable buckled state of the branch (m, n)")]  # fmt: skip
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     return keep(figure, folder, "fig12b")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.paper.draw import STABLE, UNSTABLE_FILL, pyplot, save
+from branches.paper.draw import STABLE, UNSTABLE_FILL, keep
 from branches.paper.page import Row, Section
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, RIBBON
 from ribbon_model.unfolding import HINGED, factors, first_root
@@ -54,8 +54,10 @@ def sign(law, nu, xi):
 
 
 def _draw(folder: Path) -> str:
-    plt = pyplot()
-    figure, panels = plt.subplots(1, 4, figsize=(14, 5), layout="constrained")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 5), layout="constrained")
+    panels = figure.subplots(1, 4)
     for axes, law, letter in ((panels[0], RIBBON, "a"), (panels[2], FLAT_ROD, "b"), (panels[3], ISOTROPIC_ROD, "c")):
         nu, xi = np.meshgrid(np.linspace(0.001, 0.5, 300), np.linspace(0.0025, TOP, 1000))
         _shade(axes, nu, xi, sign(law, nu, xi))
@@ -70,7 +72,7 @@ def _draw(folder: Path) -> str:
     for axes in panels:
         axes.set(xlim=(0, 0.5), xlabel=r"Poisson's ratio $\nu$")
     _legend(figure)
-    return save(figure, folder, "fig6")
+    return keep(figure, folder, "fig6")
 
 
 def _shade(axes, x, y, values):

@@ -1,6 +1,5 @@
 """Scenes of many branches: the graph, the questions, the executor."""
 
-import itertools
 import json
 import os
 import runpy
@@ -18,6 +17,7 @@ from branches import draw_diagram
 from branches import executor as executors
 from branches.config import ConfigError, parse
 from branches.diagram import run_diagram
+from branches.disentangle import crossings
 from branches.display import Display
 from branches.executor import ExecutorError, executor
 from branches.explore.gather import gather
@@ -365,20 +365,21 @@ def test_disentangled_lines_cross_less_and_keep_kappa_n(folder):
     lines = draw_diagram.lines(graph, "ribbon", 0.3)
 
     def count(heights):
-        polylines = [np.column_stack([line.kappa_n, height])[None] for line, height in zip(lines, heights)]
-        return sum(int(draw_diagram.crossings(a, b)[0, 0]) for a, b in itertools.combinations(polylines, 2))
+        return crossings([np.column_stack([line.kappa_n, height]) for line, height in zip(lines, heights)], window)
 
     heights = draw_diagram.heights(lines, window)
-    assert count(heights) < count([line.kappa_star for line in lines])
+    assert count(heights) == 0 < count([line.kappa_star for line in lines])
     for line, height in zip(lines, heights):
-        assert height[0] == pytest.approx(line.kappa_star[0])
-        assert not line.returns or height[-1] == pytest.approx(line.kappa_star[-1])
+        for number, mark in ((0, line.marks[0]), (-1, line.marks[-1])):
+            assert mark.kind != "circle" or height[number] == pytest.approx(mark.covering)
 
 
 def test_crossings_of_polylines():
-    """Two zigzags: counted by hand."""
-    zigzag, level = np.array([[[0, 0], [1, 2], [2, 0], [3, 2.0]]]), np.array([[[0, 1], [3, 1.0]], [[0, 3], [3, 3.0]]])
-    assert draw_diagram.crossings(zigzag, level).tolist() == [[3, 0]]
+    """A zigzag and two levels: counted by hand."""
+    low, high = (np.array([[0, height], [3, height]]) for height in (1.0, 3.0))
+    zigzag = np.array([[0, 0], [1, 2], [2, 0], [3, 2.0]])
+    assert crossings([zigzag, low, high], (0.0, 3.0)) == 3
+    assert crossings([zigzag, low], (1.0, 3.0)) == 2  # the first is outside
 
 
 @pytest.mark.parametrize("source", ["diagram", "scene"])

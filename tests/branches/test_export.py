@@ -164,7 +164,7 @@ def test_a_film_as_gif(call, results, tmp_path):
     done = call(export.main, results, "--movie", "fold.gif", "--frames", 4)
     assert done.returncode == 0, done.err
     with Image.open(tmp_path / "fold.gif") as film:
-        assert (film.format, film.n_frames, film.size) == ("GIF", 4, (640, 640))
+        assert (film.format, film.n_frames, film.size) == ("GIF", 6, (480, 480))  # four there, two back
         pictures = []
         for frame in range(film.n_frames):
             film.seek(frame)

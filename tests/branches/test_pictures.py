@@ -1,25 +1,40 @@
 """Pictures: stable parts solid, unstable ones dashed, colours by wavenumber, marks that say what they are."""
 
+import math
 import runpy
 
+import numpy as np
 import pytest
-from matplotlib.colors import same_color
+from matplotlib.colors import same_color, to_rgb
 from matplotlib.figure import Figure
 
-from branches.config import parse
+from branches import draw_strip
+from branches.config import load, parse
 from branches.diagram import run_diagram
+from branches.disentangle import crossings
 from branches.display import Display
-from branches.draw_branch import curve
-from branches.draw_diagram import colour_of
+from branches.draw_branch import curve, figure
+from branches.draw_diagram import circles, colour_of, conjugate, heights, legend, lines
+from branches.files import write_picture
+from branches.film import evenly
 from branches.job import run_branch
+from branches.paper.diagram import FIG12, WINDOW
+from branches.preview import preview
 from branches.read import read_branch
+from branches.solid import widest
 
 
-def drawn(folder, text):
+def branch_of(folder, scene):
+    """The branch of a scene, given as text or read already."""
+    config = parse(scene, "scene") if isinstance(scene, str) else scene
+    run_branch(config, folder / "x.h5", Display(silent=True), overwrite=True)
+    return read_branch(folder / "x.h5")
+
+
+def drawn(folder, scene):
     """The axes of a branch, without strips."""
-    run_branch(parse(text, "scene"), folder / "x.h5", Display(silent=True))
     axes = Figure().subplots()
-    curve(axes, read_branch(folder / "x.h5"), [])
+    curve(axes, branch_of(folder, scene), [])
     return axes
 
 
@@ -47,3 +62,102 @@ def test_the_script_says_which_family_it_draws(tmp_path, call, root):
     done = call(main, tmp_path / "two", "--out", "x.png", "--plain")
     assert done.out.startswith("drawn: ribbon, nu = 0.3; the diagram also has ribbon nu = 0.31 (--law, --nu)\n")
     assert call(main, tmp_path / "two", "--out", "x.png", "--plain", "--nu", "0.31").out == "written to x.png\n"
+
+
+# --- diagrams ---------------------------------------------------------------------------------------------------------
+
+
+def test_dashes_of_a_diagram_mean_unstable_and_colours_mean_wavenumbers():
+    graph = preview(parse("{pairs: [[1, 2], [3, 4]], limits: {kappa_n: [-20, 20]}}", "scene"))
+    for *_, data in graph.edges(data=True):
+        if data["n"] == 2:  # up to its fold (1, 2) is stable: the others stay without an index
+            data["index"] = 0 if data["arclength"][0] == 0 else 1
+    axes, other = Figure().subplots(1, 2)
+    conjugate(axes, graph, "ribbon", 0.3, WINDOW)
+    circles(other, graph, "ribbon", 0.3, WINDOW)
+    branches = axes.lines[len(other.lines) :]
+    styles = [(line.get_linestyle(), line.get_linewidth()) for line in branches]
+    assert styles == [("-", 3.4), ("--", 1.4), ("-", 1.4)]
+    assert [same_color(line.get_color(), colour_of(n)) for line, n in zip(branches, (2, 2, 4))] == [True] * 3
+    words = [handle.get_label() for handle in legend(graph, "ribbon", 0.3)]
+    assert words[4:7] == ["branch, stable", "branch, unstable", "branch, stability not computed"]
+
+
+@pytest.mark.parametrize("law, tangled", [("ribbon", 18), ("flat rod", 9), ("isotropic rod", 0)])
+def test_no_branches_cross_in_the_disentangled_fig12(law, tangled):
+    """None is the fewest there can be. The numbers in conjugate coordinates are counted by the same code."""
+    found = lines(preview(parse(FIG12, "fig12", [f"law={law}"])), law, 0.3)
+
+    def count(values):
+        return crossings([np.column_stack([line.kappa_n, height]) for line, height in zip(found, values)], WINDOW)
+
+    before, after = count([line.kappa_star for line in found]), count(heights(found, WINDOW))
+    print(f"{law}: {before} crossings in conjugate coordinates, {after} disentangled")
+    assert (before, after) == (tangled, 0)
+
+
+def test_the_title_is_that_of_the_data(tmp_path):
+    axes = drawn(tmp_path, "{title: 'Fig. 12a, ribbon', law: flat rod, m: 3, n: 1, limits: {kappa_n: [-100, 20]}}")
+    assert axes.get_title() == "flat rod, (m, n) = (3, 1), $\\nu$ = 0.3"
+
+
+# --- one branch -------------------------------------------------------------------------------------------------------
+
+
+def test_negative_numbers_have_minus_signs_and_fonts_can_be_edited(tmp_path):
+    branch = branch_of(tmp_path, "{m: 1, n: 3}")
+    made = figure(branch, shapes=0)
+    assert "\u22124.3020" in [text.get_text() for text in made.axes[0].texts]  # the second fold of (1, 3)
+    write_picture(made, tmp_path / "x.pdf")
+    content = (tmp_path / "x.pdf").read_bytes()
+    assert b"CIDFontType2" in content and b"/Type3" not in content
+    for name in ("a.svg", "b.svg"):
+        write_picture(figure(branch, shapes=0), tmp_path / name)
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+
+
+def test_a_strip_with_dimensions_is_drawn_in_si_units_and_at_its_width(tmp_path, root):
+    scene = load(root / "configs" / "strip_bandsaw.yaml")
+    branch = branch_of(tmp_path, scene)
+    axes = Figure().subplots()
+    curve(axes, branch, [])
+    assert axes.get_xlabel().endswith("in 1/m") and "5.65 × 0.65 × 3000 mm" in axes.get_title()
+    assert axes.lines[0].get_xdata()[0] == pytest.approx(branch.points["kappa_n"][0] * 2 * math.pi / 3.0)
+    assert "natural curvature of the strip" in [text.get_text() for text in axes.get_legend().get_texts()]
+    strips = [draw_strip.strip_of(branch, point) for point in branch.kept()[:2]]
+    assert draw_strip.width_of(branch.config, strips) == pytest.approx(2 * math.pi * 0.00565 / 3.0)
+
+
+def test_generators_never_cross_in_a_picture(tmp_path):
+    branch = branch_of(tmp_path, "{m: 1, n: 3}")  # bends sharply: at the usual width its generators cross
+    strips = [draw_strip.strip_of(branch, point) for point in branch.kept()]
+    least = min(map(widest, strips))
+    assert draw_strip.ROOM * least < draw_strip.WIDTH
+    assert draw_strip.width_of(branch.config, strips, 0.3) == pytest.approx(draw_strip.ROOM * least)
+    rod = branch_of(tmp_path, "{law: flat rod, m: 3, n: 1, limits: {kappa_n: [-100, 20]}}")
+    shapes = [draw_strip.strip_of(rod, point) for point in rod.kept()]
+    assert not any(shape.eta.any() for shape in shapes)  # a rod has no generators
+    assert draw_strip.width_of(rod.config, shapes) == draw_strip.WIDTH
+
+
+def test_the_picture_of_a_circle_has_no_seams_and_its_near_side_in_front(tmp_path):
+    circle = draw_strip.strip_of(branch_of(tmp_path, "{m: 1, n: 2, limits: {kappa_n: [0, 20]}}"), 0)
+    picture = draw_strip.rendered(circle, 0.3, 1.05, 120)
+    alpha = picture[..., 3]
+    beside = np.min([alpha[1:-1, :-2], alpha[1:-1, 2:], alpha[:-2, 1:-1], alpha[2:, 1:-1]], axis=0)
+    assert not np.any((alpha[1:-1, 1:-1] < 1) & (beside == 1))
+    covered = np.flatnonzero(alpha[:, 60] == 1)
+
+    def shade(row):
+        return picture[row, 60, :3] / picture[row, 60, :3].max()
+
+    far, near = (np.array(to_rgb(colour)) / max(to_rgb(colour)) for colour in (draw_strip.BACK, draw_strip.FRONT))
+    assert shade(covered[4]) == pytest.approx(far, abs=1e-3) and shade(covered[-5]) == pytest.approx(near, abs=1e-3)
+
+
+def test_frames_of_a_film_are_as_far_apart_as_the_points_allow(tmp_path):
+    branch = branch_of(tmp_path, "{m: 1, n: 2, steps: {largest: 0.05}}")
+    strips = draw_strip.steady({point: draw_strip.strip_of(branch, point) for point in branch.kept().tolist()})
+    places = [draw_strip.places(strips[point]) for point in evenly(strips, 12)]
+    moved = np.array([np.sqrt(np.mean(np.sum((b - a) ** 2, axis=1))) for a, b in zip(places, places[1:])])
+    assert len(moved) == 11 and np.ptp(moved) < 0.25 * moved.mean()
