@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from branches.display import Parser, complain, survive_any_encoding, write_output
+from branches.progress import Progress
 
 if TYPE_CHECKING:  # --help needs neither numpy nor matplotlib
     from branches.paper.page import Section
@@ -56,6 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder to write to, made if it is not there")
     parser.add_argument("items", nargs="*", metavar="ITEM", help=f"any of {', '.join(ITEMS)} (default: all)")
+    parser.add_argument("--quiet", action="store_true", help="print only the last line")
     options = parser.parse_args(argv)
     survive_any_encoding()
     unknown = [name for name in options.items if name not in ITEMS]
@@ -67,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     try:
         prepare(folder / "index.md")  # before the work, not after it
-        _compute(folder, list(dict.fromkeys(options.items)) or list(ITEMS))
+        _compute(folder, list(dict.fromkeys(options.items)) or list(ITEMS), options.quiet)
     except StoreError as error:
         complain(f"error: {error}")
         return 2
@@ -77,16 +79,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _compute(folder: Path, names: list[str]) -> None:
+def _compute(folder: Path, names: list[str], quiet: bool) -> None:
+    """Compute items, with a line of progress, and write the page after each of them."""
     from branches.paper.page import read, write
 
     sections = read(folder)
-    for name in names:
-        began = time.monotonic()
-        sections[name] = ITEMS[name](folder)
-        # after each item: an interrupted call leaves a page of what was done
-        write(folder, {one: sections[one] for one in ITEMS if one in sections})
-        write_output(f"{name}: {sections[name].title} ({time.monotonic() - began:.1f} s)\n")
+    with Progress("items", len(names), quiet) as progress:
+        for name in names:
+            began = time.monotonic()
+            progress.part(name)
+            sections[name] = ITEMS[name](folder)
+            # after each item: an interrupted call leaves a page of the finished items
+            write(folder, {one: sections[one] for one in ITEMS if one in sections})
+            progress.tell(f"{name}: {sections[name].title} ({time.monotonic() - began:.1f} s)\n")
+            progress.part_done()
     write_output(f"written to {folder / 'index.html'}\n")
 
 

@@ -165,3 +165,8 @@ def test_a_case_of_finite_elements_is_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(shell, "solve", lambda case, stopped: shell.Outcome(case, 0.7, (), "", 1.0, "2.20"))
     shell.compute(shell.DEFAULT[:2], tmp_path / "x.h5")
     assert lines(terminal.getvalue())[-1].startswith("2 of 2 cases done")
+
+
+def test_the_items_of_the_paper_on_a_terminal(command):
+    shown = shown_on_a_terminal(command, "--out", "x", "table3", "table1", program=("-m", "branches.paper"))
+    assert any("1 of 2 items done" in line and "to go: table1" in line for line in shown)
