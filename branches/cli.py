@@ -19,13 +19,14 @@ COMMANDS = {
     "shell": "compute the unfolding strip as a solid by finite elements (CalculiX)",
 }
 EXIT_BAD_INPUT = 2
+_COMPLETION = 'The tab key completes after: eval "$(ribbon completion bash)" (or zsh; fish: ... | source).\n'
 
 
 def help_text() -> str:
     """Return the list of all commands."""
     lines = [f"  {name:<10} {what}" for name, what in COMMANDS.items()]
     head = "usage: ribbon COMMAND ...\n\nBuckled equilibria of closed elastic strips.\n\n"
-    return head + "\n".join(lines) + "\n\n'ribbon COMMAND --help' lists the options of a command.\n"
+    return head + "\n".join(lines) + "\n\n'ribbon COMMAND --help' lists the options of a command.\n" + _COMPLETION
 
 
 def main(argv=None) -> int:
@@ -39,6 +40,8 @@ def main(argv=None) -> int:
 
         sys.stdout.write(f"ribbon-continuation {version('ribbon-continuation')}\n")
         return 0
+    if words[:1] == ["completion"]:
+        return _complete(words[1:])
     if not words or words[0] not in COMMANDS:
         problem = f"there is no command {words[0]!r}" if words else "a command is needed"
         sys.stderr.write(f"error: {problem}; the commands are {', '.join(COMMANDS)} (--help describes them)\n")
@@ -47,6 +50,16 @@ def main(argv=None) -> int:
 
     sys.argv = [f"ribbon {words[0]}", *words[1:]]
     runpy.run_module(f"branches.{words[0]}", run_name="__main__", alter_sys=True)  # as python -m does: ends by SystemExit
+    return 0
+
+
+def _complete(words: list[str]) -> int:
+    from branches.completion import SHELLS, script
+
+    if len(words) != 1 or words[0] not in SHELLS:
+        sys.stderr.write(f"error: completion: must be followed by one of {', '.join(SHELLS)}\n")
+        return EXIT_BAD_INPUT
+    sys.stdout.write(script(words[0], COMMANDS))
     return 0
 
 

@@ -2,8 +2,11 @@
 
 import importlib.util
 import os
+import shutil
 import subprocess
 import sys
+
+import pytest
 
 from branches import cli
 
@@ -46,6 +49,32 @@ def test_an_unknown_command_is_answered_in_one_sentence(call):
     done = call(cli.main, "rum")
     assert done.returncode == 2 and done.err.startswith("error: there is no command 'rum'; the commands are run, ")
     assert call(cli.main).err.startswith("error: a command is needed; the commands are run, ")
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+@pytest.mark.parametrize(
+    ("line", "wanted"),
+    [
+        ("ribbon se", "secondary"),
+        ("ribbon run --over", "--overwrite"),
+        ("ribbon paper --qu", "--quiet"),
+        ("ribbon run scen", "scene.yaml"),
+    ],
+)
+def test_bash_completes(line, wanted, command, tmp_path):
+    (tmp_path / "scene.yaml").touch()
+    (tmp_path / "completion.sh").write_text(command("completion", "bash", program=PROGRAM).out)
+    words = " ".join(f"'{word}'" for word in line.split())
+    program = f"source completion.sh; COMP_WORDS=({words}); COMP_CWORD={len(line.split()) - 1}; _ribbon; echo ${{COMPREPLY[@]}}"
+    assert subprocess.run(["bash", "-c", program], capture_output=True, text=True, cwd=tmp_path).stdout == wanted + "\n"
+
+
+def test_completion_of_other_shells(command):
+    fish = command("completion", "fish", program=PROGRAM).out
+    assert "-a secondary" in fish and "'__fish_seen_subcommand_from run' -l overwrite" in fish
+    assert "bashcompinit" in command("completion", "zsh", program=PROGRAM).out
+    wrong = command("completion", "tcsh", program=PROGRAM)
+    assert (wrong.returncode, wrong.err) == (2, "error: completion: must be followed by one of bash, zsh, fish\n")
 
 
 def test_it_is_installed_as_ribbon(root):
