@@ -57,6 +57,27 @@ class Command:
         process.out, process.err = process.communicate(timeout=300)
         return process
 
+    def on_terminal(self, *arguments, streams=("stderr",), **more) -> bytes:
+        """What a command writes to these streams on a pseudo-terminal; it ends with exit code 0."""
+        pty = pytest.importorskip("pty")
+        ours, theirs = pty.openpty()
+        process = self.start(*arguments, **dict.fromkeys(streams, theirs), **more)
+        os.close(theirs)
+        shown = b""
+        while True:
+            try:
+                part = os.read(ours, 65536)
+            except OSError:  # how Linux says that the other end is closed
+                break
+            if not part:
+                break
+            shown += part
+        os.close(ours)
+        if process.stdout is not None:
+            process.stdout.close()
+        assert process.wait() == 0
+        return shown
+
 
 def _default_signals():
     # a shell that starts pytest in the background has it ignore Ctrl-C, and so would everything below it

@@ -1,10 +1,7 @@
 """The line of progress: on a terminal only, overwritten in place, with an estimate that converges."""
 
 import io
-import os
 import time
-
-import pytest
 
 from branches import progress as module
 from branches import shell
@@ -114,22 +111,7 @@ def test_a_part_that_takes_longer_than_the_others_raises_the_estimate(monkeypatc
 
 def shown_on_a_terminal(command, *arguments, program, **more):
     """What a command writes on a pseudo-terminal."""
-    pty = pytest.importorskip("pty")
-    ours, theirs = pty.openpty()
-    process = command.start(*arguments, program=program, stderr=theirs, env={"COLUMNS": "200", **more})
-    os.close(theirs)
-    shown = b""
-    while True:
-        try:
-            part = os.read(ours, 65536)
-        except OSError:  # how Linux says that the other end is closed
-            break
-        if not part:
-            break
-        shown += part
-    os.close(ours)
-    process.stdout.close()
-    assert process.wait() == 0
+    shown = command.on_terminal(*arguments, program=program, env={"COLUMNS": "200", **more})
     return lines(shown.decode())
 
 
