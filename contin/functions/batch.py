@@ -101,7 +101,7 @@ class Batch:
         for function in functions:
             rewriter.function(function)
         source = _source(self.signature, counts, [self.signature.fills(function) for function in functions])
-        rewriter.note(source)
+        rewriter.note(source, self.signature.states, self.signature.parameters)
         self._evaluate = _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:

@@ -130,3 +130,14 @@ def test_what_numba_itself_does_not_expect_is_a_sentence():
 def test_no_functions_is_a_sentence(counts):
     with pytest.raises(ProblemError, match="functions: there must be at least one"):
         Batch([], counts, ["a"], ["k"])
+
+
+def test_one_function_of_other_states_is_another_batch():
+    """The names of states say what ``u.y`` is."""
+    for states, y in ((["x", "y"], 2.0), (["x", "z", "y"], 3.0), (["y", "x"], 1.0)):
+        batch = Batch([lambda t, u, p: u.y], [0], states, ["a"])
+        values = np.arange(1.0, 1 + len(states))[None]
+        assert batch.values(np.zeros(1), values, np.empty((0, len(states))), np.ones(1)).tolist() == [[y]]
+    for parameters, b in ((["a", "b"], 2.0), (["b", "a"], 1.0)):
+        batch = Batch([lambda t, u, p: p.b], [0], ["x"], parameters)
+        assert batch.values(np.zeros(1), np.zeros((1, 1)), np.empty((0, 1)), np.array([1.0, 2.0])).tolist() == [[b]]
