@@ -24,7 +24,7 @@ MOST_WORKERS = 8
 
 
 def pytest_addoption(parser):
-    parser.addoption("--full", action="store_true", help="all examples of random input, and every fault of the torture")
+    parser.addoption("--full", action="store_true", help="tests that take long, all examples of random input, every fault")
 
 
 def pytest_configure(config):
@@ -48,6 +48,10 @@ def pytest_xdist_auto_num_workers(config):
     return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, MOST_WORKERS)
 
 
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
+    if not config.getoption("--full"):
+        for item in items:
+            if item.get_closest_marker("full"):
+                item.add_marker(pytest.mark.skip(reason="takes long: with --full only, which .ci/run asks for"))
     places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(FIRST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))

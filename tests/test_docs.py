@@ -30,7 +30,13 @@ def project(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+#: Pages that take ten seconds or more each, most of it compiling their problems.
+LONG = {"architecture", "explore", "finite-width", "how-to", "tutorial", "variational"}
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, id=page.stem, marks=[pytest.mark.full] if page.stem in LONG else []) for page in PAGES]
+)
 def test_blocks_run(page, project):
     """Each page in a folder of its own, so none leans on what another one computes."""
     scope = {}

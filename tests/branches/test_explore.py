@@ -274,6 +274,7 @@ def test_play_keys_and_coexisting_states(pages, browser):
 
 
 @needs_chromium
+@pytest.mark.full
 def test_material_can_be_switched(pages, browser):
     browser.open(pages / "laws.html")
     names = browser.js("[...document.getElementById('family').options].map((option) => option.text)")
@@ -287,6 +288,7 @@ def test_material_can_be_switched(pages, browser):
 
 
 @needs_chromium
+@pytest.mark.full
 def test_export(pages, browser):
     browser.open(pages / "m1_n2.html")
     for button in ("csv", "yaml", "diagram.svg", "diagram.png", "strip.svg", "strip.png"):
@@ -306,6 +308,7 @@ def test_export(pages, browser):
 
 
 @needs_chromium
+@pytest.mark.full
 def test_exported_pictures_have_the_chosen_ground_and_a_legend(pages, browser):
     """Dark, white and transparent; the legend names what is inside the axes; curves have FINE = 8 pieces between points."""
     browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
@@ -333,6 +336,7 @@ def test_exported_pictures_have_the_chosen_ground_and_a_legend(pages, browser):
 
 
 @needs_chromium
+@pytest.mark.full
 def test_stable_is_solid_and_unstable_dashed(pages, browser):
     """The index of (1, 2) is 0 up to its fold and 1 beyond, in the file; the colour is that of n = 2."""
     browser.open(pages / "m1_n2.html")
@@ -348,6 +352,7 @@ def test_stable_is_solid_and_unstable_dashed(pages, browser):
 
 
 @needs_chromium
+@pytest.mark.full
 def test_a_link_shows_what_was_shown(pages, browser):
     """The address holds the place and the controls; back and forward move between branches; a wrong address does no harm."""
     browser.open(pages / "fig12.html")
@@ -382,6 +387,7 @@ EXACT += [("finite width", 0.3, 8.0)]
 
 
 @needs_chromium
+@pytest.mark.full
 def test_exact_solution_of_the_page_is_that_of_the_model(pages, browser):
     """Within 1e-10 of `ribbon_model.exact`, tested there with 30 digits; at equal amplitudes, and folds."""
     browser.open(pages / "m1_n2.html")
@@ -424,6 +430,7 @@ def test_compare_with_another_material(pages, browser):
 
 
 @needs_chromium
+@pytest.mark.full
 def test_energy_and_snap(pages, browser):
     """Energy as the vertical axis; from the fold of (1, 2) the strip snaps to the triple loop, as in the paper's experiments.
 
@@ -531,6 +538,7 @@ def test_page_of_a_stored_branch_holds_its_columns_and_states(stored):
 
 
 @needs_chromium
+@pytest.mark.full
 def test_page_of_stored_branches(stored, browser):
     folder, branch = stored
     browser.open(folder / "bratu.html")

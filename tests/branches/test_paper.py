@@ -40,14 +40,12 @@ def computed(tmp_path_factory):
         yield section
 
 
-#: Items that take half a minute each, most of it compiling: with --full only, which .ci/run asks for.
-LONG = {"snaps", "finite-width"}
+#: Items that take ten seconds or more each.
+LONG = {"fig11", "fig12", "snaps", "finite-width"}
 
 
-@pytest.mark.parametrize("name", ITEMS)
-def test_every_published_number_within_its_printed_digits(name, computed, request):
-    if name in LONG and not request.config.getoption("--full"):
-        pytest.skip("with --full only")
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.full) if name in LONG else name for name in ITEMS])
+def test_every_published_number_within_its_printed_digits(name, computed):
     section, tmp_path = computed(name)
     verdicts = [row.verdict for row in section.rows]
     assert "no" not in verdicts
@@ -78,6 +76,7 @@ def test_where_folds_are_born(computed):
     assert float(at_03[0]) == pytest.approx(-21.62681748742, abs=1e-8)  # the half loop's branch point
 
 
+@pytest.mark.full
 def test_where_the_fold_of_finite_width_is_born(computed):
     """4.45212, where the quadrature's slope dkappa_n/dA at the circle vanishes (extrapolated from A = .0004 and .0016)."""
     rows = {row.what: row.ours for row in computed("finite-width")[0].rows}

@@ -121,6 +121,7 @@ def test_a_strip_on_a_terminal(command):
     assert shown_on_a_terminal(command, *TAPE.split(), "--quiet", program=("-m", "branches.strip")) == []
 
 
+@pytest.mark.full
 def test_secondary_branches_on_a_terminal(command):
     (command.folder / "pair.yaml").write_text("{m: 5, n: 2, stability: true, limits: {kappa_n: [-21, 100]}, stride: 20}")
     assert command("pair.yaml", "--quiet").returncode == 0

@@ -291,13 +291,13 @@ def test_a_second_ctrl_c_stops_at_once(tmp_path, silent):
     assert path.read_bytes() == before and os.listdir(tmp_path) == ["x.h5"]
 
 
-def test_killed_again_and_again(command, scene, undisturbed, tables, request):
+@pytest.mark.full
+def test_killed_again_and_again(command, scene, undisturbed, tables):
     """SIGKILL, SIGINT and SIGTERM at random moments; after each the file opens with plain h5py and holds a piece of the run.
 
     The slowest test of the folder: six processes, each of which loads the compiled kernels and computes for a while.
+    tests/test_torture.py has each fault once.
     """
-    if not request.config.getoption("--full"):
-        pytest.skip("with --full only; tests/test_torture.py has each fault once")
     config = Config(m=1, n=2, **LONG)
     whole = undisturbed(config)["points"]
     path, chance = command.folder / "x.h5", random.Random(4)

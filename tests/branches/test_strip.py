@@ -39,6 +39,7 @@ def test_a_wide_strip_has_the_ribbons_threshold_in_millimetres():
     assert circles(wide)[0].stable and not circles(Strip(1.0, 1e-8, length, 1 / 2.6, 0.3, 1e9))[0].stable
 
 
+@pytest.mark.full
 def test_buckled_states_are_those_of_the_quadrature():
     """The stable state of the tape on (1, 2), by the exact quadrature up to its own kappa_n."""
     states, folds = buckled(TAPE)

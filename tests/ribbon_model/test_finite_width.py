@@ -151,6 +151,7 @@ def test_thresholds_from_the_flat_rod_to_the_ribbon():
     assert [round(thresholds(FINITE_WIDTH, 1, 2, NU, G)[0], 3) for G in (1e-3, 10, 100)] == [5.615, 3.346, 2.680]
 
 
+@pytest.mark.full
 def test_the_half_loop_bifurcates_at_the_thresholds():
     system = HALF_LOOP.discretize(FINITE_WIDTH, 12, 6, {"nu": NU, "Gamma": 10.0})
     start = HALF_LOOP.circle(system, 1, 2.0, circle(FINITE_WIDTH, 1, 2.0, NU, 10.0)["M1"])
