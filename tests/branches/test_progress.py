@@ -3,6 +3,8 @@
 import io
 import time
 
+import pytest
+
 from branches import progress as module
 from branches import shell
 from branches.progress import Progress, StartingDisplay
