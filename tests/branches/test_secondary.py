@@ -55,6 +55,7 @@ def test_a_branch_is_put_between_the_bifurcations_that_it_joins(returned, tmp_pa
     assert sum("origin" in state for state in at) == 1
 
 
+@pytest.mark.full
 def test_the_command_follows_both_kinds_of_a_pair_and_says_so(command, tmp_path):
     run_branch(parse(PAIR, "scene"), tmp_path / "x.h5", Display(silent=True))
     done = command("x.h5", "--out", "all", program=("-m", "branches.secondary"))

@@ -190,6 +190,7 @@ def test_the_others_go_on_and_a_rerun_computes_what_is_missing(fake, tmp_path, m
         compute(cases, tmp_path / "other.h5")
 
 
+@pytest.mark.full
 def test_without_ccx_one_sentence_and_the_laws_are_drawn(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(shell, "PROGRAM", "no-such-program")
     section = fig7(tmp_path)
@@ -271,6 +272,7 @@ needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (cc
 
 
 @needs_ccx
+@pytest.mark.full
 def test_a_strip_of_solid_elements_loses_stability_where_the_law_says():
     """R/w = 4, w**2/(R h) = 75, on a coarse mesh: within 2 % of the law of finite width, whose own error is of order w/R."""
     outcome = solve(Case("thermal", 0.3, 4.0, 300.0, 30, 4, first=0.74, last=0.84, step=0.05))

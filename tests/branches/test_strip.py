@@ -78,6 +78,7 @@ def test_which_law_holds():
     assert deviations(Strip(1.0, 1e-8, 6.0, 1.0, 0.3, 1e9))["ribbon"] < 1e-3
 
 
+@pytest.mark.full
 def test_the_pages_numbers_are_the_commands(root, capsys):
     page = (root / "docs" / "strips.md").read_text(encoding="utf-8")
     examples = re.findall(r"```console\n\.venv/bin/python -m branches\.strip (.*?)\n(.*?)```", page.replace("\\\n", ""), re.S)

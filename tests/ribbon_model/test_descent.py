@@ -226,7 +226,9 @@ def test_what_is_refused():
         replace(strip, strains=1.3 * strip.strains).moved(np.zeros(96))
 
 
-@pytest.mark.parametrize(("m", "kappa_n", "where"), [(3, -1.0, "1-covered circle"), (1, 3.3, "(1, 2)")])
+@pytest.mark.parametrize(
+    ("m", "kappa_n", "where"), [(3, -1.0, "1-covered circle"), pytest.param(1, 3.3, "(1, 2)", marks=pytest.mark.full)]
+)
 def test_a_strip_of_finite_width_comes_to_rest(m, kappa_n, where):
     """On a circle its energy is a closed form; on a primary branch the quadrature knows it."""
     start = discretized(second_variation.circle(FINITE_WIDTH, NU, m, kappa_n, Gamma=30.0), 96)

@@ -161,6 +161,7 @@ CLAMPED_ROD = VariationalProblem(
 )  # fmt: skip
 
 
+@pytest.mark.full
 def test_twisted_clamped_rod():
     """Greenhill 1883: M L/2B = 4.4934..., M = C phi; two modes at once, as the rod is isotropic (Love, sect. 272)."""
     start = contin.solve(CLAMPED_ROD, straight_rod(10), {"phi": 10.0})
@@ -195,6 +196,7 @@ def test_twisted_pinned_rod():
     assert_special(twisted, "M", [("BP", 2 * math.sqrt(math.pi**2 + 10), 2, (0, 2))])
 
 
+@pytest.mark.full
 def test_closed_twisted_rod():
     """Michell 1889, Zajac 1962: a ring of a straight rod buckles at a twist of 2 pi sqrt(3) B/C.
 
@@ -217,6 +219,7 @@ def test_closed_twisted_rod():
     assert abs(twisted.points[0]["mu_phase"]) < 1e-9
 
 
+@pytest.mark.full
 def test_helix_under_a_wrench():
     """Constant strains k: from m' = 0 = k x m + d3 x n, the force along the axis is (C - B) k3 |k| (Love, sect. 271)."""
     k, C = np.array([0.3, 1.1, 0.7]), 0.6
