@@ -143,20 +143,22 @@ def _share_work() -> subprocess.Popen[bytes] | None:
     if not modules:
         return None
     if sys.stderr is not None and sys.stderr.isatty():
-        print("contin: compiling for this machine (once, some 15 s)", file=sys.stderr)
+        print("contin: compiling the engine for this machine, once; this takes some 15 s", file=sys.stderr)
     if (os.cpu_count() or 1) < 2 or not sys.executable:
         return None
     quiet: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     with contextlib.suppress(OSError):  # this process makes all of it, then
         environment = {**os.environ, "CONTIN_CACHE_DIR": str(cache_directory())}
-        return subprocess.Popen([sys.executable, "-c", _PREPARE, *sys.path, "", *modules], env=environment, **quiet)
+        return subprocess.Popen([sys.executable, "-c", _PREPARE, *sys.path, _END, *modules], env=environment, **quiet)
     return None
 
 
+#: Ends the path among the arguments of that process; a path holds "" for the current folder.
+_END = "--"
 #: The program of that process; its arguments are this one's path, and modules.
-_PREPARE = """
+_PREPARE = f"""
 import sys
-split = sys.argv.index("", 1)
+split = sys.argv.index({_END!r}, 1)
 sys.path[:] = sys.argv[1:split]
 from contin.functions.kernel import prepare
 prepare(sys.argv[split + 1:])

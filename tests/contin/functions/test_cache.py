@@ -100,7 +100,7 @@ def test_the_second_process_makes_kernels_of_modules(tmp_path, monkeypatch):
         "from contin.functions.kernel import kernel\n\n@kernel\ndef one(x: int) -> int:\n    return x + 1\n"
     )
     monkeypatch.setenv("CONTIN_CACHE_DIR", str(tmp_path))
-    program = [sys.executable, "-c", kernels._PREPARE, str(tmp_path), *sys.path, "", "one_kernel"]
+    program = [sys.executable, "-c", kernels._PREPARE, "", str(tmp_path), *sys.path, kernels._END, "one_kernel"]
     subprocess.run(program, check=True)
     assert len(list(tmp_path.glob("k*.bin"))) == 1
 
