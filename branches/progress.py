@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # nothing heavy is imported here: the line is to be shown whi
 _PERIOD = 1.0
 #: Seconds below which times are given in seconds, above in minutes.
 _MINUTES_FROM = 120.0
-_STARTING = "starting (the first run compiles machine code, which takes about a minute)"
+_STARTING = "starting (the first run compiles machine code, which takes half a minute)"
 
 
 class Progress(Display):

@@ -71,13 +71,13 @@ def undisturbed(name: str, folder: Path) -> Scene:
 def load_kernels(names: list[str]) -> None:
     """Compile or load the functions of the scenes, once before processes are forked."""
     from branches.config import DiagramConfig, parse
-    from branches.display import Display
     from branches.job import compute_branch
+    from branches.progress import StartingDisplay  # runs without rights cannot load modules that are not there when they fork
 
     for name in names:
         config = parse(SCENES[name], name)
         one = config.branches[0] if isinstance(config, DiagramConfig) else config
-        compute_branch(one, Display(silent=True))
+        compute_branch(one, StartingDisplay(silent=True))
 
 
 def torture(names: list[str], count: int, seed: int, folder: Path, tell: Callable[[str], None] = print) -> list[str]:

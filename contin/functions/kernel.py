@@ -143,7 +143,8 @@ def _share_work() -> subprocess.Popen[bytes] | None:
     if not modules:
         return None
     if sys.stderr is not None and sys.stderr.isatty():
-        print("contin: compiling the engine for this machine, once; this takes some 15 s", file=sys.stderr)
+        text = "contin: compiling the engine for this machine, once; this takes some 15 s"
+        print(f"\r{text:<79}", file=sys.stderr)  # a line of progress may stand there
     if (os.cpu_count() or 1) < 2 or not sys.executable:
         return None
     quiet: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)

@@ -139,7 +139,7 @@ def test_the_start_of_a_run_is_shown_until_its_first_output(monkeypatch, capsys)
     time.sleep(0.1)
     display.note("the run")
     shown = terminal.getvalue()
-    assert lines(shown)[-1] == "starting (the first run compiles machine code, which takes about a minute): 0 s so far"
+    assert lines(shown)[-1] == "starting (the first run compiles machine code, which takes half a minute): 0 s so far"
     time.sleep(0.1)
     assert terminal.getvalue() == shown and capsys.readouterr().out == "the run\n"
 
