@@ -77,7 +77,7 @@ def load_kernels(names: list[str]) -> None:
     for name in names:
         config = parse(SCENES[name], name)
         one = config.branches[0] if isinstance(config, DiagramConfig) else config
-        compute_branch(one, StartingDisplay(silent=True))
+        compute_branch(one, StartingDisplay(quiet=True))
 
 
 def torture(names: list[str], count: int, seed: int, folder: Path, tell: Callable[[str], None] = print) -> list[str]:
