@@ -1,6 +1,6 @@
 """Completion of ``ribbon`` in a shell: commands, their options, and names of files.
 
-eval "$(ribbon completion bash)"      # zsh: eval "$(ribbon completion zsh)"; fish: ribbon completion fish | source
+A shell evaluates what ``ribbon completion bash`` (or zsh, or fish) prints.
 """
 
 from __future__ import annotations

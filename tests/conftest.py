@@ -1,4 +1,4 @@
-"""Shared by all tests: one thread each, kernels compiled once, the option ``--full``, workers, and the order of modules."""
+"""Shared by all tests: one thread each, the option ``--full``, workers, and the order of modules."""
 
 import os
 from pathlib import Path
@@ -37,7 +37,6 @@ def pytest_configure(config):
         settings.register_profile("quick", max_examples=60, **common)
         settings.register_profile("full", max_examples=300, **common)
         settings.load_profile("full" if config.getoption("--full") else "quick")
-    from contin import solve, trace  # noqa: F401  compiles the kernels, before there are workers that would all compile them
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -456,8 +456,9 @@ class Continuation:
             details = details if found.same_as else again.details
         system = trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
-        found = dataclasses.replace(found, trial=trial, details=details)
-        stability = Stability() if self._index is None else stability_of(found)
+        stability = Stability()
+        if self._index is not None:
+            stability = stability_of(dataclasses.replace(found, trial=trial, details=details))
         return Point(
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
             state.arclength + found.at, trial.iterations, trial.newton_error, errors, details,

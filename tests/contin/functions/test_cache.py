@@ -162,6 +162,7 @@ def test_a_full_disk_costs_a_line_and_the_cache(kernel, monkeypatch, capsys):
 WITHOUT_NUMBA = """
 import sys
 exec(open(sys.argv[1]).read())
+from contin import solve, trace
 print(sorted({"numba", "scipy", "sympy"} & set(sys.modules)))
 """
 
@@ -198,10 +199,10 @@ def test_code_finds_a_place_or_says_what_to_set(tmp_path, monkeypatch, capsys):
         cache.write_source("x.py", "1")
 
 
-#: Functions alone: a problem would have each folder's engine compiled as well.
+#: Functions alone: where the engine is imported before, a second process compiles it as well, for each folder.
 PROBLEM = """
 import numpy as np
-from contin import Batch, solve, trace
+from contin import Batch
 batch = Batch([lambda t, u, p: (u.v, -p.lam * u.u)], [2], ["u", "v"], ["lam"])
 print(batch.values(np.zeros(1), np.array([[2.0, 3.0]]), np.empty((0, 2)), np.array([5.0])).tolist())
 """
