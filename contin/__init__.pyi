@@ -16,6 +16,7 @@ from .files import temporary_name, write_whole
 from .functions.batch import Batch
 from .functions.cache import cache_directory
 from .functions.gradient import gradient
+from .functions.pointwise import Pointwise
 from .names import exact_text
 from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
@@ -31,7 +32,7 @@ from .stepping.trial import Monitor, TestFunction, Trial
 
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
-    "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point",
+    "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise",
     "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis",
     "cache_directory", "correct", "curve", "diagram", "exact_text", "follow", "gradient", "interpolation", "load",
     "locate_branch_point", "point_of", "read_columns", "save", "sensitivities", "solve", "temporary_name", "trace",

@@ -6,14 +6,15 @@ square root, or through a jump: two neighbouring places of the strip take differ
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
 
 from contin import Batch, TestFunction
+from ribbon_model.domains import StripProblem
+from ribbon_model.equilibrium import moment_with_force, moment_without_force
 from ribbon_model.laws import Law
-from ribbon_model.shape import frames
-from ribbon_model.solution import Solution
 
 NAME = "the end of the convex strain energy"
 
@@ -24,44 +25,38 @@ def margin(law: Law) -> Callable | None:
     It is computed for the strains at the nodes and halfway between neighbouring nodes, which detects jumps. None for a law
     whose H is a closed expression, because its domain is known.
     """
-    response, curvatures = law.response_at, law.curvatures_at
-    if curvatures is None:
-        return None
+    return None if law.curvatures_at is None else _least
 
-    def strains(u, p):
-        H, w1, w2, w3, conjugate = response(u.M1, u.M2, u.M3, p)
+
+def _least(system, x):
+    problem, p, u = system.problem, system.all_parameters(x), system.states(x)
+    strains, curvatures = _compiled(problem)
+    w = strains.values(system.nodes, np.ascontiguousarray(u), u[:0], p)
+    w = np.concatenate([w, (w[1:] + w[:-1]) / 2])
+    U11, U13, U33 = curvatures.values(np.zeros(len(w)), w, w[:0], p).T
+    ratio = np.where((U11 > 0) & (U33 > 0), (U11 * U33 - U13**2) / (U11 * U33), -1.0)
+    return float(np.nan_to_num(ratio, nan=-1.0).min())
+
+
+@functools.cache
+def _compiled(problem: StripProblem) -> tuple[Batch, Batch]:
+    """Return omega_1, omega_3 from the states of a problem, and U_11, U_13, U_33 from omega_1, omega_3, compiled."""
+    law = problem.law
+    curvatures_at = law.curvatures_at
+    moment = moment_with_force if "x1" in problem.state_names else moment_without_force
+
+    def strains(u, p, M, response):
+        H, w1, w2, w3, conjugate = response
         return w1, w3
 
-    def second_derivatives(u, p):
-        return curvatures(u.w1, u.w3, p)
+    def curvatures(t, u, p):
+        return curvatures_at(u.w1, u.w3, p)
 
-    names = ("kappa_n", *law.parameters)
-    at, second = (
-        Batch([function], [count], states, names, times=False)
-        for function, count, states in ((strains, 2, ("M1", "M2", "M3")), (second_derivatives, 3, ("w1", "w3")))
+    names = tuple(problem.parameters)
+    return (
+        Batch([law.at_points(moment, strains)], [2], problem.state_names, names),
+        Batch([curvatures], [3], ("w1", "w3"), names),
     )
-
-    def least(system, x):
-        solution = Solution.at(system, x)
-        p = np.array([solution.parameters[name] for name in names])
-        w = _values(at, _moments(solution), p)
-        U11, U13, U33 = _values(second, np.concatenate([w, (w[1:] + w[:-1]) / 2]), p).T
-        ratio = np.where((U11 > 0) & (U33 > 0), (U11 * U33 - U13**2) / (U11 * U33), -1.0)
-        return float(np.nan_to_num(ratio, nan=-1.0).min())
-
-    return least
-
-
-def _values(batch, u, p):
-    return batch.values(np.zeros(len(u)), np.ascontiguousarray(u), np.empty((0, u.shape[1])), p)
-
-
-def _moments(solution: Solution):
-    """Return the components of M on the directors at the nodes, shape (K, 3)."""
-    states, moment = solution.states, solution.moment
-    if states.shape[1] > 4:
-        moment = moment - np.cross(states[:, 4:7], solution.force)
-    return np.einsum("kij,kj->ki", frames(states), np.broadcast_to(moment, (len(states), 3)))
 
 
 def test_functions(law: Law) -> list[TestFunction]:

@@ -45,22 +45,31 @@ def on_directors(q0, q1, q2, q3, a1, a2, a3):
     )  # fmt: skip
 
 
+def moment_without_force(u, p):
+    """Return the components of M on the directors from the states and parameters of `without_force`."""
+    return on_directors(u.q0, u.q1, u.q2, u.q3, p.M1, p.M2, 0.0)
+
+
+def moment_with_force(u, p):
+    """Return the components of M on the directors from the states and parameters of `with_force`."""
+    return on_directors(
+        u.q0, u.q1, u.q2, u.q3,
+        p.M1 - u.x2 * p.R3 + u.x3 * p.R2, p.M2 - u.x3 * p.R1 + u.x1 * p.R3, p.M3 - u.x1 * p.R2 + u.x2 * p.R1,
+    )  # fmt: skip
+
+
 def without_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float], dict[str, Callable]]:
     """Return the right-hand side, states, loads (parameters, zero) and functionals where R = 0, and M3 = 0 at S = 0.
 
     The equations also have the parameters ``length`` and those of the law.
     """
-    response = law.response_at
 
-    def moment(u, p):
-        return on_directors(u.q0, u.q1, u.q2, u.q3, p.M1, p.M2, 0.0)
-
-    def rhs(t, u, p):
-        M1, M2, M3 = moment(u, p)
-        H, w1, w2, w3, conjugate = response(M1, M2, M3, p)
+    def rates(u, p, M, response):
+        H, w1, w2, w3, conjugate = response
         return spin(u.q0, u.q1, u.q2, u.q3, w1, w2, w3, p.length)
 
-    return rhs, FRAME, {"M1": 0.0, "M2": 0.0}, _functionals(response, moment)
+    moment = moment_without_force
+    return law.at_points(moment, rates), FRAME, {"M1": 0.0, "M2": 0.0}, _functionals(law, moment)
 
 
 def with_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float], dict[str, Callable]]:
@@ -68,39 +77,31 @@ def with_force(law: Law) -> tuple[Callable, tuple[str, ...], dict[str, float], d
 
     ``unfold`` multiplies the dissipative term M × omega + R × e3, which is zero on a closed solution (see `domains.LOOP`).
     """
-    response = law.response_at
 
-    def moment(u, p):
-        return on_directors(
-            u.q0, u.q1, u.q2, u.q3,
-            p.M1 - u.x2 * p.R3 + u.x3 * p.R2, p.M2 - u.x3 * p.R1 + u.x1 * p.R3, p.M3 - u.x1 * p.R2 + u.x2 * p.R1,
-        )  # fmt: skip
-
-    def rhs(t, u, p):
-        M1, M2, M3 = moment(u, p)
+    def rates(u, p, M, response):
+        M1, M2, M3 = M
         R1, R2, R3 = on_directors(u.q0, u.q1, u.q2, u.q3, p.R1, p.R2, p.R3)
-        H, w1, w2, w3, conjugate = response(M1, M2, M3, p)
+        H, w1, w2, w3, conjugate = response
         v1 = w1 + p.unfold * (M2 * w3 - M3 * w2 + R2)
         v2 = w2 + p.unfold * (M3 * w1 - M1 * w3 - R1)
         v3 = w3 + p.unfold * (M1 * w2 - M2 * w1)
-        rates = spin(u.q0, u.q1, u.q2, u.q3, v1, v2, v3, p.length)
+        turning = spin(u.q0, u.q1, u.q2, u.q3, v1, v2, v3, p.length)
         d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(u.q0, u.q1, u.q2, u.q3)
-        return (*rates, p.length * d31, p.length * d32, p.length * d33)
+        return (*turning, p.length * d31, p.length * d32, p.length * d33)
 
-    return rhs, (*FRAME, *CENTRELINE), dict.fromkeys(LOADS, 0.0), _functionals(response, moment)
+    moment = moment_with_force
+    return law.at_points(moment, rates), (*FRAME, *CENTRELINE), dict.fromkeys(LOADS, 0.0), _functionals(law, moment)
 
 
-def _functionals(response, moment):
+def _functionals(law: Law, moment: Callable[..., tuple]) -> dict[str, Callable]:
     """Return kappa* of equation (28) and the energy (1/2 pi) * (integral of U), as means over the domain."""
 
-    def kappa_star(t, u, p):
-        M1, M2, M3 = moment(u, p)
-        H, w1, w2, w3, conjugate = response(M1, M2, M3, p)
+    def kappa_star(u, p, M, response):
+        H, w1, w2, w3, conjugate = response
         return conjugate
 
-    def energy(t, u, p):
-        M1, M2, M3 = moment(u, p)
-        H, w1, w2, w3, conjugate = response(M1, M2, M3, p)
-        return M1 * w1 + M2 * w2 + M3 * w3 - H
+    def energy(u, p, M, response):
+        H, w1, w2, w3, conjugate = response
+        return M[0] * w1 + M[1] * w2 + M[2] * w3 - H
 
-    return {"kappa_star": kappa_star, "energy": energy}
+    return {"kappa_star": law.at_points(moment, kappa_star), "energy": law.at_points(moment, energy)}

@@ -123,9 +123,14 @@ def strain_energy(w1, w3, kappa_n, nu, Gamma):
     Arguments may be complex, for complex steps: first derivatives of U, U_1, U_3 and U_k then are exact. (Only the membrane
     function of real numbers is called; what the imaginary parts add is its linear term.)
     """
+    return _strain_energy(w1, w3, kappa_n, nu, Gamma, membrane((3 * (1 - nu * nu) * Gamma * Gamma * w1 * w1).real))
+
+
+def _strain_energy(w1, w3, kappa_n, nu, Gamma, profile):
+    """Return `strain_energy`, with the values of `membrane`."""
     plane, C = 1 - nu * nu, 3 * (1 - nu * nu) * Gamma * Gamma
     z = C * w1 * w1
-    g, slope, curvature = membrane(z.real)
+    g, slope, curvature = profile
     dz = z - z.real
     P = C * (g + slope * dz)
     P1 = 2 * C * C * w1 * (slope + curvature * dz)
@@ -226,14 +231,26 @@ def _strains(M1, M3, kappa_n, nu, Gamma):
     return math.nan, math.nan
 
 
-def response(M1, M2, M3, kappa_n, nu, Gamma):
-    """H, omega_1, omega_2, omega_3, dH/dkappa_n: the Legendre transform of U.
+def search(M1, M3, kappa_n, nu, Gamma):
+    """Return omega_1, omega_3 and the three values of `membrane` there, for real numbers."""
+    w1, w3 = _strains(M1, M3, kappa_n, nu, Gamma)
+    g, slope, curvature = membrane(3 * (1 - nu * nu) * Gamma * Gamma * w1 * w1)
+    return w1, w3, g, slope, curvature
 
-    Newton's method runs on real parts. One more step, on the numbers as they come, carries imaginary parts along: by the
-    theorem on implicit functions that is the exact derivative.
+
+def response(M1, M2, M3, kappa_n, nu, Gamma):
+    """H, omega_1, omega_2, omega_3, dH/dkappa_n: the Legendre transform of U."""
+    return response_from(M1, M2, M3, kappa_n, nu, Gamma, search(M1.real, M3.real, kappa_n.real, nu.real, Gamma.real))
+
+
+def response_from(M1, M2, M3, kappa_n, nu, Gamma, found):
+    """Return the response from what `search` has found for the real parts of the arguments.
+
+    One more step of Newton's method, on the numbers as they come, carries imaginary parts along: by the theorem on implicit
+    functions that is the exact derivative.
     """
-    w1, w3 = _strains(M1.real, M3.real, kappa_n.real, nu.real, Gamma.real)
-    U, U1, U3, U11, U13, U33, Uk, U1k, U3k = strain_energy(w1, w3, kappa_n, nu, Gamma)
+    w1, w3, g, slope, curvature = found
+    U, U1, U3, U11, U13, U33, Uk, U1k, U3k = _strain_energy(w1, w3, kappa_n, nu, Gamma, (g, slope, curvature))
     determinant = U11 * U33 - U13 * U13
     d1 = (U33 * (M1 - U1) - U13 * (M3 - U3)) / determinant
     d3 = (U11 * (M3 - U3) - U13 * (M1 - U1)) / determinant

@@ -19,7 +19,7 @@ import math
 import types
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ribbon_model import finite_width
 
@@ -94,11 +94,18 @@ class Law:
 
         return gradient(self.hamiltonian, ("M1", "M2", "M3", "kappa_n"))
 
-    @functools.cached_property
-    def response_at(self) -> Callable[..., tuple]:
-        """``response_at(M1, M2, M3, p)``: the response, kappa_n and the law's parameters looked up in p, a named tuple."""
+    def at_points(self, moment: Callable[..., tuple], function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return f(t, u, p) = ``function(u, p, M, response)`` for `contin`, with M = ``moment(u, p)`` on the directors.
+
+        p, a named tuple, has kappa_n and the law's parameters.
+        """
         response = self.response
-        return lambda M1, M2, M3, p: response(M1, M2, M3, p.kappa_n, p.nu)
+
+        def value(t, u, p):
+            M = moment(u, p)
+            return function(u, p, M, response(M[0], M[1], M[2], p.kappa_n, p.nu))
+
+        return value
 
     def linearized(self, moments, kappa_n: float, *parameters: float):
         """Return strains (K, 3) and compliance D2H (K, 3, 3) at moments on the directors (K, 3), by complex steps."""
@@ -325,10 +332,21 @@ class FiniteWidth(Law):
             raise ValueError(f"Gamma = {Gamma:g} must be a finite number from 0; the limit of a wide strip is the law 'ribbon'")
         return {"nu": nu, "Gamma": Gamma}
 
-    @functools.cached_property
-    def response_at(self) -> Callable[..., tuple]:
-        response = self.response
-        return lambda M1, M2, M3, p: response(M1, M2, M3, p.kappa_n, p.nu, p.Gamma)
+    def at_points(self, moment: Callable[..., tuple], function: Callable[..., Any]) -> Callable[..., Any]:
+        """As for all laws; the search for the strains runs once a point."""
+        search, response = finite_width.search, finite_width.response_from
+
+        def solve(t, u, p):
+            M = moment(u, p)
+            return search(M[0], M[2], p.kappa_n, p.nu, p.Gamma)
+
+        def value(t, u, p, w):
+            M = moment(u, p)
+            return function(u, p, M, response(M[0], M[1], M[2], p.kappa_n, p.nu, p.Gamma, w))
+
+        from contin import Pointwise
+
+        return Pointwise(value, solve)
 
     def strain_energy(self, strain, kappa_n: float, nu: float, Gamma: float) -> tuple:
         """As `finite_width.strain_energy`, with the constant that all laws leave out; a strain at a time."""

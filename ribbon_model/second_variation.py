@@ -114,13 +114,15 @@ class Equilibrium:
 @functools.cache
 def _compiled(law: Law) -> tuple:
     """Return the strains of a law as compiled functions of M1, M2, M3, and the colouring of their Jacobian."""
-    response = law.response_at
 
-    def strains(u, p):
-        H, w1, w2, w3, conjugate = response(u.M1, u.M2, u.M3, p)
+    def strains(u, p, M, response):
+        H, w1, w2, w3, conjugate = response
         return w1, w2, w3
 
-    batch = Batch([strains], [3], ("M1", "M2", "M3"), ("kappa_n", *law.parameters), times=False)
+    def moment(u, p):
+        return u.M1, u.M2, u.M3
+
+    batch = Batch([law.at_points(moment, strains)], [3], ("M1", "M2", "M3"), ("kappa_n", *law.parameters))
     return batch, batch.colouring([])
 
 

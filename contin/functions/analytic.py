@@ -23,6 +23,7 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.complex_step import REPLACED, ComplexStep
 from contin.functions.kernel import Kernel
+from contin.functions.pointwise import parts, searches
 
 #: Starts of messages of numba that say what is wrong with a user's function; the lines before them are about numba itself.
 _REASONS = ("No implementation", "Untyped", "Unknown", "Invalid")
@@ -51,7 +52,8 @@ def compile_batch(kernel: Kernel, functions: Sequence[Function]) -> Any:
         A function that cannot be compiled; the message says which and why.
     """
     rewriter = _Compiled()
-    compiled = {f"function{i}": rewriter.function(function) for i, function in enumerate(functions)}
+    compiled = {f"function{i}": rewriter.function(parts(function)[0]) for i, function in enumerate(functions)}
+    compiled |= {f"solve{k}": rewriter.function(solve) for k, solve in enumerate(searches(functions))}
     kernel.function.__globals__.update(compiled)
     try:
         return kernel.compiled

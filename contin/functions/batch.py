@@ -22,6 +22,7 @@ from contin.functions.complex_step import ComplexStep
 from contin.functions.kernel import Kernel
 from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, Vector
 from contin.functions.machine_code import Raised
+from contin.functions.pointwise import parts, searches
 from contin.functions.signature import Signature
 from contin.functions.sparsity import sparsity_pattern
 
@@ -32,9 +33,7 @@ def evaluate(
 ) -> None:
     for i in range(u.shape[0]):
 {real}
-    if jac.size == 0:
-        return
-    for i in range(u.shape[0]):
+{between}
         for colour in range(owner.shape[0]):
             for s in range(inputs[colour], inputs[colour + 1]):
                 work[inputs[s]] = STEP
@@ -45,6 +44,9 @@ def evaluate(
             for s in range(inputs[colour], inputs[colour + 1]):
                 work[inputs[s]] = 0.0
 """
+#: Between values and derivatives: a loop for each, or one for both, with what was found for the values.
+_OTHER_LOOP = "    if jac.size == 0:\n        return\n    for i in range(u.shape[0]):"
+_SAME_LOOP = "        if jac.size == 0:\n            continue"
 #: The complex step: no sum of it and a number of the problem is rounded to another number.
 _STEP = 2.0**-300
 
@@ -99,8 +101,10 @@ class Batch:
         self._colourings: dict[tuple[int, ...], Colouring] = {}
         rewriter = ComplexStep()
         for function in functions:
-            rewriter.function(function)
-        source = _source(self.signature, counts, [self.signature.fills(function) for function in functions])
+            rewriter.function(parts(function)[0])
+        for solve in searches(functions):
+            rewriter.function(solve)
+        source = _source(self.signature, functions, counts)
         rewriter.note(source, self.signature.states, self.signature.parameters)
         self._evaluate = _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
 
@@ -145,27 +149,43 @@ _NO_INPUTS, _NO_OWNER, _NO_WORK = np.empty(0, np.int64), np.empty((0, 0), np.int
 _NO_JACOBIAN = np.empty((0, 0, 0))
 
 
-def _source(signature: Signature, counts: Sequence[int], fills: Sequence[bool]) -> str:
+def _source(signature: Signature, functions: Sequence[Function], counts: Sequence[int]) -> str:
     """Return the generated kernel: every function called at point i, with real and with complex numbers."""
+    solves = searches(functions)
+    once = [f"w{k} = solve{k}({', '.join(_arguments(signature, True, 'float64'))})" for k in range(len(solves))]
     real: list[str] = []
     step: list[str] = []
     row = 0
-    for index, (count, fill) in enumerate(zip(counts, fills)):
-        real += _call(signature, index, count if fill else None, "float64")
-        step += _call(signature, index, count if fill else None, "complex128")
+    for index, (function, count) in enumerate(zip(functions, counts)):
+        solve = parts(function)[1]
+        found = "" if solve is None else f"w{solves.index(solve)}"
+        filled = count if signature.fills(function) else None
+        real += _call(signature, index, filled, found, "float64")
+        step += _call(signature, index, filled, found, "complex128")
         for j in range(max(count, 1)):
             value = f"r[{j}]" if count else "r"
             real.append(f"out[i, {row}] = {value}")
             step.append(f"work[{signature.inputs + row}] = complex({value}).imag")
             row += 1
     return _TEMPLATE.format(
-        real="\n".join(" " * 8 + line for line in real), complex="\n".join(" " * 12 + line for line in step),
-        inputs=signature.inputs,
+        real="\n".join(" " * 8 + line for line in [*once, *real]), complex="\n".join(" " * 12 + line for line in step),
+        inputs=signature.inputs, between=_SAME_LOOP if once else _OTHER_LOOP,
     )  # fmt: skip
 
 
-def _call(signature: Signature, index: int, filled: int | None, kind: str) -> list[str]:
-    """Return the lines that set r to the result of a function; ``filled``: the size of the array that it fills."""
+def _call(signature: Signature, index: int, filled: int | None, found: str, kind: str) -> list[str]:
+    """Return the lines that set r to the result of a function.
+
+    ``filled`` is the size of the array that it fills, ``found`` the name of what its search has found.
+    """
+    arguments = _arguments(signature, filled is None, kind) + [found] * bool(found)
+    if filled is None:
+        return [f"r = function{index}({', '.join(arguments)})"]
+    return [f"r = np.zeros({filled}, np.{kind})", f"function{index}({', '.join(arguments)}, r)"]
+
+
+def _arguments(signature: Signature, named: bool, kind: str) -> list[str]:
+    """Return the arguments of functions at point i: t, and named tuples or arrays."""
     arguments, slot = ["t[i]"] if signature.times else [], 0
     groups = [("U", "u[i, {}]", len(signature.states)), ("P", "p[{}]", len(signature.parameters))]
     if signature.ends:
@@ -176,10 +196,8 @@ def _call(signature: Signature, index: int, filled: int | None, kind: str) -> li
             numbers = [f"complex({number}, work[{slot + j}])" for j, number in enumerate(numbers)]
         slot += size
         inside = "".join(number + ", " for number in numbers)
-        arguments.append(f"{name}({inside})" if filled is None else f"np.array([{inside}])")
-    if filled is None:
-        return [f"r = function{index}({', '.join(arguments)})"]
-    return [f"r = np.zeros({filled}, np.{kind})", f"function{index}({', '.join(arguments)}, r)"]
+        arguments.append(f"{name}({inside})" if named else f"np.array([{inside}])")
+    return arguments
 
 
 #: Compiled kernels of this process, by their keys.

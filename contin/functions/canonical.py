@@ -27,6 +27,8 @@ from contin.errors import ProblemError
 from contin.functions import gradient
 from contin.functions.cache import run_kept_source
 from contin.functions.fingerprint import contents
+from contin.functions.pointwise import Pointwise
+from contin.functions.signature import argument_count
 
 #: Newton steps for the controls, and halvings of a step that does not lower -H. Damped steps on a convex function arrive.
 _NEWTON, _HALVINGS = 60, 40
@@ -102,11 +104,19 @@ def canonical(variation: Variation) -> Canonical:
     run_kept_source(f"v{rewriter.fingerprint()[:32]}.py", lambda: _Derivation(variation).text(), scope)
     if "pointwise" in scope:
         _check_starts(scope["pointwise"], variation)
+    functionals = {name: _of_point(scope, f"functional{i}") for i, name in enumerate(_columns(variation))}
     return Canonical(
-        scope["rhs"], scope["boundary"], scope.get("integrals"),
-        {name: scope[f"functional{i}"] for i, name in enumerate(_columns(variation))},
-        scope.get("legendre"), scope["SIGMAS"], scope["FIXED"],
+        _of_point(scope, "rhs"), scope["boundary"], _of_point(scope, "integrals"), functionals,
+        _of_point(scope, "legendre"), scope["SIGMAS"], scope["FIXED"],
     )  # fmt: skip
+
+
+def _of_point(scope: Mapping[str, Any], name: str) -> Any:
+    """Return a derived function of (t, u, p), with its search for the controls if it needs them; None if there is none."""
+    function = scope.get(name)
+    if function is None or argument_count(function) == 3:
+        return function
+    return Pointwise(function, scope["solve"])
 
 
 def _check_starts(pointwise: Any, variation: Variation) -> None:
@@ -269,19 +279,19 @@ class _Derivation:
         names = ", ".join(map(str, given))
         values = [convex, *slopes, *(second[i, j] for i, j in pairs)]
         self.helpers.append(self._function("pointwise", [*given, *self.w], [], values))
-        real = ", ".join(f"{name}.real" for name in map(str, given))
         outputs = ", ".join(["E", *(f"G{i}" for i in range(k)), *(f"A{i}_{j}" for i, j in pairs)])
         solve, exact = _elimination(k, True), _elimination(k, False)
         trial = ", ".join(f"V{i}" for i in range(k))
-        lines = [f"def controls({names}):"]
+        own = ", ".join(map(str, self.w))
+        lines = [f"def search({names}):"]
         lines += [f"    W{i} = {start!r}" for i, start in enumerate(self.variation.starts)]
-        call = f"pointwise({real}, {', '.join(map(str, self.w))})"
+        call = f"pointwise({names}, {own})"
         lines += [f"    {outputs} = {call}", f"    for iteration in range({_NEWTON}):", *("        " + line for line in solve)]
         lines += [f"        slope = {' + '.join(f'G{i} * D{i}' for i in range(k))}", "        part = 1.0"]
         lines += [f"        for halving in range({_HALVINGS}):"]
         lines += [f"            V{i} = W{i} + part * D{i}" for i in range(k)]
         lines += [
-            f"            F = pointwise({real}, {trial})[0]",
+            f"            F = pointwise({names}, {trial})[0]",
             "            if F <= E + 1e-4 * part * slope + 1e-14 * (1.0 + E * E) ** 0.5:",
             "                break",
             "            part = part * 0.5",
@@ -289,10 +299,13 @@ class _Derivation:
         lines += [f"        W{i} = W{i} + part * D{i}" for i in range(k)]
         settled = " and ".join(f"D{i} * D{i} <= {_SETTLED**2!r} * (1.0 + W{i} * W{i})" for i in range(k))
         lines += [f"        {outputs} = {call}", f"        if {settled}:", "            break"]
-        lines += [f"    {outputs} = pointwise({names}, {', '.join(map(str, self.w))})", *("    " + line for line in exact)]
+        lines += [f"    return ({own},)", "", f"def controls({names}, {own}):"]
+        lines += [f"    {outputs} = {call}", *("    " + line for line in exact)]
         lines += [f"    return ({', '.join(f'W{i} + D{i}' for i in range(k))},)", ""]
         self.helpers.append("\n".join(lines))
-        self.search = f"{', '.join(map(str, self.w))}, = controls({names})"
+        head = ["    " + line for line in self._arguments()]
+        self.helpers.append("\n".join(["def solve(t, u, p):", *head, f"    return search({names})", ""]))
+        self.given = names
 
     # --- text ----------------------------------------------------------------------------------------------------
 
@@ -316,17 +329,23 @@ class _Derivation:
 
     def _of_point(self, name: str, values: Sequence[Any], single: bool = False) -> str:
         """Return the text of a function of (t, u, p), with the controls where the values need them."""
-        v = self.variation
         values = [value.subs(self.known, simultaneous=True) for value in map(self.sympy.sympify, values)]
         if single and not values[0].free_symbols:
             values[0] = values[0] + 0.0
-        head = ["T = t"]
-        head += [f"{symbol} = u.{state}" for symbol, state in zip(self.x, v.states)]
-        head += [f"{symbol} = u.lam_{state}" for symbol, state in zip(self.lam, v.states)]
-        head += self._parameters()
+        head, arguments = self._arguments(), ["t", "u", "p"]
         if any(value.free_symbols & set(self.w) for value in values):
-            head.append(self.search)
-        return self._function(name, ["t", "u", "p"], head, values, single)
+            found = ", ".join(f"w[{i}]" for i in range(len(self.w)))
+            head.append(f"{', '.join(map(str, self.w))}, = controls({self.given}, {found})")
+            arguments.append("w")
+        return self._function(name, arguments, head, values, single)
+
+    def _arguments(self) -> list[str]:
+        """Return the lines that take t, u and p apart."""
+        v = self.variation
+        lines = ["T = t"]
+        lines += [f"{symbol} = u.{state}" for symbol, state in zip(self.x, v.states)]
+        lines += [f"{symbol} = u.lam_{state}" for symbol, state in zip(self.lam, v.states)]
+        return lines + self._parameters()
 
     def _parameters(self) -> list[str]:
         v = self.variation

@@ -18,8 +18,9 @@ import numpy as np
 
 from contin.arrays import Function, Pattern
 from contin.functions.complex_step import analytic
+from contin.functions.pointwise import parts
 from contin.functions.rewriting import Rewriter
-from contin.functions.signature import Signature
+from contin.functions.signature import Signature, result_count
 
 #: With more inputs the pattern is not looked for: the sets of inputs, kept as bits, would take longer than they save.
 _MOST_INPUTS = 500
@@ -98,6 +99,10 @@ def _traced(function: Function, count: int, signature: Signature) -> list[Any]:
             continue
         values = [next(marks) for _ in names]
         arguments.append(np.array(values, dtype=object) if fills else _tuple(names, values))
+    function, solve = parts(function)
+    if solve is not None:  # it decides by the numbers that it is given: what it finds depends on all of them
+        found = result_count(solve, signature.arguments, "a search at a point")
+        arguments.append((_TracingNumber((1 << signature.inputs) - 1),) * found)
     traceable = _Traceable().function(function)
     if fills:
         result = np.zeros(count, dtype=object)
