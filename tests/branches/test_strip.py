@@ -3,18 +3,37 @@
 import math
 import re
 import shlex
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from branches.config import ConfigError, DiagramConfig, dump, load, parse
-from branches.strip import assumptions, buckled, circles, deviations, main
+from branches.strip import main
+from branches.strip_report import assumptions, deviations
+from branches.strip_states import buckled, circles, ways_out
+from branches.strip_wants import answer, barrier, barriers_at
 from ribbon_model.exact_finite_width import curve
 from ribbon_model.laws import FINITE_WIDTH, RIBBON
-from ribbon_model.linear import thresholds
+from ribbon_model.linear import energy_interval, thresholds
 from ribbon_model.strip import Strip
 
 BLADE = Strip(0.00565, 0.00065, 3.0, 0.143, 0.3, 210e9)
 TAPE = Strip(0.016, 0.00012, 0.6, 0.03, 0.3, 200e9)
+OPTIONS = [
+    "--width",
+    ".01",
+    "--thickness",
+    "1e-4",
+    "--length",
+    "1",
+    "--natural-radius",
+    "1",
+    "--poisson-ratio",
+    ".3",
+    "--youngs-modulus",
+    "1e9",
+]
 SCENE = (
     "m: 1\nn: 2\nstrip: {width: .016, thickness: .00012, length: .6, natural_radius: .03, poisson_ratio: .3, "
     "youngs_modulus: 200.0e9}\n"
@@ -58,6 +77,63 @@ def test_the_strain_is_the_largest_principal_one():
     half = TAPE.thickness / 2 * 2 * math.pi / TAPE.length
     assert TAPE.strain(-2.0) == pytest.approx(2 * half) and TAPE.strain(0.0, 3.0) == pytest.approx(3 * half)
     assert TAPE.strain(3.0, 2.0) == pytest.approx(4 * half)  # eigenvalues of [[3, 2], [2, 0]]: 4 and -1
+
+
+def saddle_energy(strip, m, n):
+    """Return the energy in J of the state at kappa_n on a primary branch that starts above it, by its quadrature."""
+    end = curve(m, n, strip.poisson_ratio, strip.Gamma, kappa_limits=(strip.kappa_n, 100.0))[-1]
+    assert end.label == "EP"
+    return (end.energy + strip.kappa_n**2 / 2) * strip.energy_unit
+
+
+@pytest.mark.full
+def test_barriers_are_those_of_the_quadrature():
+    """The blade: its saddles lie on (1, 2), between one turn and three, and on (3, 4), between three and five."""
+    rings, (others, _) = circles(BLADE), buckled(BLADE)
+    ways = ways_out([*rings, *others])
+    assert {name: (way.saddle, way.behind) for name, way in ways.items()} == {
+        "single loop": ("buckled (1, 2)", "3-fold circle"),
+        "3-fold circle": ("buckled (3, 4)", "5-fold circle"),
+        "5-fold circle": ("buckled (3, 4)", "3-fold circle"),
+    }
+    for state in rings[:3]:
+        over = (1, 2) if state.m == 1 else (3, 4)
+        assert ways[state.name].height == pytest.approx(saddle_energy(BLADE, *over) - state.energy, rel=1e-8)
+        assert barrier(BLADE, state.m) == pytest.approx(ways[state.name].height, rel=1e-10)
+
+
+def test_a_barrier_vanishes_where_stability_ends():
+    """Of the 3-fold circle at both ends of its stable interval, where its way out, (1, 2) or (3, 4), bifurcates."""
+    ends = [3 * end for end in energy_interval(FINITE_WIDTH, 3, 0.3, 0.1)]
+    inside, outside = [ends[0] + 0.05, ends[1] - 0.05], [ends[0] - 0.05, ends[1] + 0.05]
+    near, further = barriers_at(3, inside, 0.3, 0.1), barriers_at(3, [ends[0] + 0.1, ends[1] - 0.1], 0.3, 0.1)
+    assert (near > 0).all() and (further > 3 * near).all()  # quadratic: a subcritical pitchfork
+    assert all(map(math.isnan, barriers_at(3, outside, 0.3, 0.1)))
+
+
+@pytest.mark.full
+def test_dimensions_for_a_barrier():
+    printed = answer(BLADE, 3, 0.3)
+    radii, widths, thicknesses = (re.findall(r"([\d.]+) mm", line) for line in printed.splitlines()[1:])
+    assert (len(radii), len(widths), len(thicknesses)) == (2, 1, 1)
+    for name, found in (("natural_radius", radii), ("width", widths), ("thickness", thicknesses)):
+        for value in found:
+            assert barrier(replace(BLADE, **{name: float(value) / 1e3}), 3) == pytest.approx(0.3, rel=1e-2)  # 4 digits printed
+    assert "none between 28.6 and 715 mm" in answer(BLADE, 3, 5.0)
+
+
+def test_a_chart_is_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("branches.strip_wants._GAMMAS", np.array([0.1, 1.0]))
+    monkeypatch.setattr("branches.strip_wants._PARTS", np.linspace(0.1, 0.9, 3))
+    assert main([*OPTIONS, "--chart", str(tmp_path / "chart.png"), "--turns", "3"]) == 0
+    assert capsys.readouterr().out == f"written to {tmp_path / 'chart.png'}\n"
+    assert (tmp_path / "chart.png").stat().st_size > 10_000
+
+
+def test_numbers_in_other_units_are_doubted():
+    in_millimetres = Strip(5.65, 0.65, 3000.0, 143.0, 0.3, 210.0)
+    names = [line.split()[1] for line in assumptions(in_millimetres, circles(in_millimetres)) if "unusual" in line]
+    assert names == ["width", "thickness", "length", "youngs_modulus"]
 
 
 def test_cautions():
@@ -135,11 +211,14 @@ def test_scenes_that_are_refused(settings, words):
         ({"--width": "x"}, "argument --width: invalid float value: 'x'"),
         ({"--natural-radius": "nan"}, "natural_radius: nan must be positive"),
         ({"--yield-strain": "-1"}, "yield_strain: -1 must be positive and finite"),
+        ({"--want": "0"}, "want: 0 must be positive and finite"),
+        ({"--want": "1", "--turns": "2"}, "turns: 2 must be odd, from 1 to 15"),
+        ({"--turns": "3"}, "turns: it belongs to want or chart"),
+        ({"--chart": "chart.xyz"}, "chart.xyz"),
     ],
 )
 def test_strips_that_are_refused(changed, words, capsys):
-    options = {"--width": ".01", "--thickness": "1e-4", "--length": "1", "--natural-radius": "1", "--poisson-ratio": ".3"}
-    options |= {"--youngs-modulus": "1e9", **changed}
+    options = dict(zip(OPTIONS[::2], OPTIONS[1::2])) | changed
     try:
         code = main([word for option in options.items() for word in option])
     except SystemExit as left:

@@ -1,0 +1,99 @@
+"""Barriers: the states that the energy passes on its lowest way out of a stable state of a closed strip.
+
+On the lowest way from one minimum of the energy to another, the highest state is an equilibrium of index 1, a saddle. From a
+saddle the energy falls to two sides, along its one unstable direction; `sides` follows it down on both
+(`ribbon_model.descent`). The barrier of a stable state is the energy of the lowest saddle that has the state on one side, less
+its own. Only saddles that are given are considered: another one may be lower.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from ribbon_model.descent import descend, modes
+from ribbon_model.second_variation import Equilibrium
+from ribbon_model.segments import Strip, discretized
+
+#: Segments to begin with, and at most: their number is doubled where both ways down lead to the same state, because the saddle
+#: of the segments lies further from that of the continuous strip than the kick leads.
+SEGMENTS, _MOST = 96, 400
+#: The kick: root mean square change of the strains, over 2 pi/L.
+_KICK = 0.02
+#: Difference of the strains from those of a circle, and of energies of the same state on the same segments.
+_PLANAR, _SAME = 1e-6, 1e-6
+
+Name = TypeVar("Name")
+
+
+@dataclass(frozen=True)
+class Barrier(Generic[Name]):
+    """The way out of a stable state.
+
+    Attributes
+    ----------
+    height : float
+        Energy of the saddle less that of the stable state.
+    saddle, behind
+        The saddle, and the state on its other side (None if that is none of the given ones).
+    """
+
+    height: float
+    saddle: Name
+    behind: Name | None
+
+
+def sides(saddle: Equilibrium) -> tuple[Strip, Strip] | None:
+    """Return the strips at rest on both sides of a state of index 1; None where they cannot be told apart."""
+    segments = SEGMENTS
+    while segments <= _MOST:
+        strip = discretized(saddle, segments)
+        mode = modes(strip, 1)[1][:, 0]
+        ways = [descend(strip.moved(sign * _KICK * mode)) for sign in (1, -1)]
+        first, last = (way.end for way in ways)
+        if all(way.rests for way in ways) and abs(first.energy - last.energy) > _SAME * (1 + abs(first.energy)):
+            return first, last
+        segments *= 2
+    return None
+
+
+def covering_index(strip: Strip) -> int | None:
+    """Return the covering index of a strip that is a planar circle (negative if turned inside out), None for all others."""
+    mean = float(strip.strains[:, 0].mean())
+    return round(mean) if np.abs(strip.strains - [mean, 0, 0]).max() < _PLANAR else None
+
+
+def is_at(strip: Strip, state: Equilibrium) -> bool:
+    """Return whether a strip at rest is a buckled state, by their energies on the same segments."""
+    energy = discretized(state, len(strip.strains)).energy
+    return abs(strip.energy - energy) < 100 * _SAME * (1 + abs(energy))
+
+
+def barriers(
+    energies: Sequence[tuple[Name, float]], saddles: Iterable[tuple[Name, float, Name | None, Name | None]]
+) -> dict[Name, Barrier[Name]]:
+    """Return the lowest way out of each stable state that has one.
+
+    Parameters
+    ----------
+    energies : sequence of (name, energy)
+        The stable states.
+    saddles : iterable of (name, energy, side, side)
+        Saddles, with the names of the stable states on both sides (None: none of the given ones).
+
+    Examples
+    --------
+    >>> found = barriers([("low", 0.0), ("high", 1.0)], [("pass", 1.5, "low", "high"), ("peak", 3.0, "low", None)])
+    >>> found["high"]
+    Barrier(height=0.5, saddle='pass', behind='low')
+    """
+    known, lowest = dict(energies), {}
+    for name, energy, *ends in saddles:
+        for here, there in (ends, ends[::-1]):
+            if here in known and here != there:
+                way = Barrier(energy - known[here], name, there)
+                lowest[here] = min((way, lowest.get(here, way)), key=lambda barrier: barrier.height)
+    return lowest
