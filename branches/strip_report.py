@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from branches.strip_states import State, buckled, circles, ways_out
+from branches.strip_states import State, buckled, by_hand, circles, ways_out
 from ribbon_model.barriers import Barrier
+from ribbon_model.folding import Folding
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.linear import energy_interval, thresholds
 from ribbon_model.strip import Strip
@@ -56,7 +57,9 @@ def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) 
     """Return what the command prints, one screen; unless ``quiet``, a line of progress is shown meanwhile."""
     rings = circles(strip)
     others, folds = buckled(strip, quiet)
-    barriers = ways_out([*rings, *others], quiet)
+    states = [*rings, *others]
+    barriers = ways_out(states, quiet)
+    foldings = by_hand(strip, states, barriers, quiet)
     lines = [
         f"Gamma = w^2/(h L/2pi) = {strip.Gamma:.4g}, natural curvature kappa_n L/2pi = {strip.kappa_n:.4g}",
         f"law: {_law(strip)}",
@@ -72,7 +75,8 @@ def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) 
         *_buckled_lines(others, yield_strain),
         *_fate(rings, [state for state in others if state.stable]),
         "",
-        *_ways_out([state for state in (*rings, *others) if state.stable], barriers),
+        *_ways_out([state for state in states if state.stable], barriers),
+        *_by_hand(strip, foldings),
     ]
     return "\n".join(lines) + "\n"
 
@@ -160,6 +164,19 @@ def _ways_out(stable: list[State], barriers: Mapping[str, Barrier]) -> Iterator[
         behind = "a state not listed here" if way.behind is None else way.behind
         released = "" if way.behind is None else f"{state.energy + way.height - energies[way.behind]:10.4g}"
         yield f"{state.name:18s}  {way.height:10.4g}  {way.saddle:16s}  {behind:23s}{released}".rstrip()
+
+
+def _by_hand(strip: Strip, foldings: Mapping[str, Folding]) -> Iterator[str]:
+    """Yield the couples that take circles to their saddles."""
+    if foldings:
+        yield ""
+        yield "by hand, two opposite points turned against each other about the line between them:"
+    for name, path in foldings.items():
+        couple, angle, end = path.couples[path.peak] * strip.moment_unit, path.angles[path.peak], path.angles[-1]
+        yield (
+            f"{name:18s}  {couple:10.4g} N m at most, at {math.degrees(angle):.0f} degrees; "
+            f"beyond {math.degrees(end):.0f} degrees it goes on by itself"
+        )
 
 
 def _millimetres(metres: float) -> str:

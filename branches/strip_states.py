@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from contin import Settings, follow
 from ribbon_model import convexity, linear, stability
 from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
 from ribbon_model.equilibrium import LENGTH
+from ribbon_model.folding import Folding, folding
 from ribbon_model.laws import FINITE_WIDTH
 from ribbon_model.second_variation import Equilibrium
 from ribbon_model.seeds import primary_branch
@@ -26,6 +27,8 @@ _COVERINGS, _MOST_COVERINGS = 7, 15
 _REACH = 40.0
 #: States whose energies and conjugate curvatures differ by less are the same.
 _SAME = 1e-8
+#: The same for energies of saddles reached by two methods, each on a mesh of its own.
+_SAME_SADDLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -152,6 +155,21 @@ def ways_out(states: Sequence[State], quiet: bool = True) -> dict[str, Barrier]:
                 found.append((saddle.name, saddle.energy, *(_name(end, stable) for end in ends)))
             progress.part_done()
     return barriers([(state.name, state.energy) for state in stable], found)
+
+
+def by_hand(strip: Strip, states: Sequence[State], ways: Mapping[str, Barrier], quiet: bool = True) -> dict[str, Folding]:
+    """Return, by name, the paths on which couples at two opposite points take stable circles to their lowest saddles."""
+    energies, found = {state.name: state.energy for state in states}, {}
+    rings = [state for state in states if state.m and state.name in ways]
+    with Progress("foldings", len(rings), quiet) as progress:
+        for ring in rings:
+            progress.part(ring.name)
+            path = folding(FINITE_WIDTH, ring.m, strip.kappa_n, strip.poisson_ratio, strip.Gamma)
+            end = math.nan if path is None else _energy(strip, path.energies[-1])
+            if path is not None and abs(end - energies[ways[ring.name].saddle]) < _SAME_SADDLE * strip.energy_unit:
+                found[ring.name] = path
+            progress.part_done()
+    return found
 
 
 def _name(end: Segments, stable: Sequence[State]) -> str | None:

@@ -104,7 +104,7 @@ class Domain:
         states = [np.cos(half_angle), np.sin(half_angle), zero, zero]
         if "x1" in system.problem.states:
             states += [zero, (np.cos(2 * half_angle) - 1) / m, np.sin(2 * half_angle) / m]
-        values = dict.fromkeys(self.free, 0.0) | {"kappa_n": kappa_n, "M1": m - kappa_n if moment is None else moment}
+        values = dict.fromkeys(system.free, 0.0) | {"kappa_n": kappa_n, "M1": m - kappa_n if moment is None else moment}
         return system.pack(np.array(states).T, values)
 
     def __repr__(self) -> str:
