@@ -1,0 +1,68 @@
+"""Segments: parts of a long mesh that are assembled, eliminated and solved for independently, by several threads.
+
+Their number depends on the size of the matrix only, and so does the order of the arithmetic: results have the same bits for
+any number of threads. A matrix that is not large is one segment.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin import threads
+from contin.arrays import Indices
+from contin.functions.kernel_parts import IndexVector
+
+#: Numbers in the blocks of all intervals from which on there are segments: below, threads would gain less than .5 ms a matrix.
+#: With ten times fewer a factorization takes as long with two threads as with one.
+_LARGE = 2**20
+#: Segments of a large matrix: more than cores usually, so that a core that is busy with something else gets fewer of them.
+#: With ten times more, the elimination of the points between them, on one core, takes a tenth of the time.
+_MOST = 16
+
+
+class Share(NamedTuple):
+    """What one call of a kernel does: stage ``stage`` for the segments ``first`` to ``last``, without ``last``; or all of it.
+
+    ``starts`` (S + 1,) are the first intervals of the segments, and N. ``stage`` is `ALL` for all stages.
+    """
+
+    starts: IndexVector
+    first: int
+    last: int
+    stage: int
+
+
+#: All stages, one after the other.
+ALL = -1
+
+
+def share(intervals: int, numbers: int) -> Share:
+    """Return the whole of a matrix with this many intervals and ``numbers`` in their blocks."""
+    return _share(intervals, min(_MOST, intervals // 2) if numbers >= _LARGE else 1)
+
+
+@functools.lru_cache(maxsize=32)  # each matrix of a mesh asks for it
+def _share(intervals: int, segments: int) -> Share:
+    starts: Indices = np.arange(segments + 1) * intervals // segments
+    return Share(starts, 0, segments, ALL)
+
+
+def run(kernel: Callable[[Share], Any], whole: Share, stages: Sequence[bool]) -> list[Any]:
+    """Call a kernel once for a matrix that is one segment, or else stage by stage; return the results of all calls.
+
+    ``stages`` says for each stage whether segments are independent in it; then they are calls of their own, in several threads.
+    """
+    if whole.last == 1 or threads.count() == 1:
+        return [kernel(whole)]
+    results: list[Any] = []
+    for stage, independent in enumerate(stages):
+        if independent:
+            shares = [whole._replace(first=s, last=s + 1, stage=stage) for s in range(whole.last)]
+            results += threads.each(kernel, shares)
+        else:
+            results.append(kernel(whole._replace(stage=stage)))
+    return results
