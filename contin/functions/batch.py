@@ -8,13 +8,16 @@ edit of a constant or of a helper in another file compiles anew.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import time
 from collections import namedtuple
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from contin import threads
 from contin.arrays import Array, Function, Indices, Pattern
 from contin.errors import ProblemError
 from contin.functions.colouring import Colouring, colouring
@@ -47,6 +50,21 @@ def evaluate(
 """
 #: The complex step: no sum of it and a number of the problem is rounded to another number.
 _STEP = 2.0**-300
+
+
+class _Places(NamedTuple):
+    """Places where functions are evaluated, as in `Batch.values`, and what is filled there: values and Jacobian."""
+
+    t: Array
+    u: Array
+    v: Array
+    out: Array
+    jac: Array
+
+    def parts(self) -> list[_Places]:
+        """Return all places in `_PARTS` parts."""
+        ends = [len(self.u) * i // _PARTS for i in range(_PARTS + 1)]
+        return [_Places(*(array[a:b] for array in self)) for a, b in zip(ends, ends[1:])]
 
 
 class Batch:
@@ -102,13 +120,14 @@ class Batch:
             rewriter.function(function)
         source = _source(self.signature, counts, [self.signature.fills(function) for function in functions])
         rewriter.note(source, self.signature.states, self.signature.parameters)
+        self._seconds: dict[int, float] = {}  # a place takes, by the number of colours
         self._evaluate = _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
         out = np.empty((len(u), self.count))
         try:
-            self._evaluate(t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN)
+            self._fill(_Places(t, u, v, out, _NO_JACOBIAN), p, _NO_COLOURS)
         except Raised as error:
             raise error.exception() from None
         return out
@@ -117,7 +136,7 @@ class Batch:
         """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
         out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, colours.width))
         try:
-            self._evaluate(t, u, v, p, colours.inputs, colours.owner, np.zeros(self.signature.inputs + self.count), out, jac)
+            self._fill(_Places(t, u, v, out, jac), p, colours)
         except Raised as error:
             exception = error.exception()
             if not isinstance(exception, ZeroDivisionError):
@@ -125,6 +144,31 @@ class Batch:
             out.fill(np.nan)  # the quotient of real numbers is infinite there, that of complex ones an error
             jac.fill(np.nan)
         return out, jac
+
+    def _fill(self, places: _Places, p: Array, colours: Colouring) -> None:
+        """Fill values and derivatives, by several threads where one took long before.
+
+        Raises
+        ------
+        Raised
+            What one call for all places raises: the same for any number of threads.
+        """
+
+        def fill(part: _Places) -> None:
+            work = np.zeros(self.signature.inputs + self.count) if len(colours.owner) else _NO_WORK
+            self._evaluate(part.t, part.u, part.v, p, colours.inputs, colours.owner, work, part.out, part.jac)
+
+        count, kind = len(places.u), len(colours.owner)
+        if count < _MANY:
+            fill(places)
+            return
+        if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
+            with contextlib.suppress(Raised):  # parts are not in the order of one call
+                threads.each(fill, places.parts())
+                return
+        began = time.perf_counter()
+        fill(places)
+        self._seconds[kind] = (time.perf_counter() - began) / count
 
     def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:
         """Return the colouring for derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters."""
@@ -140,9 +184,15 @@ class Batch:
         return sparsity_pattern(self._functions, self._counts, self.signature)
 
 
-#: Stand for a colouring and a Jacobian that are not asked for.
-_NO_INPUTS, _NO_OWNER, _NO_WORK = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0)
-_NO_JACOBIAN = np.empty((0, 0, 0))
+#: Stand for a colouring, work space and a Jacobian that are not asked for.
+_NO_COLOURS = Colouring(np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0, np.int64))
+_NO_WORK, _NO_JACOBIAN = np.empty(0), np.empty((0, 0, 0))
+#: Fewer places are evaluated by one thread. With ten times fewer, problems of all sizes would be timed, at 1 us a call.
+_MANY = 256
+#: So are those that take fewer seconds. Ten times fewer would be the time that it takes to wake another thread.
+_LONG = 0.5e-3
+#: Parts that several threads share: more than cores usually, so that a core that is busy with something else gets fewer.
+_PARTS = 16
 
 
 def _source(signature: Signature, counts: Sequence[int], fills: Sequence[bool]) -> str:
