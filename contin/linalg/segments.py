@@ -42,7 +42,7 @@ ALL = -1
 
 def share(intervals: int, numbers: int) -> Share:
     """Return the whole of a matrix with this many intervals and ``numbers`` in their blocks."""
-    return _share(intervals, min(_MOST, intervals // 2) if numbers >= _LARGE else 1)
+    return _share(intervals, max(1, min(_MOST, intervals // 2)) if numbers >= _LARGE else 1)
 
 
 @functools.lru_cache(maxsize=32)  # each matrix of a mesh asks for it
