@@ -381,7 +381,7 @@ def factorize(
 
     ``work`` holds the local and the border blocks and takes the result; ``first`` and ``last`` are those of the `Blocks`.
     ``corners`` (S, r, k) are the corner of the `Blocks` for the first segment, zero for the others; they are overwritten.
-    ``carried`` (S, n + r, 2 n + k) is scratch space. The first stage of a `Share` condenses segments, the second one joins them.
+    ``carried`` (S, n + r, 2 n + k) is scratch space. The first stage of a `Share` condenses segments, the second joins them.
     The sign is that of the share; the product of all is the sign of the determinant.
     """
     sign = 1.0

@@ -70,9 +70,11 @@ class Vectors(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """What all segments share: ``rest`` is the right-hand side, and then the solution, behind the collocation rows (n + k,),
-    ``dense`` (2 n + k,) are entries of the dense rest, ``known`` and ``border`` as in `Vectors`, and ``pair`` (S + 1, 2 n) those
-    of the mesh point on the left of each segment [and what is left for the last mesh point].
+    """The vectors that all segments share.
+
+    ``rest`` (n + k,) is the right-hand side behind the collocation rows, and then the solution there. ``dense`` (2 n + k,) are
+    entries of the dense rest, ``known`` and ``border`` as in `Vectors`. ``pair`` (S + 1, 2 n) belongs to the mesh points on the
+    left of the segments, and its last entries to the last mesh point.
     """
 
     rest: int

@@ -140,12 +140,7 @@ def test_what_functions_raise_is_the_same(function, order, use):
         use(count)
         batch = Batch([function], [1], ["x"], ["a"])
         for _ in range(2):  # the first time it is timed
-            found = []
-            for evaluate in (lambda: batch.values(u[:, 0], u, none, p), lambda: all_of(batch, u, none, p)):
-                try:
-                    found.append(np.nan_to_num(evaluate(), nan=-1.0).tolist())
-                except Exception as error:
-                    found.append((type(error), error.args))
+            found = [outcome(evaluate, batch, u, none, p) for evaluate in (values, jacobian)]
             known = known or found
             assert found == known
     assert function is quotient or known[0] == (
@@ -153,7 +148,19 @@ def test_what_functions_raise_is_the_same(function, order, use):
     )
 
 
-def all_of(batch, u, none, p):
+def outcome(evaluate, *given):
+    """What is returned or raised, so that it can be compared."""
+    try:
+        return np.nan_to_num(evaluate(*given), nan=-1.0).tolist()
+    except Exception as error:
+        return type(error), error.args
+
+
+def values(batch, u, none, p):
+    return batch.values(u[:, 0], u, none, p)
+
+
+def jacobian(batch, u, none, p):
     return np.concatenate([array.ravel() for array in batch.jacobian(u[:, 0], u, none, p, batch.colouring([0]))])
 
 
