@@ -194,7 +194,7 @@ class Collocation(System):
         )  # fmt: skip
         tables = Tables(self.basis.value, self.basis.slope, self.basis.weights)
         given = self._layout, tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
-        run(lambda part: assemble(*given, part), share(self.intervals, blocks.local.size), (True, False))
+        run(assemble, given, share(self.intervals, blocks.local.size), (True, False))
         return self._residual(x, field, boundary), blocks
 
     def linearize(

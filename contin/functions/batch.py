@@ -13,7 +13,7 @@ import functools
 import time
 from collections import namedtuple
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -50,21 +50,6 @@ def evaluate(
 """
 #: The complex step: no sum of it and a number of the problem is rounded to another number.
 _STEP = 2.0**-300
-
-
-class _Places(NamedTuple):
-    """Places where functions are evaluated, as in `Batch.values`, and what is filled there: values and Jacobian."""
-
-    t: Array
-    u: Array
-    v: Array
-    out: Array
-    jac: Array
-
-    def parts(self) -> list[_Places]:
-        """Return all places in `_PARTS` parts."""
-        ends = [len(self.u) * i // _PARTS for i in range(_PARTS + 1)]
-        return [_Places(*(array[a:b] for array in self)) for a, b in zip(ends, ends[1:])]
 
 
 class Batch:
@@ -127,7 +112,7 @@ class Batch:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
         out = np.empty((len(u), self.count))
         try:
-            self._fill(_Places(t, u, v, out, _NO_JACOBIAN), p, _NO_COLOURS)
+            self._run((t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN))
         except Raised as error:
             raise error.exception() from None
         return out
@@ -135,8 +120,9 @@ class Batch:
     def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
         """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
         out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, colours.width))
+        work = np.zeros(self.signature.inputs + self.count)
         try:
-            self._fill(_Places(t, u, v, out, jac), p, colours)
+            self._run((t, u, v, p, colours.inputs, colours.owner, work, out, jac))
         except Raised as error:
             exception = error.exception()
             if not isinstance(exception, ZeroDivisionError):
@@ -145,29 +131,25 @@ class Batch:
             jac.fill(np.nan)
         return out, jac
 
-    def _fill(self, places: _Places, p: Array, colours: Colouring) -> None:
-        """Fill values and derivatives, by several threads where one took long before.
+    def _run(self, given: _Arguments) -> None:
+        """Call the kernel, for many places in several threads where one took long before.
 
         Raises
         ------
         Raised
             What one call for all places raises: the same for any number of threads.
         """
-
-        def fill(part: _Places) -> None:
-            work = np.zeros(self.signature.inputs + self.count) if len(colours.owner) else _NO_WORK
-            self._evaluate(part.t, part.u, part.v, p, colours.inputs, colours.owner, work, part.out, part.jac)
-
-        count, kind = len(places.u), len(colours.owner)
+        count = len(given[1])
         if count < _MANY:
-            fill(places)
+            self._evaluate(*given)
             return
+        kind = len(given[5])
         if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
             with contextlib.suppress(Raised):  # parts are not in the order of one call
-                threads.each(fill, places.parts())
+                threads.each(lambda part: self._evaluate(*part), _parts(given))
                 return
         began = time.perf_counter()
-        fill(places)
+        self._evaluate(*given)
         self._seconds[kind] = (time.perf_counter() - began) / count
 
     def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:
@@ -184,15 +166,24 @@ class Batch:
         return sparsity_pattern(self._functions, self._counts, self.signature)
 
 
-#: Stand for a colouring, work space and a Jacobian that are not asked for.
-_NO_COLOURS = Colouring(np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0, np.int64))
-_NO_WORK, _NO_JACOBIAN = np.empty(0), np.empty((0, 0, 0))
-#: Fewer places are evaluated by one thread. With ten times fewer, problems of all sizes would be timed, at 1 us a call.
+#: Stand for a colouring and a Jacobian that are not asked for.
+_NO_INPUTS, _NO_OWNER, _NO_WORK = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0)
+_NO_JACOBIAN = np.empty((0, 0, 0))
+#: Fewer places are evaluated by one thread, and not timed. Ten times fewer would hardly ever take long.
 _MANY = 256
 #: So are those that take fewer seconds. Ten times fewer would be the time that it takes to wake another thread.
 _LONG = 0.5e-3
 #: Parts that several threads share: more than cores usually, so that a core that is busy with something else gets fewer.
 _PARTS = 16
+#: The arguments of the generated kernel.
+_Arguments = tuple[Array, Array, Array, Array, Indices, Indices, Array, Array, Array]
+
+
+def _parts(given: _Arguments) -> list[_Arguments]:
+    """Return the kernel's arguments for all places in `_PARTS` parts, each with work space of its own."""
+    t, u, v, p, inputs, owner, work, out, jac = given
+    ends = [len(u) * i // _PARTS for i in range(_PARTS + 1)]
+    return [(t[a:b], u[a:b], v[a:b], p, inputs, owner, work.copy(), out[a:b], jac[a:b]) for a, b in zip(ends, ends[1:])]
 
 
 def _source(signature: Signature, counts: Sequence[int], fills: Sequence[bool]) -> str:

@@ -61,11 +61,15 @@ class Factorization:
         )  # fmt: skip
         segments = self._whole.last
         self._unknowns, self._work_size = intervals * rows + n + k, work_size(segments, intervals, rows, n, r, size)
-        corners = np.zeros((segments, r, k))
-        corners[0] = corner
-        given = layout, self._factors, corners, first, last, np.empty((segments, n + r, 2 * n + k))
+        carried = np.empty((segments, n + r, size))
         #: Sign of the determinant up to a factor that depends on the shape only.
-        self.sign = math.prod(run(lambda part: factorize(*given, part), self._whole, (True, False)))
+        self.sign: float
+        if segments == 1:
+            self.sign = factorize(layout, self._factors, corner[None], first, last, carried, self._whole)
+        else:
+            corners = np.concatenate([corner[None], np.zeros((segments - 1, r, k))])
+            given = layout, self._factors, corners, first, last, carried
+            self.sign = math.prod(run(factorize, given, self._whole, (True, False)))
 
     def solve(self, b: Array) -> Array:
         """Return the x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""
@@ -80,12 +84,10 @@ class Factorization:
         given = np.ascontiguousarray(given, dtype=float)
         rows = given.reshape(-1, self._unknowns)
         result, work = np.empty(rows.shape), np.empty((self._work_size, LANES))
-        together = len(rows) if self._whole.last == 1 else LANES
-        for first in range(0, len(rows), max(together, 1)):
-            these = slice(first, first + together)
-            run(
-                lambda part, these=these: kernel(self._layout, self._factors, rows[these], result[these], work, part),
-                self._whole,
-                (True, False, True),
-            )
+        if self._whole.last == 1:
+            kernel(self._layout, self._factors, rows, result, work, self._whole)
+        else:
+            for first in range(0, len(rows), LANES):
+                these = slice(first, first + LANES)
+                run(kernel, (self._layout, self._factors, rows[these], result[these], work), self._whole, (True, False, True))
         return result.reshape(given.shape)

@@ -51,18 +51,18 @@ def _share(intervals: int, segments: int) -> Share:
     return Share(starts, 0, segments, ALL)
 
 
-def run(kernel: Callable[[Share], Any], whole: Share, stages: Sequence[bool]) -> list[Any]:
-    """Call a kernel once for a matrix that is one segment, or else stage by stage; return the results of all calls.
+def run(kernel: Callable[..., Any], given: Sequence[Any], whole: Share, stages: Sequence[bool]) -> list[Any]:
+    """Return the results of ``kernel(*given, share)``: one call for a matrix that is one segment, or else stage by stage.
 
     ``stages`` says for each stage whether segments are independent in it; then they are calls of their own, in several threads.
     """
     if whole.last == 1 or threads.count() == 1:
-        return [kernel(whole)]
+        return [kernel(*given, whole)]
     results: list[Any] = []
     for stage, independent in enumerate(stages):
         if independent:
             shares = [whole._replace(first=s, last=s + 1, stage=stage) for s in range(whole.last)]
-            results += threads.each(kernel, shares)
+            results += threads.each(lambda part: kernel(*given, part), shares)
         else:
-            results.append(kernel(whole._replace(stage=stage)))
+            results.append(kernel(*given, whole._replace(stage=stage)))
     return results
