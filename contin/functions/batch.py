@@ -112,7 +112,10 @@ class Batch:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
         out = np.empty((len(u), self.count))
         try:
-            self._run((t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN))
+            if len(u) < _MANY:
+                self._evaluate(t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN)
+            else:
+                self._evaluate_many((t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN))
         except Raised as error:
             raise error.exception() from None
         return out
@@ -122,7 +125,10 @@ class Batch:
         out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, colours.width))
         work = np.zeros(self.signature.inputs + self.count)
         try:
-            self._run((t, u, v, p, colours.inputs, colours.owner, work, out, jac))
+            if len(u) < _MANY:
+                self._evaluate(t, u, v, p, colours.inputs, colours.owner, work, out, jac)
+            else:
+                self._evaluate_many((t, u, v, p, colours.inputs, colours.owner, work, out, jac))
         except Raised as error:
             exception = error.exception()
             if not isinstance(exception, ZeroDivisionError):
@@ -131,19 +137,15 @@ class Batch:
             jac.fill(np.nan)
         return out, jac
 
-    def _run(self, given: _Arguments) -> None:
-        """Call the kernel, for many places in several threads where one took long before.
+    def _evaluate_many(self, given: _Arguments) -> None:
+        """Call the kernel for many places, in several threads where one took long before.
 
         Raises
         ------
         Raised
             What one call for all places raises: the same for any number of threads.
         """
-        count = len(given[1])
-        if count < _MANY:
-            self._evaluate(*given)
-            return
-        kind = len(given[5])
+        count, kind = len(given[1]), len(given[5])
         if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
             with contextlib.suppress(Raised):  # parts are not in the order of one call
                 threads.each(lambda part: self._evaluate(*part), _parts(given))

@@ -60,7 +60,8 @@ class Factorization:
             np.empty((intervals, rows), np.int64), np.empty(size, np.int64),
         )  # fmt: skip
         segments = self._whole.last
-        self._unknowns, self._work_size = intervals * rows + n + k, work_size(segments, intervals, rows, n, r, size)
+        self._unknowns = intervals * rows + n + k
+        self._work = np.empty((work_size(segments, intervals, rows, n, r, size), LANES))  # of solves, one at a time
         carried = np.empty((segments, n + r, size))
         #: Sign of the determinant up to a factor that depends on the shape only.
         self.sign: float
@@ -83,11 +84,16 @@ class Factorization:
         """Return the solutions that a kernel finds for one or several right-hand sides."""
         given = np.ascontiguousarray(given, dtype=float)
         rows = given.reshape(-1, self._unknowns)
-        result, work = np.empty(rows.shape), np.empty((self._work_size, LANES))
+        result = np.empty(rows.shape)
         if self._whole.last == 1:
-            kernel(self._layout, self._factors, rows, result, work, self._whole)
+            kernel(self._layout, self._factors, rows, result, self._work, self._whole)
         else:
             for first in range(0, len(rows), LANES):
                 these = slice(first, first + LANES)
-                run(kernel, (self._layout, self._factors, rows[these], result[these], work), self._whole, (True, False, True))
+                run(
+                    kernel,
+                    (self._layout, self._factors, rows[these], result[these], self._work),
+                    self._whole,
+                    (True, False, True),
+                )
         return result.reshape(given.shape)
