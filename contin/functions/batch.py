@@ -38,6 +38,7 @@ def evaluate(
     if jac.size == 0:
         return
     for i in range(u.shape[0]):
+        jac[i] = 0.0
         for colour in range(owner.shape[0]):
             for s in range(inputs[colour], inputs[colour + 1]):
                 work[inputs[s]] = STEP
@@ -122,7 +123,7 @@ class Batch:
 
     def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
         """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
-        out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, colours.width))
+        out, jac = np.empty((len(u), self.count)), np.empty((len(u), self.count, colours.width))
         work = np.zeros(self.signature.inputs + self.count)
         try:
             if len(u) < _MANY:
