@@ -55,6 +55,14 @@ def test_a_wrong_number_of_threads_is_refused(given, monkeypatch):
         threads.count()
 
 
+def test_a_wrong_number_of_threads_is_refused_where_a_run_begins(monkeypatch):
+    circle = contin.AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1,), ["x"], {"a": 0.6})
+    start = contin.solve(circle, [1.0])
+    monkeypatch.setenv("CONTIN_THREADS", "two")
+    with pytest.raises(contin.ProblemError, match="CONTIN_THREADS"):
+        contin.trace(start, free=["a"])
+
+
 def test_the_number_of_threads_is_that_of_usable_cores(monkeypatch):
     monkeypatch.delenv("CONTIN_THREADS", raising=False)
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 4, 5}, raising=False)
