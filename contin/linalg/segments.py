@@ -16,11 +16,11 @@ from contin import threads
 from contin.arrays import Indices
 from contin.functions.kernel_parts import IndexVector
 
-#: Numbers in the blocks of all intervals from which on there are segments: below, threads would gain less than .5 ms a matrix.
-#: With ten times fewer a factorization takes as long with two threads as with one.
+#: Numbers in the blocks of all intervals from which on there are segments. There a Newton iteration takes .7 times as long with
+#: two threads as with one (300 intervals, 13 states, degree 4); with four times fewer numbers it takes as long.
 _LARGE = 2**20
-#: Segments of a large matrix: more than cores usually, so that a core that is busy with something else gets fewer of them.
-#: With ten times more, the elimination of the points between them, on one core, takes a tenth of the time.
+#: Segments of a large matrix: more than cores usually, so that a core that is busy with something else gets fewer of them. Two
+#: threads take as long with 4 to 32 segments; with ten times more 1.16 times as long.
 _MOST = 16
 
 
