@@ -37,7 +37,6 @@ def evaluate(
     for i in range(u.shape[0]):
 {real}
 {between}
-        jac[i] = 0.0
         for colour in range(owner.shape[0]):
             for s in range(inputs[colour], inputs[colour + 1]):
                 work[inputs[s]] = STEP
@@ -127,7 +126,8 @@ class Batch:
 
     def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
         """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
-        out, jac = np.empty((len(u), self.count)), np.empty((len(u), self.count, colours.width))
+        out, new = np.empty((len(u), self.count)), np.zeros if len(u) < _MANY else np.empty
+        jac = new((len(u), self.count, colours.width))
         work = np.zeros(self.signature.inputs + self.count)
         try:
             if len(u) < _MANY:
@@ -153,11 +153,16 @@ class Batch:
         count, kind = len(given[1]), len(given[5])
         if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
             with contextlib.suppress(Raised):  # parts are not in the order of one call
-                threads.each(lambda part: self._evaluate(*part), _divided(given))
+                threads.each(self._evaluate_part, _divided(given))
                 return
         began = time.perf_counter()
-        self._evaluate(*given)
+        self._evaluate_part(given)
         self._seconds[kind] = (time.perf_counter() - began) / count
+
+    def _evaluate_part(self, given: _Arguments) -> None:
+        """Call the kernel, which leaves zeros of the Jacobian as they are."""
+        given[-1].fill(0.0)
+        self._evaluate(*given)
 
     def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:
         """Return the colouring for derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters."""

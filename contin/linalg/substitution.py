@@ -89,24 +89,39 @@ def work_size(segments: int, intervals: int, rows: int, n: int, r: int, size: in
     return 3 * size - n + r + (segments + 1) * 2 * n + intervals * (3 * rows + 2 * n) + segments * (2 * n + r + size)
 
 
+class Sizes(NamedTuple):
+    """Numbers of segments S, of rows n d of an interval's block, of states n, of border rows r, and of dense rows 2 n + k."""
+
+    segments: int
+    rows: int
+    n: int
+    r: int
+    dense: int
+
+
 @helper(inline=True)
-def _joint(factors, n, work, segments):
-    """Return places of the joint vectors in work space of `work_size` entries."""
-    size = factors.dense.shape[0]
-    rest = _entry(work.ctypes.data, 0)
-    dense = _entry(rest, size - n)
+def _sizes(factors, n, starts):
+    """Return the sizes of a solve."""
+    return Sizes(starts.size - 1, factors.local.shape[1], n, factors.border.shape[1], factors.dense.shape[0])
+
+
+@helper
+def _joint(work, sizes):
+    """Return places of the joint vectors in work space at an address."""
+    segments, rows, n, r, size = sizes
+    dense = _entry(work, size - n)
     known = _entry(dense, size)
     border = _entry(known, size)
-    return Joint(rest, dense, known, border, _entry(border, factors.border.shape[1]))
+    return Joint(work, dense, known, border, _entry(border, r))
 
 
-@helper(inline=True)
-def _vectors(factors, n, work, starts, s):
-    """Return places of the vectors of segment s in work space of `work_size` entries."""
-    rows, r, size, segments = factors.local.shape[1], factors.border.shape[1], factors.dense.shape[0], starts.size - 1
-    first, count = starts[s], starts[s + 1] - starts[s]
-    before = 3 * size - n + r + (segments + 1) * 2 * n + first * (3 * rows + 2 * n) + s * (2 * n + r + size)
-    given = _entry(work.ctypes.data, before)
+@helper
+def _vectors(work, sizes, part, s):
+    """Return places of the vectors of segment s, with the intervals of ``part``, in work space at an address."""
+    segments, rows, n, r, size = sizes
+    count = part.last - part.first
+    before = 3 * size - n + r + (segments + 1) * 2 * n + part.first * (3 * rows + 2 * n) + s * (2 * n + r + size)
+    given = _entry(work, before)
     found = _entry(given, count * rows + n)
     inner = _entry(found, count * rows + n)
     pair = _entry(inner, count * rows)
@@ -251,22 +266,22 @@ def _forward_interiors(layout, factors, part, vectors):
             _move(_entry(remaining, offsets[g]), _entry(inner, step.bottom - size), size)
 
 
-@helper(inline=True)
-def _forward_point(factors, n, j, pair, border):
-    """Apply the elimination of mesh point j to the ``pair`` of its rows, and reduce the ``border``."""
-    block, (_, rows, width) = _page(factors.chain, j - 1), factors.chain.shape
-    step = point_step(n, width)
-    _forward(block, step, factors.pivots[j, factors.pivots.shape[1] - n :], pair)
-    _subtract(_part(block, 2 * n, 0), Range(0, rows - 2 * n), step, pair, border)
+@helper
+def _forward_point(block, step, r, pivots, pair, border):
+    """Apply the elimination of a mesh point to the ``pair`` of its rows, and reduce the ``border``."""
+    _forward(block, step, pivots, pair)
+    _subtract(_part(block, step.bottom, 0), Range(0, r), step, pair, border)
 
 
 @helper(inline=True)
 def _forward_points(factors, n, part, vectors):
     """Apply stage 2: fill the first half of each ``pair``, and reduce the ``border``."""
+    step = point_step(n, factors.chain.shape[2])
     for j in range(part.first + 1, part.last):
         pair = _entry(vectors.pair, 2 * n * (j - part.first))
         _move(pair, _entry(pair, -n), n)
-        _forward_point(factors, n, j, pair, vectors.border)
+        pivots = factors.pivots[j, factors.local.shape[1] - n :]
+        _forward_point(_page(factors.chain, j - 1), step, factors.border.shape[1], pivots, pair, vectors.border)
 
 
 @helper(inline=True)
@@ -278,19 +293,13 @@ def _solve_dense(factors, x):
 
 
 @helper(inline=True)
-def _backward_point(factors, n, j, pair, known):
-    """Solve for mesh point j, with [first point | next point | parameters] ``known``."""
-    _backward(_page(factors.chain, j - 1), point_step(n, factors.chain.shape[2]), pair, known)
-
-
-@helper(inline=True)
 def _backward_points(factors, n, part, vectors):
-    """Solve for the mesh points inside a segment, the last one first."""
-    rows = factors.local.shape[1]
+    """Solve for the mesh points inside a segment, the last first, with [first point | next point | parameters] ``known``."""
+    rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
     for j in range(part.last - 1, part.first, -1):
         pair, point = _entry(vectors.pair, 2 * n * (j - part.first)), _entry(vectors.found, (j - part.first) * rows)
         _move(_entry(vectors.known, n), _entry(point, rows), n)
-        _backward_point(factors, n, j, pair, vectors.known)
+        _backward(_page(factors.chain, j - 1), step, pair, vectors.known)
         _move(point, pair, n)
 
 
@@ -309,16 +318,16 @@ def _backward_interiors(layout, factors, part, vectors):
 
 
 @helper(inline=True)
-def _solve_joint(factors, n, starts, work):
+def _solve_joint(factors, sizes, starts, place):
     """Apply stage 3 and solve stages 4 and 3: the mesh points between segments, both ends, and the parameters.
 
     Each segment gives what it carries, the second half of its last ``pair``, and its ``border``; it gets both its ends, the
     first mesh point of the segment in ``known``, and the parameters there.
     """
-    rows, r, size, segments = factors.local.shape[1], factors.border.shape[1], factors.dense.shape[0], starts.size - 1
-    joint = _joint(factors, n, work, segments)
+    segments, rows, n, r, size = sizes
+    joint, step = _joint(place, sizes), point_step(n, factors.chain.shape[2])
     for s in range(segments):
-        vectors, pair = _vectors(factors, n, work, starts, s), _entry(joint.pair, 2 * n * s)
+        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), _entry(joint.pair, 2 * n * s)
         _move(_entry(pair, n), _entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), n)
         if s == 0:
             _move(joint.border, vectors.border, r)
@@ -327,7 +336,8 @@ def _solve_joint(factors, n, starts, work):
     for s in range(1, segments):
         pair = _entry(joint.pair, 2 * n * s)
         _move(pair, _entry(pair, -n), n)
-        _forward_point(factors, n, starts[s], pair, joint.border)
+        pivots = factors.pivots[starts[s], rows - n :]
+        _forward_point(_page(factors.chain, starts[s] - 1), step, r, pivots, pair, joint.border)
     _move(joint.dense, _entry(joint.pair, (2 * segments - 1) * n), n)
     _move(_entry(joint.dense, n), joint.rest, size - n - r)
     _move(_entry(joint.dense, size - r), joint.border, r)
@@ -335,10 +345,10 @@ def _solve_joint(factors, n, starts, work):
     _move(joint.rest, _entry(joint.dense, n), size - n)
     _move(joint.known, joint.dense, size)
     for s in range(segments - 1, -1, -1):
-        vectors, pair = _vectors(factors, n, work, starts, s), _entry(joint.pair, 2 * n * s)
+        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), _entry(joint.pair, 2 * n * s)
         _move(_entry(vectors.found, (starts[s + 1] - starts[s]) * rows), _entry(joint.known, n), n)
         if s > 0:
-            _backward_point(factors, n, starts[s], pair, joint.known)
+            _backward(_page(factors.chain, starts[s] - 1), step, pair, joint.known)
             _move(_entry(joint.known, n), pair, n)
         else:
             _move(_entry(joint.known, n), joint.known, n)
@@ -354,15 +364,17 @@ def solve(layout: Layout, factors: Eliminated, b: ReadOnlyMatrix, x: Matrix, wor
     The stages of a `Share` are: elimination in segments, what joins them, substitution in segments. A share that is not the
     whole takes at most `LANES` rows.
     """
-    n, rows, r, size = layout.order.size, factors.local.shape[1], factors.border.shape[1], factors.dense.shape[0]
-    starts, tail = share.starts, size - n
-    collocation, segments = factors.local.shape[0] * rows, starts.size - 1
-    joint = _joint(factors, n, work, segments)
+    starts, place = share.starts, work.ctypes.data
+    sizes = _sizes(factors, layout.order.size, starts)
+    _, rows, n, r, size = sizes
+    collocation, tail = factors.local.shape[0] * rows, size - n
+    joint = _joint(place, sizes)
     for first in range(0, b.shape[0], LANES):
         given, found, count = at(b, first, 0), at(x, first, 0), b.shape[0] - first
         if share.stage == 0 or share.stage == ALL:
             for s in range(share.first, share.last):
-                part, vectors = Range(starts[s], starts[s + 1]), _vectors(factors, n, work, starts, s)
+                part = Range(starts[s], starts[s + 1])
+                vectors = _vectors(place, sizes, part, s)
                 side_by_side(vectors.given, _part(given, 0, part.first * rows), (part.last - part.first) * rows, count)
                 if s == 0:
                     side_by_side(joint.rest, _part(given, 0, collocation), tail, count)
@@ -372,11 +384,12 @@ def solve(layout: Layout, factors: Eliminated, b: ReadOnlyMatrix, x: Matrix, wor
                 _forward_interiors(layout, factors, part, vectors)
                 _forward_points(factors, n, part, vectors)
         if share.stage == 1 or share.stage == ALL:
-            _solve_joint(factors, n, starts, work)
+            _solve_joint(factors, sizes, starts, place)
             apart(_part(found, 0, collocation), joint.rest, tail, count)
         if share.stage == 2 or share.stage == ALL:
             for s in range(share.first, share.last):
-                part, vectors = Range(starts[s], starts[s + 1]), _vectors(factors, n, work, starts, s)
+                part = Range(starts[s], starts[s + 1])
+                vectors = _vectors(place, sizes, part, s)
                 _backward_points(factors, n, part, vectors)
                 _backward_interiors(layout, factors, part, vectors)
                 apart(_part(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
@@ -400,22 +413,23 @@ def _interiors_transposed(layout, factors, part, vectors):
         _put(given, layout.ends, Range(0, 2 * n), vectors.known)
 
 
-@helper(inline=True)
-def _point_transposed(factors, n, j, point, after, known):
-    """Solve the triangle of mesh point j; subtract what it contributes to the first one, the one ``after``, and parameters."""
+@helper
+def _point_transposed(block, step, point, after, known):
+    """Solve the triangle of a mesh point; subtract what it contributes to the first one, the one ``after``, and parameters."""
+    n = step.right
     _move(_entry(known, n), after, n)
-    _forward_transposed(_page(factors.chain, j - 1), point_step(n, factors.chain.shape[2]), point, known)
+    _forward_transposed(block, step, point, known)
     _move(after, _entry(known, n), n)
 
 
 @helper(inline=True)
 def _points_transposed(factors, n, part, vectors):
     """Solve the triangles of stage 2."""
-    rows = factors.local.shape[1]
+    rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
     _move(vectors.known, vectors.given, n)
     for j in range(part.first + 1, part.last):
         point = _entry(vectors.given, (j - part.first) * rows)
-        _point_transposed(factors, n, j, point, _entry(point, rows), vectors.known)
+        _point_transposed(_page(factors.chain, j - 1), step, point, _entry(point, rows), vectors.known)
     _move(vectors.given, vectors.known, n)
 
 
@@ -427,23 +441,22 @@ def _solve_dense_transposed(factors, x):
     _backward_transposed(block, step, factors.pivots_dense, x)
 
 
-@helper(inline=True)
-def _multipliers_of_point(factors, n, j, pair, border):
-    """Apply the transpose of the elimination of mesh point j: turn its ``pair`` into the multipliers of its rows."""
-    block, (_, height, width) = _page(factors.chain, j - 1), factors.chain.shape
-    step = point_step(n, width)
-    _subtract_transposed(_part(block, 2 * n, 0), Range(0, height - 2 * n), step, border, pair)
-    _backward_transposed(block, step, factors.pivots[j, factors.pivots.shape[1] - n :], pair)
+@helper
+def _multipliers_of_point(block, step, r, pivots, pair, border):
+    """Apply the transpose of the elimination of a mesh point: turn its ``pair`` into the multipliers of its rows."""
+    _subtract_transposed(_part(block, step.bottom, 0), Range(0, r), step, border, pair)
+    _backward_transposed(block, step, pivots, pair)
 
 
 @helper(inline=True)
 def _multipliers_of_points(factors, n, part, vectors):
     """Apply the transpose of stage 2: fill each ``pair`` with the multipliers of its rows."""
-    rows = factors.local.shape[1]
+    rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
     for j in range(part.last - 1, part.first, -1):
         pair = _entry(vectors.pair, 2 * n * (j - part.first))
         _move(pair, _entry(vectors.given, (j - part.first) * rows), n)
-        _multipliers_of_point(factors, n, j, pair, vectors.border)
+        pivots = factors.pivots[j, rows - n :]
+        _multipliers_of_point(_page(factors.chain, j - 1), step, factors.border.shape[1], pivots, pair, vectors.border)
         _move(_entry(pair, -n), pair, n)
 
 
@@ -468,16 +481,16 @@ def _multipliers_of_interiors(layout, factors, part, vectors):
 
 
 @helper(inline=True)
-def _solve_joint_transposed(factors, n, starts, work):
+def _solve_joint_transposed(factors, sizes, starts, place):
     """Solve the triangles of stage 3 and stage 4, and apply the transpose of stage 3.
 
     Each segment gives what is left for both its ends and for the parameters; it gets the multipliers of the rows that it
     carries, in the second half of its last ``pair``, and of the ``border``.
     """
-    rows, r, size, segments = factors.local.shape[1], factors.border.shape[1], factors.dense.shape[0], starts.size - 1
-    joint = _joint(factors, n, work, segments)
+    segments, rows, n, r, size = sizes
+    joint, step = _joint(place, sizes), point_step(n, factors.chain.shape[2])
     for s in range(segments):
-        vectors, pair = _vectors(factors, n, work, starts, s), _entry(joint.pair, 2 * n * s)
+        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), _entry(joint.pair, 2 * n * s)
         if s == 0:
             _move(_entry(joint.known, 2 * n), _entry(vectors.known, 2 * n), size - 2 * n)
             _move(joint.known, vectors.given, n)
@@ -487,7 +500,7 @@ def _solve_joint_transposed(factors, n, starts, work):
         _move(_entry(pair, 2 * n), _entry(vectors.given, (starts[s + 1] - starts[s]) * rows), n)
     for s in range(1, segments):
         pair = _entry(joint.pair, 2 * n * s)
-        _point_transposed(factors, n, starts[s], pair, _entry(pair, 2 * n), joint.known)
+        _point_transposed(_page(factors.chain, starts[s] - 1), step, pair, _entry(pair, 2 * n), joint.known)
     _move(joint.dense, joint.known, n)
     _move(_entry(joint.dense, n), _entry(joint.pair, 2 * n * segments), n)
     _move(_entry(joint.dense, 2 * n), _entry(joint.known, 2 * n), size - 2 * n)
@@ -496,9 +509,10 @@ def _solve_joint_transposed(factors, n, starts, work):
     _move(joint.border, _entry(joint.dense, size - r), r)
     _move(_entry(joint.pair, (2 * segments - 1) * n), joint.dense, n)
     for s in range(segments - 1, -1, -1):
-        vectors, pair = _vectors(factors, n, work, starts, s), _entry(joint.pair, 2 * n * s)
+        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), _entry(joint.pair, 2 * n * s)
         if s > 0:
-            _multipliers_of_point(factors, n, starts[s], pair, joint.border)
+            pivots = factors.pivots[starts[s], rows - n :]
+            _multipliers_of_point(_page(factors.chain, starts[s] - 1), step, r, pivots, pair, joint.border)
             _move(_entry(pair, -n), pair, n)
         _move(_entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), _entry(pair, n), n)
         _move(vectors.border, joint.border, r)
@@ -507,15 +521,17 @@ def _solve_joint_transposed(factors, n, starts, work):
 @kernel
 def solve_transposed(layout: Layout, factors: Eliminated, c: ReadOnlyMatrix, y: Matrix, work: Matrix, share: Share) -> None:
     """Solve J^T y = c for rows of c (m, unknowns) and of y (m, equations), with ``work`` and ``share`` as for `solve`."""
-    n, rows, size = layout.order.size, factors.local.shape[1], factors.dense.shape[0]
-    starts, tail = share.starts, size - n
-    collocation, segments = factors.local.shape[0] * rows, starts.size - 1
-    joint = _joint(factors, n, work, segments)
+    starts, place = share.starts, work.ctypes.data
+    sizes = _sizes(factors, layout.order.size, starts)
+    segments, rows, n, _, size = sizes
+    collocation, tail = factors.local.shape[0] * rows, size - n
+    joint = _joint(place, sizes)
     for first in range(0, c.shape[0], LANES):
         given, found, count = at(c, first, 0), at(y, first, 0), c.shape[0] - first
         if share.stage == 0 or share.stage == ALL:
             for s in range(share.first, share.last):
-                part, vectors = Range(starts[s], starts[s + 1]), _vectors(factors, n, work, starts, s)
+                part = Range(starts[s], starts[s + 1])
+                vectors = _vectors(place, sizes, part, s)
                 own = (part.last - part.first) * rows
                 side_by_side(vectors.given, _part(given, 0, part.first * rows), own, count)
                 right, parameters = _entry(vectors.given, own), _entry(vectors.known, 2 * n)
@@ -530,11 +546,12 @@ def solve_transposed(layout: Layout, factors: Eliminated, c: ReadOnlyMatrix, y: 
                 _interiors_transposed(layout, factors, part, vectors)
                 _points_transposed(factors, n, part, vectors)
         if share.stage == 1 or share.stage == ALL:
-            _solve_joint_transposed(factors, n, starts, work)
+            _solve_joint_transposed(factors, sizes, starts, place)
             apart(_part(found, 0, collocation), joint.rest, tail, count)
         if share.stage == 2 or share.stage == ALL:
             for s in range(share.first, share.last):
-                part, vectors = Range(starts[s], starts[s + 1]), _vectors(factors, n, work, starts, s)
+                part = Range(starts[s], starts[s + 1])
+                vectors = _vectors(place, sizes, part, s)
                 _multipliers_of_points(factors, n, part, vectors)
                 _multipliers_of_interiors(layout, factors, part, vectors)
                 apart(_part(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
