@@ -323,7 +323,7 @@ def _instructions(function: Any) -> int:
 
 
 #: Helpers of more instructions are called, not copied to where they are called: kernels run as fast, and are compiled in three
-#: quarters of the time (a limit of 150 saves a tenth). Users' functions have this in their names (`contin.functions.rewriting`).
+#: quarters of the time (a limit of 150 saves a tenth). Names of users' functions have this in them (`rewriting.py`).
 _LONG, _OF_USERS = 30, "user_"
 #: Arrays that Python gives have no owner that compiled code releases, so this is never called where no others are made.
 _NOTHING_TO_RELEASE = "define void @NRT_MemInfo_call_dtor(i8* %nothing) { ret void }"
