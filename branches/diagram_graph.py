@@ -7,6 +7,8 @@ their columns. The command is ``python -m branches.graph DIR`` (`branches.graph`
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -35,6 +37,31 @@ def new_graph(title: str = ""):
     return networkx.MultiGraph(title=title, format="ribbon bifurcation diagram", format_version=1)
 
 
+@dataclass(frozen=True)
+class Course:
+    """A primary branch as a diagram holds it.
+
+    Attributes
+    ----------
+    family : dict
+        law, nu, m and n.
+    nodes : list of (str, dict)
+        Identifiers and attributes of its special points (see `node`), from end to end.
+    pieces : list of dict
+        The columns between consecutive special points, as lists.
+    """
+
+    family: dict
+    nodes: list[tuple[str, dict]]
+    pieces: list[dict]
+
+
+def course_of(branch) -> Course:
+    """Return the course of a primary branch: anything with ``config``, ``points``, ``events`` and ``reason``."""
+    family, special = _family(branch.config), _special(branch)
+    return Course(family, [_node_of(event, family, branch.reason) for event in special], _pieces_of(branch, special))
+
+
 def add_branch(graph, branch, name: str) -> bool:
     """Add a stored branch to the diagram.
 
@@ -51,27 +78,46 @@ def add_branch(graph, branch, name: str) -> bool:
         False if the diagram has it already, computed from its other end. (One branch leaves a bifurcation on each
         domain, and its images under the symmetries of the primary branch.)
     """
-    config = branch.config
+    if not branch.config["origin"]:
+        return add_course(graph, course_of(branch), name)
+    family, special = _family(branch.config), _special(branch)
+    nodes = _nodes_of_secondary(graph, special, family, branch)
+    start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
+    if any(data.get("domain") == family["domain"] for _, _, data in start):
+        return False
+    return connect(graph, family, nodes, _pieces_of(branch, special), file=name)
+
+
+def add_course(graph, course: Course, name: str) -> bool:
+    """Add a primary branch from the file ``name`` to the diagram; see `add_branch`."""
+    return connect(graph, course.family, course.nodes, course.pieces, file=name)
+
+
+def _family(config: dict) -> dict:
+    """Return what the edges of a branch have in common."""
     family = {"law": label(config["law"], config["Gamma"]), "nu": config["nu"], "m": config["m"], "n": config["n"]}
     if config["origin"]:
         family |= {"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"], "domain": config["domain"]}
-    special = [event for event in branch.events if event["label"].decode() in SPECIAL]
-    if config["origin"]:
-        nodes = _nodes_of_secondary(graph, special, family, branch)
-        start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
-        if any(data.get("domain") == family["domain"] for _, _, data in start):
-            return False
-    else:
-        nodes = [_node_of(event, family, branch.reason) for event in special]
-    rows = [branch.points[first["point"] : last["point"] + 1] for first, last in pairwise(special)]
-    pieces = [{column: piece[column].tolist() for column in COLUMNS} for piece in rows]
-    if config["origin"]:
-        for piece, values in zip(pieces, rows):
-            piece["force"] = np.sqrt(values["R1"] ** 2 + values["R2"] ** 2 + values["R3"] ** 2).tolist()
-    if "index" in branch.points.dtype.names:
-        for piece, values in zip(pieces, rows):
-            piece["index"] = common_index(values["index"])
-    return connect(graph, family, nodes, pieces, file=name)
+    return family
+
+
+def _special(branch) -> list:
+    """Return the labelled points of a branch that are nodes of a diagram."""
+    return [event for event in branch.events if event["label"].decode() in SPECIAL]
+
+
+def _pieces_of(branch, special: list) -> list[dict]:
+    """Return the columns between consecutive special points."""
+    found = []
+    for first, last in pairwise(special):
+        rows = branch.points[first["point"] : last["point"] + 1]
+        piece = {column: rows[column].tolist() for column in COLUMNS}
+        if branch.config["origin"]:
+            piece["force"] = np.sqrt(rows["R1"] ** 2 + rows["R2"] ** 2 + rows["R3"] ** 2).tolist()
+        if "index" in rows.dtype.names:
+            piece["index"] = common_index(rows["index"])
+        found.append(piece)
+    return found
 
 
 def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str, dict]]:
@@ -172,8 +218,18 @@ def families(graph) -> list[tuple]:
 
 def pieces(graph, family: tuple) -> list[tuple]:
     """Return the edges (a, b, columns) of the primary branch (law, nu, m, n), from end to end."""
-    found = [edge for edge in graph.edges(data=True) if family_of(edge[2]) == family and "origin" not in edge[2]]
-    return sorted(found, key=lambda edge: edge[2]["arclength"][0])
+    return _by_family(graph).get(family, [])
+
+
+def _by_family(graph) -> dict[tuple, list[tuple]]:
+    """Return the edges of every primary branch, from end to end, in one pass over the diagram."""
+    found: dict[tuple, list[tuple]] = {}
+    for edge in graph.edges(data=True):
+        if "origin" not in edge[2]:
+            found.setdefault(family_of(edge[2]), []).append(edge)
+    for edges in found.values():
+        edges.sort(key=lambda edge: edge[2]["arclength"][0])
+    return found
 
 
 def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[dict]:
@@ -201,10 +257,9 @@ def course(graph, m: int, n: int, law: str | None = None, nu: float | None = Non
         The diagram has no such branch.
     """
     result = []
-    for law_, nu_, m_, n_ in families(graph):
+    for (law_, nu_, _, n_), nodes in courses(graph):
         if n_ != n or law not in (None, law_) or nu not in (None, nu_):
             continue
-        nodes = _in_order(graph, pieces(graph, (law_, nu_, m_, n_)))
         if nodes[-1].get("covering") == m:
             nodes.reverse()
         if nodes[0].get("covering") == m:
@@ -212,6 +267,12 @@ def course(graph, m: int, n: int, law: str | None = None, nu: float | None = Non
     if not result:
         raise KeyError(f"the diagram has no branch (m, n) = ({m}, {n})")
     return result
+
+
+def courses(graph) -> Iterator[tuple[tuple, list[dict]]]:
+    """Yield (law, nu, m, n) and the special points, from end to end, of every primary branch, in order."""
+    for family, edges in sorted(_by_family(graph).items(), key=lambda item: item[0]):
+        yield family, _in_order(graph, edges)
 
 
 def family_of(data) -> tuple:
@@ -234,13 +295,9 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
     Values between computed points come from a cubic spline over arclength.
     """
     found = []
-    for law_, nu_ in sorted({family[:2] for family in families(graph)}):
-        if law not in (None, law_) or nu not in (None, nu_):
-            continue
-        coverings = {
-            d["covering"] for _, d in graph.nodes(data=True) if d["kind"] == "circle" and (d["law"], d["nu"]) == (law_, nu_)
-        }
-        for m in sorted(coverings):
+    circles = {(data["law"], data["nu"], data["covering"]) for _, data in graph.nodes(data=True) if data["kind"] == "circle"}
+    for law_, nu_, m in sorted(circles):
+        if law in (None, law_) and nu in (None, nu_):
             found.append({"law": law_, "nu": nu_, "circle": m, **_planar(law_, nu_, m, kappa_n)})
     for _, _, data in graph.edges(data=True):
         if law in (None, data["law"]) and nu in (None, data["nu"]):
@@ -285,14 +342,14 @@ def folds(graph, low: float, high: float, law: str | None = None, nu: float | No
 # --- in words ------------------------------------------------------------------------------------------------------
 
 
-def describe(graph, m: int, n: int, law: str, nu: float) -> str:
+def describe(nodes) -> str:
     """Return the special points of one branch in one line."""
-    return " -> ".join(map(describe_node, course(graph, m, n, law, nu)[0]["nodes"]))
+    return " -> ".join(map(describe_node, nodes))
 
 
 def describe_secondary(branch: dict) -> str:
     """Return the special points of a secondary branch (see `secondaries`) in one line."""
-    return f"{branch['mode']}, {branch['domain']}: " + " -> ".join(map(describe_node, branch["nodes"]))
+    return f"{branch['mode']}, {branch['domain']}: {describe(branch['nodes'])}"
 
 
 def describe_node(node) -> str:

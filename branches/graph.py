@@ -63,9 +63,7 @@ def _answers(graph, options) -> Iterable[str]:
         yield graph.graph["source"]
     if options.where:
         for branch in diagram.course(graph, *options.where):
-            yield f"{branch['law']}, nu = {exact_text(branch['nu'])}: " + " -> ".join(
-                map(diagram.describe_node, branch["nodes"])
-            )
+            yield f"{branch['law']}, nu = {exact_text(branch['nu'])}: {diagram.describe(branch['nodes'])}"
         for branch in diagram.secondaries(graph):
             if branch["family"][2:] == tuple(options.where):
                 yield f"  {diagram.describe_secondary(branch)}"
@@ -80,9 +78,10 @@ def _answers(graph, options) -> Iterable[str]:
             place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
             yield f"{data['law']}, nu = {exact_text(data['nu'])}: fold at {place}"
     if not options.where and options.at is None and not options.folds:
-        yield f"{len(diagram.families(graph))} branches, {graph.number_of_nodes()} special points"
-        for law, nu, m, n in diagram.families(graph):
-            yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(graph, m, n, law, nu)}"
+        found = list(diagram.courses(graph))
+        yield f"{len(found)} branches, {graph.number_of_nodes()} special points"
+        for (law, nu, m, n), nodes in found:
+            yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(nodes)}"
 
 
 if __name__ == "__main__":

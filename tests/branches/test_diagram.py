@@ -11,9 +11,8 @@ import networkx
 import numpy as np
 import pytest
 
-from branches import diagram as diagrams
 from branches import diagram_graph as diagram
-from branches import draw_diagram
+from branches import draw_diagram, job
 from branches import executor as executors
 from branches.config import ConfigError, parse
 from branches.diagram import run_diagram
@@ -169,17 +168,16 @@ def test_a_cluster_makes_no_difference(computed_here, tmp_path):
 
 
 def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
-    scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), diagrams.compute
+    scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), job.compute_branch
 
-    def troubled(text):
-        config = parse(text, "scene")
+    def troubled(config, display):
         if (config.m, config.n) == (1, 4):
             os.kill(os.getpid(), signal.SIGKILL)
         if (config.m, config.n) == (3, 4):
             time.sleep(60)
-        return compute(text)
+        return compute(config, display)
 
-    monkeypatch.setattr(diagrams, "compute", troubled)
+    monkeypatch.setattr(job, "compute_branch", troubled)
     assert run_diagram(scene, tmp_path, Display(), workers=2, time_limit=5) == "lost"
     graph = diagram.read(tmp_path)
     assert [family[2:] for family in diagram.families(graph)] == [(1, 2)]
