@@ -13,9 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from branches import diagram_graph as diagram
-from branches.config import ConfigError, load
 from branches.files import StoreError
-from branches.preview import preview
 from contin import exact_text
 
 
@@ -25,11 +23,17 @@ def read(path: str | Path):
     Raises
     ------
     StoreError
-        There is none.
-    ConfigError
-        The scene is none.
+        There is none, or the scene is none.
     """
-    return preview(load(path)) if Path(path).suffix in (".yaml", ".yml") else diagram.read(path)
+    if Path(path).suffix not in (".yaml", ".yml"):
+        return diagram.read(path)
+    from branches.config import ConfigError, load  # with the quadrature they take 0.15 s: not for questions about results
+    from branches.preview import preview
+
+    try:
+        return preview(load(path))
+    except ConfigError as error:
+        raise StoreError(str(error)) from error
 
 
 def main(argv=None) -> int:
@@ -48,7 +52,7 @@ def main(argv=None) -> int:
     options = parser.parse_args(argv)
     try:
         lines = list(_answers(read(options.folder), options))
-    except (ConfigError, StoreError) as error:
+    except StoreError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyError as error:

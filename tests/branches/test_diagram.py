@@ -10,6 +10,7 @@ import time
 import networkx
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from branches import diagram_graph as diagram
 from branches import draw_diagram, job
@@ -22,6 +23,7 @@ from branches.executor import ExecutorError, executor
 from branches.explore.gather import gather
 from branches.files import StoreError, only_run
 from branches.graph import main as graph_command
+from branches.interpolation import places
 from branches.names import primary_file
 from branches.preview import preview
 from branches.read import read_branch
@@ -78,6 +80,29 @@ def test_states_at_a_curvature_against_the_quadrature(folder):
     circles = {state["circle"]: state["energy"] for state in states if "circle" in state}
     assert circles[1] == pytest.approx(0.5 - 3.2) and set(circles) == {1, 3, 5, 7}
     assert [state["energy"] for state in states] == sorted(state["energy"] for state in states)
+
+
+def test_values_between_points_are_those_of_single_splines():
+    """SciPy's spline of each piece; straight lines through two and three points. One piece has a point twice."""
+    random, pieces = np.random.default_rng(5), []
+    for count in (2, 3, 4, 5, 30, 4, 2, 12):
+        s = np.cumsum(random.uniform(0.5, 1, count))
+        columns = {"arclength": s, "kappa_n": np.tanh(s - s.mean()), "energy": np.cos(s)}
+        pieces.append({name: values.tolist() for name, values in columns.items()})
+    pieces[-1] = {name: [*values[:5], values[4], *values[5:]] for name, values in pieces[-1].items()}
+    for value in (-0.3, 0.0, 0.2):
+        found = places(pieces, "kappa_n", value, ["energy"])
+        assert [number for number, _ in found] == list(range(len(pieces)))
+        for number, values in found:
+            s, keep = np.unique(pieces[number]["arclength"], return_index=True)
+            kappa_n, energy = (np.array(pieces[number][name])[keep] for name in ("kappa_n", "energy"))
+            if len(s) < 4:
+                expected = np.interp(value, kappa_n, energy)
+            else:
+                (place,) = CubicSpline(s, kappa_n - value).roots(extrapolate=False)
+                expected = CubicSpline(s, energy)(place)
+            assert values["energy"] == pytest.approx(expected, abs=1e-12)
+    assert places(pieces, "kappa_n", 5.0, ["energy"]) == [] == places([], "kappa_n", 0.0, [])
 
 
 def _guesses(m, n, kappa_n):
