@@ -1,17 +1,22 @@
 """Scenes of many branches: the graph, the questions, the executor."""
 
+import contextlib
+import itertools
 import json
 import os
 import runpy
 import signal
+import sys
 import threading
 import time
+from concurrent.futures import Future
 
 import networkx
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from branches import diagram as diagrams
 from branches import diagram_graph as diagram
 from branches import draw_diagram, job
 from branches import executor as executors
@@ -27,6 +32,7 @@ from branches.interpolation import places
 from branches.names import primary_file
 from branches.preview import preview
 from branches.read import read_branch
+from branches.run import main as run_command
 from ribbon_model import exact
 
 #: Fig. 12a of Audoly & Seffen (2015), a part of it: all ends of m = 1 and 3 up to n = 4.
@@ -280,6 +286,19 @@ def test_a_scheduler_that_is_not_there():
         pass
 
 
+def test_a_scheduler_without_workers_is_refused(tmp_path, call, monkeypatch):
+    """At the start; and, after all workers have left, while jobs are waited for."""
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    monkeypatch.setattr(executors, "_WORKERS_WITHIN", 0.3)
+    (tmp_path / "scene.yaml").write_text(PAIR)
+    with distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster:
+        done = call(run_command, "scene.yaml", "--out", "x", "--scheduler", cluster.scheduler_address)
+        assert done.returncode == 2 and done.err.count("\n") == 1
+        assert "the scheduler answers, but has no workers" in done.err and "dask worker" in done.err
+        with distributed.Client(cluster) as client, pytest.raises(ExecutorError, match="no workers"):
+            executors._first_done_by(client, cluster.scheduler_address)([Future()])
+
+
 def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
     scene = parse("{law: [ribbon, flat rod], nu: [0.3, -0.9], pairs: [[1, 2], [3, 4]]}", "scene")
     assert len(scene.branches) == 6
@@ -415,3 +434,41 @@ def test_the_pictures(folder, call, tmp_path, root, source):
     assert (tmp_path / "x.svg").stat().st_size > 10_000
     refused = call(main, what, "--out", "x.gif")
     assert refused.returncode == 2 and "must end in .pdf, .svg or .png" in refused.err
+
+
+def test_the_work_for_a_branch_does_not_grow_with_the_diagram(tmp_path, monkeypatch):
+    """Calls of functions in the process that collects the branches, each with its line, for one of 60 and for one of 240."""
+
+    @contextlib.contextmanager
+    def at_once(*options):
+        yield lambda function, config: _done((b"", "", _course(config))), executors.first_done, 1
+
+    monkeypatch.setattr(diagrams, "executor", at_once)
+    monkeypatch.setattr(diagrams, "write_bytes", lambda path, data: None)
+    monkeypatch.setattr(diagrams, "_load_kernels", lambda configs: None)
+    calls = {}
+    for count in (60, 240):
+        scene, counter = parse(f"{{m: 1, n: 2, nu: {[k / 1000 for k in range(count)]}}}", "scene"), itertools.count()
+        sys.setprofile(lambda frame, event, argument, counter=counter: next(counter) if event == "call" else None)
+        try:
+            run_diagram(scene, tmp_path / str(count), Display())
+        finally:
+            sys.setprofile(None)
+        calls[count] = next(counter) / count
+        assert len(diagram.families(diagram.read(tmp_path / str(count)))) == count
+    assert calls[240] < calls[60]
+
+
+def _done(result):
+    """A future with its result."""
+    future = Future()
+    future.set_result(result)
+    return future
+
+
+def _course(config):
+    """A branch of two points."""
+    family = {"law": config.law, "nu": config.nu, "m": config.m, "n": config.n}
+    values = {"kappa_n": 1.0, "kappa_star": 1.0, "energy": -0.5}
+    nodes = [diagram.node(family, kind, values, number) for number, kind in enumerate(("circle", "leaves"))]
+    return diagram.Course(family, nodes, [dict.fromkeys(diagram.COLUMNS, [0.0, 1.0])])
