@@ -43,8 +43,8 @@ def compressed(values: np.ndarray, each: bool = False) -> dict:
     Returns
     -------
     dict
-        ``nodes``, ``channels``; ``functions``, the number of functions; ``basis``, in 16 bits a number; ``products``, their number;
-        ``left`` and ``right``, in 16 bits in the first ``wide`` products and in 8 bits in the others; ``scale``; ``size``.
+        ``nodes``, ``channels``; ``functions``, the number of functions; ``basis``, in 16 bits a number; ``products``, their
+        number; ``left`` and ``right``, in 16 bits in the first ``wide`` products and in 8 bits in the others; ``scale``; ``size``.
     """
     points, nodes, channels = values.shape
     size = np.abs(values).max(axis=1 if each else (0, 1)).reshape(-1, channels)
@@ -64,9 +64,9 @@ def compressed(values: np.ndarray, each: bool = False) -> dict:
         scale.append(by * times)
         rest = rest - np.multiply.outer(a * scale[-1], basis.T @ b.reshape(-1, channels))
     return {
-        "nodes": nodes, "channels": channels, "functions": len(basis), "basis": packed(np.round(32767 * basis), "<i2"), "products": len(scale),
-        "wide": wide, "left": _mixed(left, wide), "right": _mixed(right, wide), "scale": packed(scale, "<f8"),
-        "size": packed(size, "<f8"),
+        "nodes": nodes, "channels": channels, "functions": len(basis), "basis": packed(np.round(32767 * basis), "<i2"),
+        "products": len(scale), "wide": wide, "left": _mixed(left, wide), "right": _mixed(right, wide),
+        "scale": packed(scale, "<f8"), "size": packed(size, "<f8"),
     }  # fmt: skip
 
 
