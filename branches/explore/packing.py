@@ -44,7 +44,7 @@ def compressed(values: np.ndarray, each: bool = False) -> dict:
     -------
     dict
         ``nodes``, ``channels``; ``functions``, the number of functions; ``basis``, in 16 bits a number; ``products``, their
-        number; ``left`` and ``right``, in 16 bits in the first ``wide`` products and in 8 bits in the others; ``scale``; ``size``.
+        number; ``left`` and ``right``, in 16 bits in the first ``wide`` products, in 8 bits in the others; ``scale``; ``size``.
     """
     points, nodes, channels = values.shape
     size = np.abs(values).max(axis=1 if each else (0, 1)).reshape(-1, channels)

