@@ -32,19 +32,18 @@ def solutions(branch: StoredBranch) -> list[Solution | None]:
     StoreError
         A solution that the file keeps does not belong to the columns of its point.
     """
-    found: list[Solution | None] = [None] * len(branch.points)
-    kept = branch.kept().tolist()
-    for number in kept:
-        found[number] = _kept(branch, number)
-    for first, last in itertools.pairwise(kept):
-        there = _walk(branch, found[last], range(last, first, -1), found[first])
-        found[first + 1 : last] = [None] * (last - first - 1)
-        for number, solution in zip(range(first + 1, last), _walk(branch, found[first], range(first, last), found[last])):
+    kept = {number: _kept(branch, number) for number in branch.kept().tolist()}
+    found: list[Solution | None] = [kept.get(number) for number in range(len(branch.points))]
+    numbers = list(kept)
+    for first, last in itertools.pairwise(numbers):
+        for number, solution in _walk(branch, kept, range(first, last), last):
             found[number] = solution
-        for number, solution in zip(range(last - 1, first, -1), there):
+        for number, solution in _walk(branch, kept, range(last, first, -1), first):
             if found[number] is not None:
                 break
             found[number] = solution
+    for number, solution in _walk(branch, kept, range(numbers[-1], len(found)), numbers[-2:][0]):  # an interrupted run
+        found[number] = solution
     return found
 
 
@@ -59,15 +58,14 @@ def _kept(branch: StoredBranch, number: int) -> Solution:
     return found
 
 
-def _walk(branch: StoredBranch, start: Solution, numbers: range, aim: Solution) -> Iterator[Solution]:
-    """Yield the solutions of the points between the first and the end of ``numbers``, as far as they are found, on one mesh.
+def _walk(branch: StoredBranch, kept: dict[int, Solution], numbers: range, other: int) -> Iterator[tuple[int, Solution]]:
+    """Yield the points after the first of ``numbers``, which is kept, with their solutions on its mesh, until none is found.
 
-    The first step goes from ``start`` towards ``aim``, the solution at the end.
+    The first step is on the secant through the solution at the point ``other``.
     """
-    system = start.discretized()[0]
-    arclength = branch.points["arclength"]
-    before, here = (arclength[numbers.stop], aim.on_nodes(start.t)), (arclength[numbers.start], start.states)
-    parameters = start.parameters
+    start, arclength = kept[numbers[0]], branch.points["arclength"]
+    system, parameters = start.discretized()[0], start.parameters
+    before, here = (arclength[other], kept[other].on_nodes(start.t)), (arclength[numbers[0]], start.states)
     for number in numbers[1:]:
         row = branch.points[number]
         values = {name: float(row[name]) if name in row.dtype.names else value for name, value in parameters.items()}
@@ -77,7 +75,7 @@ def _walk(branch: StoredBranch, start: Solution, numbers: range, aim: Solution) 
         if x is None:
             return
         before, here, parameters = here, (row["arclength"], system.states(x)), values
-        yield Solution(start.law, start.domain, start.t, here[1], start.degree, values)
+        yield number, Solution(start.law, start.domain, start.t, here[1], start.degree, values)
 
 
 def _corrected(system: Collocation, last: np.ndarray, guess: np.ndarray) -> np.ndarray | None:

@@ -34,8 +34,9 @@ AXES = (
     ("energy", "energy, in units 2πB/L", "energy"),
     ("elastic", "elastic energy (energy + κ<sub>n</sub>²/2), in units 2πB/L", "elastic energy"),
 )
-#: Columns of a circle: those of every law that the page reads.
-CIRCLE_COLUMNS = ("kappa_n", "kappa_star", "energy", "index")
+#: Those of them in files, and the columns of a circle.
+_MAP = ("kappa_n", "kappa_star", "energy")
+CIRCLE_COLUMNS = (*_MAP, "index")
 #: The index where a whole band of wavenumbers is unstable, which no number counts; and where it is not known.
 INFINITE, UNKNOWN = -2, -1
 #: About so many nodes make a closed strip; a quarter wave has no fewer than the second number.
@@ -66,6 +67,8 @@ def _branch(path: Path, branch: StoredBranch) -> dict:
     config, points = branch.config, branch.points
     if len(points) < 2:
         raise StoreError(f"{str(path)!r} holds {len(points)} points; a branch has two at least")
+    if bad := [name for name in ("arclength", *_MAP) if not np.isfinite(points[name]).all()]:
+        raise StoreError(f"{str(path)!r}: the column {bad[0]!r} holds values that are no numbers")
     names = [name for name in points.dtype.names if points.dtype[name].kind in "if" and name not in ("point", "length")]
     marks = [_mark(event, branch.reason, bool(config["origin"])) for event in branch.events]
     about = {
@@ -108,7 +111,7 @@ def family_of(branches: list[dict]) -> dict:
 def _mark(event, reason: str, secondary: bool) -> dict:
     """A labelled point: its number, kind, and what it is called; kappa_n where it is on a circle."""
     name, place = event["name"].decode(), {"point": int(event["point"])}
-    values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
+    values = {column: float(event[column]) for column in _MAP}
     if not all(map(math.isfinite, values.values())):
         raise StoreError(f"the labelled point {event['point']} has columns that are no numbers")
     kind = kind_of(event["label"].decode(), name, reason, secondary)
