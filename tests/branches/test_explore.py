@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import shutil
+from dataclasses import replace
 from io import BytesIO
 from xml.etree import ElementTree
 
@@ -142,6 +143,15 @@ def test_shapes_between_kept_solutions_are_those_of_a_run_that_keeps_all(results
         assert None not in solutions(read_branch(files[1]))
 
 
+def test_shapes_after_the_last_kept_solution(results):
+    """An interrupted run keeps every tenth solution, and no last one: the others are found all the same."""
+    branch = read_branch(results / "m1_n2.h5")
+    few = replace(branch, index=branch.index[branch.index["point"] % 10 == 0])
+    assert few.kept()[-1] < len(branch.points) - 3
+    largest = np.abs(shapes(branch)).max(axis=(0, 1))
+    assert (np.abs(shapes(few) - shapes(branch)).max(axis=(0, 1)) < TOLERANCE * (largest + 1e-9)).all()
+
+
 def test_packing_error(pages):
     """At most `TOLERANCE` of the largest value of a channel, and half of that for the rounding of small parts."""
     branch = read_branch(pages / "m1_n2.h5")
@@ -175,6 +185,21 @@ def test_a_page_that_would_be_too_large_leaves_out_shapes_and_says_so(results, m
     assert len(missing) == 2 and all((results / "laws" / branch["path"]).exists() for branch in missing)
     assert data["families"][0]["branches"][0]["shapes"] is not None
     assert "the shapes of 2 branches" in capsys.readouterr().out
+    if not CHROMIUM:
+        return
+    browser = Browser(tmp_path)
+    try:
+        browser.open(tmp_path / "page.html")
+        number = next(i for i, family in enumerate(data["families"]) if family["branches"][0]["shapes"] is None)
+        browser.js(f"document.getElementById('family').onchange({{ target: {{ value: {number} }} }})")
+        browser.until("document.getElementById('left-out').offsetParent !== null")
+        shown = browser.js("document.getElementById('left-out-command').textContent")
+        assert shown == f'python -m branches.explore "{missing[0]["path"]}"'
+        browser.js("document.getElementById('family').onchange({ target: { value: 0 } })")
+        browser.until("document.getElementById('left-out').offsetParent === null")
+        assert browser.colours("#ribbon") > 200 and browser.errors == []
+    finally:
+        browser.close()
 
 
 def test_families_by_law_and_nu(results):
