@@ -296,9 +296,10 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
     Values between computed points come from a cubic spline over arclength.
     """
     found = []
-    circles = {(data["law"], data["nu"], data["covering"]) for _, data in graph.nodes(data=True) if data["kind"] == "circle"}
-    for law_, nu_, m in sorted(circles):
-        if law in (None, law_) and nu in (None, nu_):
+    materials = {family[:2] for family in families(graph) if law in (None, family[0]) and nu in (None, family[1])}
+    nodes = (data for _, data in graph.nodes(data=True) if data["kind"] == "circle")
+    for law_, nu_, m in sorted({(data["law"], data["nu"], data["covering"]) for data in nodes}):
+        if (law_, nu_) in materials:
             found.append({"law": law_, "nu": nu_, "circle": m, **_planar(law_, nu_, m, kappa_n)})
     edges = [data for *_, data in graph.edges(data=True) if law in (None, data["law"]) and nu in (None, data["nu"])]
     for number, place in places(edges, "kappa_n", kappa_n, COLUMNS[2:]):
