@@ -66,7 +66,7 @@ def executor(
 
 
 #: Seconds to wait for the first worker, and for another one when all have left: a scheduler and its workers are often started
-#: together, and a worker connects within two seconds (measured). With ten times more a forgotten worker looks like a long job.
+#: together. With ten times more, a scheduler without workers looks like a long job.
 _WORKERS_WITHIN = 10.0
 
 

@@ -7,7 +7,7 @@ import base64
 import numpy as np
 
 #: Largest error of a compressed value, relative to the largest value of its channel: a tenth of a pixel of a strip a thousand
-#: pixels large. With a tenth of it pages are a third larger, and the rounding to 16 bits (3e-5) is in the way.
+#: pixels large. With a tenth of it the rounding to 16 bits (3e-5) is in the way; twice as much makes shapes 14 % smaller.
 TOLERANCE = 1e-4
 #: A product that contributes no more than this is kept in 8 bits a number, with an error of an eighth of `TOLERANCE`.
 _SMALL = 127 * TOLERANCE / 8
