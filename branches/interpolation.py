@@ -1,7 +1,7 @@
 """Values between the computed points of many pieces of branches: cubic splines over arclength, all in one linear system.
 
-The splines are those of `scipy.interpolate.CubicSpline` (not-a-knot). One at a time they took three seconds for a question about a
-sweep of 2801 branches, together they take 0.07 s.
+The splines are those of `scipy.interpolate.CubicSpline` (not-a-knot). One at a time they took three seconds for a question about
+a sweep of 2801 branches, together they take 0.07 s.
 """
 
 from __future__ import annotations
