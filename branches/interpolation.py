@@ -1,6 +1,6 @@
 """Values between the computed points of many pieces of branches: cubic splines over arclength, all in one linear system.
 
-The splines are those of `scipy.interpolate.CubicSpline` (not-a-knot). One at a time they took three seconds for a question about
+The splines are those of `scipy.interpolate.CubicSpline` (not-a-knot). One at a time they took three seconds for a question on
 a sweep of 2801 branches, together they take 0.07 s.
 """
 
