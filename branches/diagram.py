@@ -2,40 +2,52 @@
 
 from __future__ import annotations
 
-import contextlib
+import collections
 import json
 import time
 from pathlib import Path
 
 from branches import diagram_graph
 from branches.config import Config, ConfigError, DiagramConfig, difference, dump, parse
+from branches.diagram_graph import Course
 from branches.executor import WAIT, executor, run_jobs, trouble
 from branches.files import StoreError, only_run, prepare, write_bytes
 from branches.names import DIAGRAM, primary_file
-from branches.read import complete_run, read_branch
+from branches.read import read_branch
+
+#: Combinations without a branch that the summary names; the diagram names all. A sweep over nu has a thousand.
+_MOST_NAMED = 10
+#: Places in the order of branches are multiples of this, modulo 1 (the golden ratio): the branches so far are a fair sample.
+_SPREAD = (5**0.5 - 1) / 2
 
 
-def compute(text: str) -> tuple[bytes, str]:
-    """Compute one branch from the text of its scene, in any process: return the image of its file, and the outcome."""
+def compute(config: Config) -> tuple[bytes, str, Course]:
+    """Compute one branch, in any process; return the image of its file, the reason of a failure or '', and its course."""
     from branches.display import Display
     from branches.job import compute_branch
 
-    return compute_branch(parse(text, "scene"), Display(silent=True))
+    branch = compute_branch(config, Display(silent=True))
+    return branch.image, "" if branch.status == "complete" else branch.stop, diagram_graph.course_of(branch)
 
 
 class _Plan:
     """The order of the branches, in which none is computed twice from its two ends.
 
     A branch (m, n) may end on the (2n - m)-covered circle, where it is the branch (2n - m, n). The second branch of such a pair
-    waits for the first, and is left out if the first one ends at its start.
+    follows the first and waits for it, and is left out if the first one ends at its start. Otherwise the order mixes long and
+    short branches, so that the time left can be estimated from the branches so far.
     """
 
-    def __init__(self, configs: list[Config], missing: list[Config], graph):
+    def __init__(self, configs: tuple[Config, ...], missing: list[Config], graph):
         self._graph = graph
         keys = {self._key(config) for config in configs}
         self._later = {key: other for key in keys if (other := self._partner(key)) in keys and other[2] < key[2]}
-        self._open = sorted(missing, key=lambda config: (self._key(config) in self._later, config.n * config.m))
+        places = {self._key(config): number * _SPREAD % 1 for number, config in enumerate(configs)}
+        self._open = collections.deque(sorted(missing, key=lambda config: self._place(self._key(config), places)))
         self.left_out: list[Config] = []
+
+    def _place(self, key, places) -> tuple[float, bool]:
+        return places[self._later.get(key, key)], key in self._later
 
     @staticmethod
     def _key(config):
@@ -48,17 +60,18 @@ class _Plan:
 
     def next(self, running):
         """Return the next branch, `WAIT`, or None."""
-        busy = {self._key(config) for config in running}
-        for config in list(self._open):
+        busy, waiting, found = {self._key(config) for config in running}, [], None
+        while self._open and found is None:
+            config = self._open.popleft()
             other = self._later.get(self._key(config))
             if other in busy:
-                continue
-            self._open.remove(config)
-            if other and diagram_graph.holds_circle(self._graph, config.material, config.nu, config.m, config.n):
+                waiting.append(config)
+            elif other and diagram_graph.holds_circle(self._graph, config.material, config.nu, config.m, config.n):
                 self.left_out.append(config)
-                continue
-            return config
-        return WAIT if self._open else None
+            else:
+                found = config
+        self._open.extendleft(reversed(waiting))
+        return found or (WAIT if waiting else None)
 
 
 def run_diagram(
@@ -86,69 +99,81 @@ def run_diagram(
     began, folder, graph = time.perf_counter(), Path(folder), diagram_graph.new_graph(config.title)
     prepare(folder / DIAGRAM)
     with only_run(folder / DIAGRAM):
-        if not overwrite:
-            _refuse_another_scene(config, folder)
+        kept = {} if overwrite else _kept(config, folder)
         run = executor(scheduler, workers, time_limit)
-        failed, left_out = _compute_missing(config, folder, graph, display, run, overwrite)
+        failed, left_out = _compute_missing(config, folder, graph, display, run, kept)
         graph.graph.update({"config": dump(config), "failed": json.dumps(failed), "absent": json.dumps(config.absent)})
         diagram_graph.save(graph, folder)
     display.diagram_summary(_summary(config, graph, failed, left_out, time.perf_counter() - began, folder))
     return "lost" if failed else "complete"
 
 
-def _refuse_another_scene(config: DiagramConfig, folder: Path) -> None:
-    """Raise StoreError if a branch in the folder would be replaced, or would no longer be in a diagram.
+def _kept(config: DiagramConfig, folder: Path) -> dict[str, Course]:
+    """Return the complete branches in the folder, by file name.
 
-    A scene with the same branches and further ones is accepted.
+    Raises
+    ------
+    StoreError
+        A branch in the folder would be replaced, or would no longer be in a diagram. (A scene with the same branches and
+        further ones is accepted.)
     """
-    advice = "--overwrite replaces its diagram, --out writes elsewhere"
-    ours = {primary_file(one): one for one in config.branches}
-    stored = _stored_scenes(folder, ours, advice)
-    for name, scene in stored.items():
-        differs = difference(scene, ours[name]) if name in ours else ""
-        if differs:
-            raise StoreError(f"{str(folder)!r} holds another scene ({name}: {differs}); {advice}")
+    ours, kept = {primary_file(one): one for one in config.branches}, {}
+    for name, scene in _stored_scenes(config, folder).items():
         if name not in ours:
-            raise StoreError(f"{str(folder)!r} holds another scene ({name} is not a branch of this one); {advice}")
-
-
-def _stored_scenes(folder: Path, names, advice: str) -> dict[str, Config]:
-    """Return the scenes of the branches in a folder: those of its diagram, and those of its files with one of the names."""
-    found = {}
-    if (folder / DIAGRAM).exists():
+            raise _another_scene(folder, f"{name} is not a branch of this one")
+        if differs := difference(scene, ours[name]):
+            raise _another_scene(folder, f"{name}: {differs}")
+    for name, one in ours.items():
         try:
-            text = diagram_graph.read(folder).graph["config"]
-            scene = parse(text, DIAGRAM)
-        except (StoreError, ConfigError, KeyError) as error:
-            raise StoreError(f"{str(folder)!r} holds a diagram that is not a result of branches.run; {advice}") from error
-        found = {primary_file(one): one for one in scene.branches}
-    for name in names:
-        with contextlib.suppress(StoreError, ConfigError):  # an unreadable branch is computed again
-            found[name] = Config.model_validate(read_branch(folder / name).config)
-    return found
+            branch = read_branch(folder / name)
+        except StoreError:  # there is none, or it cannot be read: it is computed
+            continue
+        if differs := difference(Config.model_validate(branch.config), one):
+            raise _another_scene(folder, f"{name}: {differs}")
+        if branch.status == "complete":
+            kept[name] = diagram_graph.course_of(branch)
+    return kept
 
 
-def _compute_missing(config, folder, graph, display, run, overwrite) -> tuple[dict[str, str], list[Config]]:
+_ADVICE = "--overwrite replaces its diagram, --out writes elsewhere"
+
+
+def _another_scene(folder: Path, reason: str) -> StoreError:
+    return StoreError(f"{str(folder)!r} holds another scene ({reason}); {_ADVICE}")
+
+
+def _stored_scenes(config: DiagramConfig, folder: Path) -> dict[str, Config]:
+    """Return the scenes of the branches of a folder's diagram by file name; none if it has no diagram, or one of this scene."""
+    if not (folder / DIAGRAM).exists():
+        return {}
+    try:
+        text = diagram_graph.read(folder).graph["config"]
+        if text == dump(config):
+            return {}
+        scene = parse(text, DIAGRAM)
+        return {primary_file(one): one for one in scene.branches}
+    except (StoreError, ConfigError, KeyError) as error:
+        raise StoreError(f"{str(folder)!r} holds a diagram that is not a result of branches.run; {_ADVICE}") from error
+
+
+def _compute_missing(config, folder, graph, display, run, kept) -> tuple[dict[str, str], list[Config]]:
     """Compute the missing branches; return the failed ones, by file name with the reason, and those left out as duplicates."""
-    configs = config.branches
-    fresh = []
-    for one in configs:
-        stored = None if overwrite else complete_run(folder / primary_file(one), one)
-        if stored is None:
-            fresh.append(one)
-        else:
-            diagram_graph.add_branch(graph, stored, primary_file(one))
-    plan, failed = _Plan(configs, fresh, graph), {}
+    for name, course in kept.items():
+        diagram_graph.add_course(graph, course, name)
+    fresh = [one for one in config.branches if primary_file(one) not in kept]
+    plan, failed = _Plan(config.branches, fresh, graph), {}
     _load_kernels(fresh)
-    display.begin_diagram(config, len(configs), len(configs) - len(fresh))
+    display.begin_diagram(config, len(config.branches), len(kept))
+    done = len(kept)
     if fresh:
         with run as (submit, wait, limit):
-            for one, result in run_jobs(plan.next, _compute_one, submit, limit, wait):
-                problem = _take(folder, one, result, graph)
+            for one, result in run_jobs(plan.next, compute, submit, limit, wait):
+                name, done = primary_file(one), done + 1
+                problem = _take(folder, name, result, graph)
                 if problem:
-                    failed[primary_file(one)] = problem
-                place = "" if problem else diagram_graph.describe(graph, one.m, one.n, one.material, one.nu)
-                display.branch_done(one, problem, place)
+                    failed[name] = problem
+                nodes = [] if problem else [attributes for _, attributes in result[2].nodes]
+                display.branch_done(one, problem, nodes, done + len(plan.left_out))
     return failed, plan.left_out
 
 
@@ -162,13 +187,11 @@ def _summary(config, graph, failed, left_out, seconds, folder) -> list[str]:
     ]
     if left_out:
         lines.append(f"  {len(left_out)} duplicates (the same branches from their other ends) are merged")
-    lines += [f"  left out: {name}: {reason}" for name, reason in config.absent.items()]
+    lines += [f"  left out: {name}: {reason}" for name, reason in list(config.absent.items())[:_MOST_NAMED]]
+    if len(config.absent) > _MOST_NAMED:
+        lines.append(f"  left out: {len(config.absent) - _MOST_NAMED} more, which diagram.json names (absent)")
     lines += [f"  failed: {name}: {reason}" for name, reason in failed.items()]
     return [*lines, f"  written to {folder} (diagram.json, diagram.graphml, one file per branch)"]
-
-
-def _compute_one(config: Config):
-    return compute(dump(config))
 
 
 def _load_kernels(configs):
@@ -180,13 +203,11 @@ def _load_kernels(configs):
         system.functionals(x)
 
 
-def _take(folder: Path, config: Config, result, graph) -> str:
+def _take(folder: Path, name: str, result, graph) -> str:
     """Write a finished branch to its file and add it to the diagram; return the reason of a failure, or ''."""
     if isinstance(result, BaseException):
         return trouble(result)
-    image, outcome = result
-    path = folder / primary_file(config)
-    write_bytes(path, image)
-    branch = read_branch(path)
-    diagram_graph.add_branch(graph, branch, path.name)
-    return "" if outcome == "complete" else branch.stop
+    image, problem, course = result
+    write_bytes(folder / name, image)
+    diagram_graph.add_course(graph, course, name)
+    return problem

@@ -7,6 +7,8 @@ their columns. The command is ``python -m branches.graph DIR`` (`branches.graph`
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import numpy as np
 
 from branches import interrupt
 from branches.files import StoreError, write_bytes
+from branches.interpolation import places
 from branches.labels import SPECIAL, kind_of
 from branches.names import DIAGRAM, GRAPHML
 from contin import exact_text
@@ -35,6 +38,31 @@ def new_graph(title: str = ""):
     return networkx.MultiGraph(title=title, format="ribbon bifurcation diagram", format_version=1)
 
 
+@dataclass(frozen=True)
+class Course:
+    """A primary branch as a diagram holds it.
+
+    Attributes
+    ----------
+    family : dict
+        law, nu, m and n.
+    nodes : list of (str, dict)
+        Identifiers and attributes of its special points (see `node`), from end to end.
+    pieces : list of dict
+        The columns between consecutive special points, as lists.
+    """
+
+    family: dict
+    nodes: list[tuple[str, dict]]
+    pieces: list[dict]
+
+
+def course_of(branch) -> Course:
+    """Return the course of a primary branch: anything with ``config``, ``points``, ``events`` and ``reason``."""
+    family, special = _family(branch.config), _special(branch)
+    return Course(family, [_node_of(event, family, branch.reason) for event in special], _pieces_of(branch, special))
+
+
 def add_branch(graph, branch, name: str) -> bool:
     """Add a stored branch to the diagram.
 
@@ -51,27 +79,46 @@ def add_branch(graph, branch, name: str) -> bool:
         False if the diagram has it already, computed from its other end. (One branch leaves a bifurcation on each
         domain, and its images under the symmetries of the primary branch.)
     """
-    config = branch.config
+    if not branch.config["origin"]:
+        return add_course(graph, course_of(branch), name)
+    family, special = _family(branch.config), _special(branch)
+    nodes = _nodes_of_secondary(graph, special, family, branch)
+    start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
+    if any(data.get("domain") == family["domain"] for _, _, data in start):
+        return False
+    return connect(graph, family, nodes, _pieces_of(branch, special), file=name)
+
+
+def add_course(graph, course: Course, name: str) -> bool:
+    """Add a primary branch from the file ``name`` to the diagram; see `add_branch`."""
+    return connect(graph, course.family, course.nodes, course.pieces, file=name)
+
+
+def _family(config: dict) -> dict:
+    """Return what the edges of a branch have in common."""
     family = {"law": label(config["law"], config["Gamma"]), "nu": config["nu"], "m": config["m"], "n": config["n"]}
     if config["origin"]:
         family |= {"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"], "domain": config["domain"]}
-    special = [event for event in branch.events if event["label"].decode() in SPECIAL]
-    if config["origin"]:
-        nodes = _nodes_of_secondary(graph, special, family, branch)
-        start = graph.edges(nodes[0][0], data=True) if nodes[0][0] in graph else ()
-        if any(data.get("domain") == family["domain"] for _, _, data in start):
-            return False
-    else:
-        nodes = [_node_of(event, family, branch.reason) for event in special]
-    rows = [branch.points[first["point"] : last["point"] + 1] for first, last in pairwise(special)]
-    pieces = [{column: piece[column].tolist() for column in COLUMNS} for piece in rows]
-    if config["origin"]:
-        for piece, values in zip(pieces, rows):
-            piece["force"] = np.sqrt(values["R1"] ** 2 + values["R2"] ** 2 + values["R3"] ** 2).tolist()
-    if "index" in branch.points.dtype.names:
-        for piece, values in zip(pieces, rows):
-            piece["index"] = common_index(values["index"])
-    return connect(graph, family, nodes, pieces, file=name)
+    return family
+
+
+def _special(branch) -> list:
+    """Return the labelled points of a branch that are nodes of a diagram."""
+    return [event for event in branch.events if event["label"].decode() in SPECIAL]
+
+
+def _pieces_of(branch, special: list) -> list[dict]:
+    """Return the columns between consecutive special points."""
+    found = []
+    for first, last in pairwise(special):
+        rows = branch.points[first["point"] : last["point"] + 1]
+        piece = {column: rows[column].tolist() for column in COLUMNS}
+        if branch.config["origin"]:
+            piece["force"] = np.sqrt(rows["R1"] ** 2 + rows["R2"] ** 2 + rows["R3"] ** 2).tolist()
+        if "index" in rows.dtype.names:
+            piece["index"] = common_index(rows["index"])
+        found.append(piece)
+    return found
 
 
 def _nodes_of_secondary(graph, special, family: dict, branch) -> list[tuple[str, dict]]:
@@ -172,8 +219,18 @@ def families(graph) -> list[tuple]:
 
 def pieces(graph, family: tuple) -> list[tuple]:
     """Return the edges (a, b, columns) of the primary branch (law, nu, m, n), from end to end."""
-    found = [edge for edge in graph.edges(data=True) if family_of(edge[2]) == family and "origin" not in edge[2]]
-    return sorted(found, key=lambda edge: edge[2]["arclength"][0])
+    return _by_family(graph).get(family, [])
+
+
+def _by_family(graph) -> dict[tuple, list[tuple]]:
+    """Return the edges of every primary branch, from end to end, in one pass over the diagram."""
+    found: dict[tuple, list[tuple]] = {}
+    for edge in graph.edges(data=True):
+        if "origin" not in edge[2]:
+            found.setdefault(family_of(edge[2]), []).append(edge)
+    for edges in found.values():
+        edges.sort(key=lambda edge: edge[2]["arclength"][0])
+    return found
 
 
 def secondaries(graph, law: str | None = None, nu: float | None = None) -> list[dict]:
@@ -201,10 +258,9 @@ def course(graph, m: int, n: int, law: str | None = None, nu: float | None = Non
         The diagram has no such branch.
     """
     result = []
-    for law_, nu_, m_, n_ in families(graph):
+    for (law_, nu_, _, n_), nodes in courses(graph):
         if n_ != n or law not in (None, law_) or nu not in (None, nu_):
             continue
-        nodes = _in_order(graph, pieces(graph, (law_, nu_, m_, n_)))
         if nodes[-1].get("covering") == m:
             nodes.reverse()
         if nodes[0].get("covering") == m:
@@ -212,6 +268,12 @@ def course(graph, m: int, n: int, law: str | None = None, nu: float | None = Non
     if not result:
         raise KeyError(f"the diagram has no branch (m, n) = ({m}, {n})")
     return result
+
+
+def courses(graph) -> Iterator[tuple[tuple, list[dict]]]:
+    """Yield (law, nu, m, n) and the special points, from end to end, of every primary branch, in order."""
+    for family, edges in sorted(_by_family(graph).items(), key=lambda item: item[0]):
+        yield family, _in_order(graph, edges)
 
 
 def family_of(data) -> tuple:
@@ -234,19 +296,16 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
     Values between computed points come from a cubic spline over arclength.
     """
     found = []
-    for law_, nu_ in sorted({family[:2] for family in families(graph)}):
-        if law not in (None, law_) or nu not in (None, nu_):
-            continue
-        coverings = {
-            d["covering"] for _, d in graph.nodes(data=True) if d["kind"] == "circle" and (d["law"], d["nu"]) == (law_, nu_)
-        }
-        for m in sorted(coverings):
+    materials = {family[:2] for family in families(graph) if law in (None, family[0]) and nu in (None, family[1])}
+    nodes = (data for _, data in graph.nodes(data=True) if data["kind"] == "circle")
+    for law_, nu_, m in sorted({(data["law"], data["nu"], data["covering"]) for data in nodes}):
+        if (law_, nu_) in materials:
             found.append({"law": law_, "nu": nu_, "circle": m, **_planar(law_, nu_, m, kappa_n)})
-    for _, _, data in graph.edges(data=True):
-        if law in (None, data["law"]) and nu in (None, data["nu"]):
-            for place in _crossings(data, kappa_n):
-                left = {"origin": data["origin"]} if "origin" in data else {}
-                found.append({"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **left, **place})
+    edges = [data for *_, data in graph.edges(data=True) if law in (None, data["law"]) and nu in (None, data["nu"])]
+    for number, place in places(edges, "kappa_n", kappa_n, COLUMNS[2:]):
+        data = edges[number]
+        left = {"origin": data["origin"]} if "origin" in data else {}
+        found.append({"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **left, **place})
     return sorted(found, key=lambda state: (state["law"], state["nu"], state["energy"]))
 
 
@@ -255,24 +314,6 @@ def _planar(law: str, nu: float, m: int, kappa_n: float) -> dict[str, float]:
     material, Gamma = from_label(law)
     values = circle(material, m, kappa_n, nu, Gamma)
     return {"kappa_star": float(values["kappa_star"]), "energy": values["energy"]}
-
-
-def _crossings(data, kappa_n):
-    """Yield the points on one piece of a branch with a given kappa_n."""
-    from scipy.interpolate import CubicSpline
-
-    s, keep = np.unique(data["arclength"], return_index=True)
-    columns = {name: np.asarray(data[name])[keep] for name in COLUMNS[1:]}
-    if len(s) < 4:
-        inside = (columns["kappa_n"][:-1] - kappa_n) * (columns["kappa_n"][1:] - kappa_n) < 0
-        places = [float(np.interp(0, *zip(*sorted(zip(columns["kappa_n"][i : i + 2] - kappa_n, s[i : i + 2])))))
-                  for i in np.flatnonzero(inside)]  # fmt: skip
-    else:
-        places = CubicSpline(s, columns["kappa_n"] - kappa_n).roots(extrapolate=False)
-    for place in places:
-        values = {n: float(CubicSpline(s, columns[n])(place) if len(s) > 3 else np.interp(place, s, columns[n]))
-                  for n in COLUMNS[2:]}  # fmt: skip
-        yield values
 
 
 def folds(graph, low: float, high: float, law: str | None = None, nu: float | None = None) -> list[dict]:
@@ -285,14 +326,14 @@ def folds(graph, low: float, high: float, law: str | None = None, nu: float | No
 # --- in words ------------------------------------------------------------------------------------------------------
 
 
-def describe(graph, m: int, n: int, law: str, nu: float) -> str:
+def describe(nodes) -> str:
     """Return the special points of one branch in one line."""
-    return " -> ".join(map(describe_node, course(graph, m, n, law, nu)[0]["nodes"]))
+    return " -> ".join(map(describe_node, nodes))
 
 
 def describe_secondary(branch: dict) -> str:
     """Return the special points of a secondary branch (see `secondaries`) in one line."""
-    return f"{branch['mode']}, {branch['domain']}: " + " -> ".join(map(describe_node, branch["nodes"]))
+    return f"{branch['mode']}, {branch['domain']}: {describe(branch['nodes'])}"
 
 
 def describe_node(node) -> str:
@@ -312,7 +353,7 @@ def save(graph, folder: Path) -> tuple[Path, Path]:
     import networkx
 
     folder = Path(folder)
-    text = json.dumps(networkx.node_link_data(graph, edges="edges"), indent=1)
+    text = _lines(networkx.node_link_data(graph, edges="edges"))
     plain = networkx.MultiGraph(**graph.graph)
     plain.add_nodes_from(graph.nodes(data=True))
     for a, b, data in graph.edges(data=True):
@@ -322,6 +363,13 @@ def save(graph, folder: Path) -> tuple[Path, Path]:
         write_bytes(paths[0], text.encode())
         write_bytes(paths[1], "\n".join(networkx.generate_graphml(plain)).encode())
     return paths
+
+
+def _lines(data: dict) -> str:
+    """Return a graph as JSON with a line for each node and edge (`json.dumps` with ``indent`` takes four times as long)."""
+    rows = {name: ",\n".join(map(json.dumps, data.pop(name))) for name in ("nodes", "edges")}
+    lists = ", ".join(f'"{name}": [\n{lines}\n]' for name, lines in rows.items())
+    return f"{json.dumps(data)[:-1]}, {lists}}}\n"
 
 
 def read(folder: str | Path):

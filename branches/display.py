@@ -128,24 +128,35 @@ class Display:
 
     def begin_diagram(self, config, total: int, kept: int) -> None:
         """Say how many branches a diagram has, and how many of them are there already."""
-        self._total, self._done = total, kept
+        self._total, self._kept, self._began = total, kept, time.monotonic()
         if not self._quiet:
             there = f", {kept} of them computed before" if kept else ""
             self.note(f"{config.title or 'diagram'}: {total} branches{there}")
 
-    def branch_done(self, config, problem: str, course: str) -> None:
-        """One branch more: where it went, or what went wrong with it."""
-        self._done += 1
-        if not self._quiet:
-            self.clear()
-            self.note(f"  {name_of(config)}: {'FAILED: ' + problem if problem else course}")
-        rate = (time.monotonic() - self._began) / self._done
-        self._line(f"{self._done} of {self._total} branches, {rate * (self._total - self._done):.0f} s to go")
+    def branch_done(self, config, problem: str, nodes: list[dict], settled: int) -> None:
+        """Show a branch: its special points, or why it failed. So many branches are ``settled``: there, failed or left out."""
+        if self._quiet:
+            return
+        from branches.diagram_graph import describe  # not for --help
+
+        self.clear()
+        self.note(f"  {name_of(config)}: {'FAILED: ' + problem if problem else describe(nodes)}")
+        each = (time.monotonic() - self._began) / (settled - self._kept)
+        self._line(f"{settled} of {self._total} branches, about {duration(each * (self._total - settled))} to go")
 
     def diagram_summary(self, summary: list[str]) -> None:
         """What came out."""
         self.clear()
         self.note("\n".join(summary if self._quiet else ["", *summary]))
+
+
+#: Seconds below which times are given in seconds, above in minutes.
+_MINUTES_FROM = 120.0
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words."""
+    return f"{seconds:.0f} s" if seconds < _MINUTES_FROM else f"{seconds / 60:.0f} min"
 
 
 def name_of(config) -> str:

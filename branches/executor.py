@@ -46,7 +46,7 @@ def executor(
     Raises
     ------
     ExecutorError
-        Dask is not installed, or the scheduler does not answer.
+        Dask is not installed, the scheduler does not answer or has no workers, or all of its workers have left.
     """
     if scheduler is None:
         count = workers or cores()
@@ -62,7 +62,36 @@ def executor(
     except (OSError, ValueError) as error:
         raise ExecutorError(f"--scheduler {scheduler!r}: no Dask scheduler answers there") from error
     with client:
-        yield functools.partial(client.get_executor().submit, _alone), first_done, max(1, sum(client.nthreads().values()))
+        _await_workers(client, scheduler)
+        submit = functools.partial(client.get_executor().submit, _alone)
+        yield submit, _first_done_by(client, scheduler), max(1, sum(client.nthreads().values()))
+
+
+#: Seconds to wait for the first worker, and for another one when all have left: a scheduler and its workers are often started
+#: together. With ten times more, a scheduler without workers looks like a long job.
+_WORKERS_WITHIN = 10.0
+
+
+def _await_workers(client, scheduler: str) -> None:
+    """Wait until the scheduler has a worker; raise ExecutorError if none comes."""
+    try:
+        client.wait_for_workers(1, timeout=_WORKERS_WITHIN)
+    except TimeoutError as error:
+        raise ExecutorError(
+            f"--scheduler {scheduler!r}: the scheduler answers, but has no workers, and none joined it within "
+            f"{_WORKERS_WITHIN:g} s; start some, as in: dask worker {scheduler}"
+        ) from error
+
+
+def _first_done_by(client, scheduler: str) -> Wait:
+    """Return a function that waits until some futures are done; it raises ExecutorError if the scheduler loses all workers."""
+
+    def wait(running: Iterable[futures.Future]) -> set[futures.Future]:
+        while not (done := futures.wait(running, _WORKERS_WITHIN, futures.FIRST_COMPLETED).done):
+            _await_workers(client, scheduler)
+        return done
+
+    return wait
 
 
 def first_done(running: Iterable[futures.Future]) -> set[futures.Future]:

@@ -13,9 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from branches import diagram_graph as diagram
-from branches.config import ConfigError, load
 from branches.files import StoreError
-from branches.preview import preview
 from contin import exact_text
 
 
@@ -25,11 +23,17 @@ def read(path: str | Path):
     Raises
     ------
     StoreError
-        There is none.
-    ConfigError
-        The scene is none.
+        There is none, or the scene is none.
     """
-    return preview(load(path)) if Path(path).suffix in (".yaml", ".yml") else diagram.read(path)
+    if Path(path).suffix not in (".yaml", ".yml"):
+        return diagram.read(path)
+    from branches.config import ConfigError, load  # with the quadrature they take 0.15 s: not for questions about results
+    from branches.preview import preview
+
+    try:
+        return preview(load(path))
+    except ConfigError as error:
+        raise StoreError(str(error)) from error
 
 
 def main(argv=None) -> int:
@@ -48,7 +52,7 @@ def main(argv=None) -> int:
     options = parser.parse_args(argv)
     try:
         lines = list(_answers(read(options.folder), options))
-    except (ConfigError, StoreError) as error:
+    except StoreError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyError as error:
@@ -63,9 +67,7 @@ def _answers(graph, options) -> Iterable[str]:
         yield graph.graph["source"]
     if options.where:
         for branch in diagram.course(graph, *options.where):
-            yield f"{branch['law']}, nu = {exact_text(branch['nu'])}: " + " -> ".join(
-                map(diagram.describe_node, branch["nodes"])
-            )
+            yield f"{branch['law']}, nu = {exact_text(branch['nu'])}: {diagram.describe(branch['nodes'])}"
         for branch in diagram.secondaries(graph):
             if branch["family"][2:] == tuple(options.where):
                 yield f"  {diagram.describe_secondary(branch)}"
@@ -80,9 +82,10 @@ def _answers(graph, options) -> Iterable[str]:
             place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
             yield f"{data['law']}, nu = {exact_text(data['nu'])}: fold at {place}"
     if not options.where and options.at is None and not options.folds:
-        yield f"{len(diagram.families(graph))} branches, {graph.number_of_nodes()} special points"
-        for law, nu, m, n in diagram.families(graph):
-            yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(graph, m, n, law, nu)}"
+        found = list(diagram.courses(graph))
+        yield f"{len(found)} branches, {graph.number_of_nodes()} special points"
+        for (law, nu, m, n), nodes in found:
+            yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(nodes)}"
 
 
 if __name__ == "__main__":

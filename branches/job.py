@@ -8,6 +8,8 @@ import signal
 import time
 from pathlib import Path
 
+import numpy as np
+
 from branches.config import Config, ConfigError, difference, dump, parse
 from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
@@ -81,15 +83,30 @@ def _shown(stop: Stop | None) -> Stop | None:
     return dataclasses.replace(stop, message=f"{stop.message}, the scene's own limit")
 
 
-def compute_branch(config: Config, display) -> tuple[bytes, str]:
-    """Return the branch of ``config`` as the image of its file, and its outcome; no file is written.
+@dataclasses.dataclass(frozen=True)
+class Computed:
+    """A branch that was computed in memory; ``image`` is that of its file, the rest as in `branches.read.StoredBranch`."""
+
+    image: bytes
+    status: str
+    stop: str
+    reason: str
+    config: dict
+    points: np.ndarray
+    events: np.ndarray
+
+
+def compute_branch(config: Config, display) -> Computed:
+    """Return the branch of ``config``; no file is written.
 
     Ctrl-C is not caught here: the points so far would be lost with the memory.
     """
     run, watch = begun(config)
     with contextlib.closing(_writer(None, config, run, watch)) as writer:
         outcome = _follow(config, run, writer, display, _Interruption(()))
-        return writer.image(), outcome
+        stop = run.stop.reason if run.stop else ""
+        tables = writer.points(), writer.events()
+        return Computed(writer.image(), outcome, str(run.stop or ""), stop, config.model_dump(), *tables)
 
 
 def _writer(path, config: Config, run: Continuation, watch, image=None) -> BranchWriter:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from branches.config import Config
+from typing import TYPE_CHECKING
+
 from contin import exact_text
+
+if TYPE_CHECKING:  # a question about a diagram needs no scenes, which take 0.1 s to import
+    from branches.config import Config
 
 #: The files of a diagram, in two formats.
 DIAGRAM, GRAPHML = "diagram.json", "diagram.graphml"

@@ -6,15 +6,13 @@ import threading
 import time
 from typing import TYPE_CHECKING, ClassVar
 
-from branches.display import Display, write_output
+from branches.display import Display, duration, write_output
 
 if TYPE_CHECKING:  # nothing heavy is imported here: the line is to be shown while the heavy modules are imported
     from contin import Point
 
 #: Seconds between two updates of the line while nothing else happens. Ten times more would look like a program that hangs.
 _PERIOD = 1.0
-#: Seconds below which times are given in seconds, above in minutes.
-_MINUTES_FROM = 120.0
 _STARTING = "starting (the first run compiles machine code, which takes half a minute)"
 
 
@@ -101,11 +99,11 @@ class Progress(Display):
     def text(self) -> str:
         """Return the line."""
         now = time.monotonic()
-        so_far = f"{_duration(now - self._began)} so far"
+        so_far = f"{duration(now - self._began)} so far"
         if not self._total:
             return f"{self._what}: {so_far}{self._detail}"
         left = self._left(now)
-        estimate = "" if left is None else f", about {_duration(left)} to go"
+        estimate = "" if left is None else f", about {duration(left)} to go"
         part = f": {self._part}{self._detail}" if self._part else ""
         return f"{self._done} of {self._total} {self._what} done, {so_far}{estimate}{part}"
 
@@ -147,17 +145,8 @@ class StartingDisplay(Display):
         self._start.stop()
         super().clear()
 
-    def begin_diagram(self, config, total: int, kept: int) -> None:
-        """Say how many branches there are; estimates of the time left do not contain the time of the start."""
-        super().begin_diagram(config, total, kept)
-        self._began = time.monotonic()
-
     def point(self, point: Point, number: int, step: float) -> None:
         """Show a point; the rate counts from the first one, without the time of the start."""
         if number == self._first:
             self._began = self._shown = time.monotonic()
         super().point(point, number, step)
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < _MINUTES_FROM else f"{seconds / 60:.0f} min"

@@ -188,8 +188,7 @@ def _computed(path: Path, config: Config, progress: Progress) -> StoredBranch:
     """Return the branch of a scene: from the file if it is complete, otherwise computed."""
     stored = complete_run(path, config)
     if stored is None:
-        image, _ = compute_branch(config, progress)
-        write_bytes(path, image)
+        write_bytes(path, compute_branch(config, progress).image)
         stored = read_branch(path)
     return stored
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, fields
 
@@ -119,6 +120,13 @@ def quaternions(directors) -> np.ndarray:
     return q * np.cumprod(np.where(flipped, -1.0, 1.0))[:, None]
 
 
+@functools.cache  # it takes as long as the rest of `quadrature_centreline`
+def _integrals(degree: int) -> np.ndarray:
+    """Return the matrix that integrates values at the Gauss points from 0 to each further node."""
+    tables = basis(degree)
+    return tables.integrals(tables.nodes[1:])
+
+
 def quadrature_centreline(t, states, degree: int, length: float) -> np.ndarray:
     """Return x at the nodes, shape (K, 3), x(0) = 0: the integral of d3, by the Gauss points of each interval."""
     tables = basis(degree)
@@ -126,6 +134,6 @@ def quadrature_centreline(t, states, degree: int, length: float) -> np.ndarray:
     nodal = np.stack([states[i : i + (len(h) - 1) * degree + 1 : degree, :4] for i in range(degree + 1)], axis=1)
     at_gauss = np.einsum("ij,ejk->eik", tables.value, nodal)
     d3 = np.array(directors(*np.moveaxis(at_gauss, -1, 0))[6:]).transpose(1, 2, 0)
-    inside = length * h[:, None, None] * np.einsum("ij,ejk->eik", tables.integrals(tables.nodes[1:]), d3)
+    inside = length * h[:, None, None] * np.einsum("ij,ejk->eik", _integrals(degree), d3)
     inside[1:] += np.cumsum(inside[:, -1], axis=0)[:-1, None]
     return np.concatenate([np.zeros((1, 3)), inside.reshape(-1, 3)])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import Collocation, Point
+from contin import Collocation, Point, basis, interpolation
 from ribbon_model import stability
 from ribbon_model.domains import CELL, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH, on_directors
@@ -106,6 +106,24 @@ class Solution:
         omega = self.strains()
         part = Shape(length * np.asarray(self.t), x, frames(states), omega[:, 2] / omega[:, 0])
         return self.domain.whole(part, self.parameters)
+
+    def sampled(self, t: np.ndarray) -> np.ndarray:
+        """Return quaternion and centreline at places t (K,) of the unit interval, shape (K, 7)."""
+        if self.states.shape[1] > 4:
+            return self._interpolated(self.states, t)
+        x = quadrature_centreline(self.t, self.states, self.degree, self.parameters["length"])
+        return self._interpolated(np.hstack([self.states, x]), t)
+
+    def on_nodes(self, t: np.ndarray) -> np.ndarray:
+        """Return the states at places t (K,) of the unit interval, shape (K, n)."""
+        return self.states if np.array_equal(t, self.t) else self._interpolated(self.states, t)
+
+    def _interpolated(self, nodal: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Return the values at t of the piecewise polynomials with these values at the nodes."""
+        tables, mesh = basis(self.degree), self.t[:: self.degree]
+        j = np.clip(np.searchsorted(mesh, t, side="right") - 1, 0, len(mesh) - 2)
+        matrix = interpolation(tables.nodes, tables.barycentric, (t - mesh[j]) / (mesh[j + 1] - mesh[j]))
+        return np.einsum("ij,ijk->ik", matrix, nodal[self.degree * j[:, None] + np.arange(self.degree + 1)])
 
     def equilibrium(self) -> Equilibrium:
         """Return the equilibrium along the whole loop, for its second variation; raises as `from_solution`."""

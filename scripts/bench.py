@@ -1,6 +1,6 @@
 """Time contin and other tools on your machine: pictures, a table of ratios, and every number as JSON.
 
-    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [stress] [cores] [--quick] [--out DIR]
+    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [--quick] [--out DIR]
 
 Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A tool
 that is not installed is left out, and the output names it. See docs/performance.md.
@@ -22,7 +22,7 @@ from benchmarks.measure import ONE_THREAD  # noqa: E402  (it imports nothing tha
 
 os.environ.update(ONE_THREAD)
 
-PARTS = ("like-for-like", "fold", "cost", "startup", "stress", "cores")
+PARTS = ("like-for-like", "fold", "cost", "startup", "many", "stress", "cores")
 
 
 def arguments(argv=None) -> argparse.Namespace:
@@ -52,7 +52,7 @@ def arguments(argv=None) -> argparse.Namespace:
 
 def measure(part: str, quick: bool, bifpy_python: str) -> dict:
     """Run one part."""
-    from benchmarks import cores, cost, fold, like_for_like, startup, stress
+    from benchmarks import cores, cost, fold, like_for_like, many, startup, stress
 
     from ribbon_model import exact
 
@@ -60,6 +60,8 @@ def measure(part: str, quick: bool, bifpy_python: str) -> dict:
         return cost.run(quick)
     if part == "startup":
         return startup.run(quick)
+    if part == "many":
+        return many.run(quick)
     if part == "stress":
         return stress.run(quick)
     exact_fold = exact.folds(1, 2)[0].kappa_n

@@ -22,7 +22,6 @@ def main(argv=None) -> int:
     parser.add_argument("--nu", type=float, help="which nu, where the diagram has several")
     parser.add_argument("--plain", action="store_true", help="only in conjugate coordinates, not disentangled beside")
     options = parser.parse_args(argv)
-    from branches.config import ConfigError
     from branches.draw_diagram import figure
     from branches.files import StoreError, check_picture, write_picture
     from branches.graph import read
@@ -33,7 +32,7 @@ def main(argv=None) -> int:
         law, nu, more = choose(graph, options.law, options.nu)
         check_picture(out)
         write_picture(figure(graph, law, nu, tuple(options.window), not options.plain), out)
-    except (ConfigError, StoreError) as error:
+    except StoreError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     print(f"{more}written to {out}")

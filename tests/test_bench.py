@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
 
-from benchmarks import cost, fold, report, startup  # noqa: E402
+from benchmarks import cost, fold, many, report, startup  # noqa: E402
 from peers import auto_07p, scipy_bvp  # noqa: E402
 
 BRANCH_FILE = """\
@@ -92,3 +92,11 @@ def test_jacobian_given_to_solve_bvp_is_exact():
         e = 1e-6 * np.eye(3)[j]
         difference = (scipy_bvp.rhs(0, q, p + e) - scipy_bvp.rhs(0, q, p - e)) / 2e-6
         np.testing.assert_allclose(by_parameters[:, j], difference, atol=1e-8)
+
+
+def test_the_table_of_many_branches():
+    """Rates are branches over seconds; a cluster that was not measured has no row."""
+    results = {"branches": 100, "one": 8.0, "two": 5.0, "cpu": 6.0, "question": 0.5, "page": 9.0, "megabytes": 6.0}
+    text = many.table(results)
+    assert "| one process | 8.0 s | 12.5 |" in text and "| two processes | 5.0 s | 20.0 |" in text and "60 ms a branch" in text
+    assert "Dask" not in text and "| Dask cluster of two workers | 4.0 s | 25.0 |" in many.table(results | {"cluster": 4.0})

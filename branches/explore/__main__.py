@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 
 from branches import interrupt
@@ -23,6 +24,7 @@ def arguments(argv=None):
         help="a branch file (.h5), the folder of a diagram, a file of contin.save (.npz), or a folder of those",
     )  # fmt: skip
     parser.add_argument("--out", metavar="PAGE", default="explore.html", help="the page (default: explore.html)")
+    parser.add_argument("--quiet", action="store_true", help="show no line of progress")
     return parser.parse_args(argv)
 
 
@@ -32,19 +34,25 @@ def main(argv=None) -> int:
 
     survive_any_encoding()
     options = arguments(argv)
-    from branches.explore.gather import gather
+    from branches.explore.gather import gather, left_out
     from branches.explore.page import MissingLibraryError, assemble
     from branches.files import StoreError, write_bytes
     from contin import ContinError
 
     try:
         path = _page_path(options.out)
-        page = assemble(gather(options.results)).encode()
+        data = gather(options.results, options.quiet)
+        page = assemble(data).encode()
         write_bytes(path, page)
     except (StoreError, MissingLibraryError, ContinError) as error:
         complain(f"error: {error}")
         return EXIT_BAD_INPUT
     write_output(f"written to {path} ({len(page) / 1e6:.1f} MB); open it in a browser\n")
+    if missing := left_out(data):
+        write_output(
+            f"left out to keep the page small: the shapes of {len(missing)} branches, which the page names; a page of fewer "
+            f"results has them, as in: python -m branches.explore {shlex.quote(missing[0]['path'])}\n"
+        )
     return 0
 
 

@@ -2,26 +2,54 @@
 // A branch: its columns, and its states, anywhere along it.
 
 const FINE = 8; // pieces of a drawn curve between neighbouring points
+const CIRCLE_PIECES = 8; // pieces of a circle between neighbouring points of the data: its columns are parabolas
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+const KINDS = { d: Float64Array, b: Int8Array, h: Int16Array, i: Int32Array };
 
-/** A branch or a circle: columns, and a shape anywhere along it. `s` is the number of a point, with fractions between points. */
+/** A branch or a circle: columns, and a shape anywhere along it. `s` is the number of a point, with fractions between points.
+ * Columns and shapes are unpacked when they are looked at. */
 class Branch {
   constructor(about, family) {
-    Object.assign(this, about);
+    const { columns, shapes, ...rest } = about;
+    Object.assign(this, rest);
+    this.packed = { columns, shapes };
     this.ruled = !(family.law || "").endsWith("rod"); // the section of a rod stays straight and at right angles to it
     this.parameter = family.parameter;
-    this.columns = {};
-    for (const [name, text] of Object.entries(about.columns)) this.columns[name] = new Float64Array(bytes(text));
-    this.circle = !("shapes" in about);
-    const { kappa_n, energy } = this.columns;
-    if (!this.profile) this.columns.elastic = kappa_n.map((k, i) => energy[i] + (k * k) / 2);
-    this.size = this.columns[this.parameter].length;
-    this.abscissa = this.columns.arclength || this.columns[this.parameter];
+    this.circle = !("file" in about);
+    this.leftOut = shapes === null; // to keep the page small
     this.id = this.circle ? `circle_${this.m}` : this.file.replace(/\.\w+$/, "");
-    this.channels = about.channels || CHANNELS;
-    if (this.circle) return;
-    this.packed = new Int16Array(bytes(about.shapes));
-    this.scale = new Float64Array(bytes(about.scale));
+    if (this.profile) Object.assign(this, { channels: shapes.channels, nodes: shapes.nodes });
+  }
+
+  get columns() {
+    return this.kept("columns", () => {
+      const { columns } = this.packed,
+        found = {},
+        size = Math.max(...Object.values(columns).map((one) => (typeof one === "string" ? unpacked(one).length : 1)));
+      for (const [name, one] of Object.entries(columns))
+        found[name] = typeof one === "string" ? unpacked(one) : new Float64Array(size).fill(one);
+      return this.profile ? found : withElasticEnergy(this.circle ? finer(found, this.parameter) : found);
+    });
+  }
+
+  /** What `make` returns, made once. */
+  kept(name, make) {
+    const value = make();
+    Object.defineProperty(this, name, { value });
+    return value;
+  }
+
+  get size() {
+    return this.columns[this.parameter].length;
+  }
+
+  get abscissa() {
+    return this.columns.arclength || this.columns[this.parameter];
+  }
+
+  /** Whether its index is known, without unpacking. */
+  get hasIndex() {
+    return "index" in this.packed.columns;
   }
 
   /** Pairs of row and weight: cubic Hermite interpolation with slopes of parabolas, on the points themselves exact. */
@@ -74,20 +102,46 @@ class Branch {
     return { x: steps.map((s) => this.value(x, s)), y: steps.map((s) => this.value(y, s)) };
   }
 
+  /** The shapes as the page holds them: see `packing.compressed`. */
+  get shapes() {
+    return this.kept("shapes", () => {
+      const { basis, functions, products, wide, left, right, scale, size, ...rest } = this.packed.shapes;
+      return {
+        ...rest,
+        basis: rows(basis, functions, functions),
+        left: rows(left, products, wide),
+        right: rows(right, products, wide),
+        scale: unpacked(`d${scale}`),
+        size: unpacked(`d${size}`),
+      };
+    });
+  }
+
   /** States at the nodes, (nodes, channels). */
   states(s) {
-    const { channels, nodes } = this,
+    const { nodes, channels, basis, left, right, scale, size } = this.shapes,
+      weights = this.weights(s),
+      each = size.length > channels ? channels : 0, // a size for each point, or one for all
+      parts = new Float64Array(basis.length * channels),
       result = new Float64Array(nodes * channels);
-    for (const [row, weight] of this.weights(s))
-      for (let k = 0, at = row * nodes * channels; k < result.length; k++, at++)
-        result[k] += weight * this.packed[at] * this.scale[row * channels + (k % channels)];
+    right.forEach((row, k) => {
+      for (let c = 0; c < channels; c++) {
+        let factor = 0;
+        for (const [point, weight] of weights) factor += (weight * scale[k] * left[k][point] * size[point * each + c]) / 32767;
+        for (let i = c; i < parts.length; i += channels) parts[i] += factor * row[i];
+      }
+    });
+    basis.forEach((values, j) => {
+      for (let i = 0, at = 0; i < nodes; i++)
+        for (let c = 0; c < channels; c++, at++) result[at] += values[i] * parts[j * channels + c];
+    });
     return result;
   }
 
   /** The closed strip at s, its axis upright and its middle at the origin: stations one after the other, the last before the first. */
   strip(s) {
     if (this.circle) return placed(planar(this.m), [1, 0, 0]);
-    const part = stations(this.states(s), this.nodes);
+    const part = stations(this.states(s), this.shapes.nodes);
     if (!this.ruled) part.forEach((station) => (station.eta = 0));
     if (this.domain === "half loop") return placed(mirrored(part).slice(0, -1));
     if (this.domain !== "cell") return placed(turned(part).slice(0, -1));
@@ -102,12 +156,12 @@ class Branch {
     for (let i = 1; i < this.size; i++) {
       let change = 1e-3 + 1e-3 * Math.abs(this.columns[this.parameter][i] - this.columns[this.parameter][i - 1]);
       if (this.profile) change = Math.max(this.abscissa[i] - this.abscissa[i - 1], 1e-12);
-      else if (!this.circle) {
+      else if (!this.circle && !this.leftOut) {
         const a = this.states(i - 1),
           b = this.states(i);
         let sum = 0;
         for (let k = 0; k < a.length; k++) if (k % CHANNELS < 4) sum += (a[k] - b[k]) ** 2;
-        change += Math.sqrt(sum / this.nodes);
+        change += Math.sqrt(sum / this.shapes.nodes);
       }
       this.ways.push(this.ways[i - 1] + change);
     }
@@ -143,4 +197,29 @@ class Branch {
     }
     return found;
   }
+}
+
+/** Numbers from text that begins with the letter of their type. */
+const unpacked = (text) => new KINDS[text[0]](bytes(text.slice(1)));
+
+/** Rows of whole numbers, the first `wide` of 16 bits and the others of 8. */
+function rows(text, rank, wide) {
+  const buffer = bytes(text),
+    length = buffer.byteLength / (rank + wide);
+  return Array.from({ length: rank }, (_, k) =>
+    k < wide ? new Int16Array(buffer, 2 * k * length, length) : new Int8Array(buffer, (wide + k) * length, length),
+  );
+}
+
+const withElasticEnergy = (columns) => ({ ...columns, elastic: columns.kappa_n.map((k, i) => columns.energy[i] + (k * k) / 2) });
+
+/** The columns of a circle at more points: parabolas through neighbouring ones, and the index of the piece. */
+function finer(columns, parameter) {
+  const coarse = Object.create(Branch.prototype, { columns: { value: columns } });
+  coarse.parameter = parameter;
+  const places = Array.from({ length: (coarse.size - 1) * CIRCLE_PIECES + 1 }, (_, i) => i / CIRCLE_PIECES),
+    found = {};
+  for (const name of Object.keys(columns))
+    found[name] = Float64Array.from(places, (s) => (name === "index" ? (coarse.index(s) ?? -1) : coarse.value(name, s)));
+  return found;
 }

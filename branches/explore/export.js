@@ -3,9 +3,9 @@
 
 function csv(branch) {
   const names = Object.keys(branch.columns).filter((name) => name !== "elastic"), // the file holds the others
-    head = [...(branch.circle ? [] : ["label"]), ...names].join(",");
+    head = [...(branch.circle ? [] : ["point", "label"]), ...names].join(",");
   const rows = Array.from({ length: branch.size }, (_, i) =>
-    [...(branch.circle ? [] : [branch.labels[i]]), ...names.map((name) => branch.columns[name][i])].join(","),
+    [...(branch.circle ? [] : [i, branch.labels[i] || ""]), ...names.map((name) => branch.columns[name][i])].join(","),
   );
   return [head, ...rows, ""].join("\n");
 }

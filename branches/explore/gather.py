@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from branches import diagram_graph as diagram
+from branches.executor import executor, run_jobs
 from branches.explore import profiles, strips
 from branches.files import StoreError
 from branches.names import DIAGRAM
-from branches.read import read_branch
+from branches.progress import Progress
 
 #: Ending of the files that `contin.save` writes.
 STORED = ".npz"
+#: Files that are read without starting processes, which takes as long as reading so many.
+_ALONE = 8
+#: Largest size of the texts of columns and shapes on a page. With the library that draws (4.9 MB) and names it makes 30 MB.
+_MOST_BYTES = 22_500_000
 
 
-def gather(results: list[str]) -> dict:
-    """Everything the page needs, ready for JSON.
+def gather(results: list[str], quiet: bool = True) -> dict:
+    """Everything the page needs, ready for JSON; unless ``quiet``, a line of progress is shown.
 
     Parameters
     ----------
@@ -33,30 +39,71 @@ def gather(results: list[str]) -> dict:
     StoreError
         One of them cannot be read, holds no branch, or is of the other kind.
     """
-    files: dict[Path, None] = {}
+    files: dict[Path, Path] = {}
     titles = []
     for result in results:
         found, title = _files_of(Path(result))
-        files |= dict.fromkeys(path.resolve() for path in found)
+        files |= {path.resolve(): path for path in found if path.resolve() not in files}
         titles.append(title)
     stored = [path for path in files if path.suffix == STORED]
     if not stored:
-        return _of_strips(list(files), titles)
+        with Progress("branches", len(files), quiet) as progress:
+            return _of_strips(files, titles, progress)
     if other := next((path for path in files if path.suffix != STORED), None):
         raise StoreError(f"{str(other)!r} is of a strip, {str(stored[0])!r} is not; a page shows one kind of result")
     return profiles.gathered(stored)
 
 
-def _of_strips(files: list[Path], titles: list[str]) -> dict:
-    branches = [(path, read_branch(path)) for path in files]
-    families: dict[tuple, list] = {}
-    for path, branch in branches:
-        families.setdefault(strips.material(branch), []).append((path, branch))
-    title = next((title or branch.config["title"] for title, (_, branch) in zip(titles, branches)), "")
+def left_out(data: dict) -> list[dict]:
+    """Return the branches of a page whose shapes are not on it; ``path`` is the file of each."""
+    return [branch for family in data["families"] for branch in family["branches"] if not branch["shapes"]]
+
+
+def _of_strips(files: dict[Path, Path], titles: list[str], progress: Progress) -> dict:
+    """Return the data of a page of strips; ``files`` maps each file to its name as given."""
+    branches = _read(list(files), progress)
+    title = next((title or branch["title"] for title, branch in zip(titles, branches)), "")
+    families: dict[tuple, list[dict]] = {}
+    for branch, path in zip(branches, files.values()):
+        families.setdefault(branch["family"], []).append(branch | {"path": str(path)})
+    _leave_out(families)
     return {
         "title": title, "kind": "strips", "axes": strips.AXES, "shown": ["kappa_n", "kappa_star"],
-        "families": [strips.family(families[material]) for material in sorted(families)],
+        "families": [strips.family_of(families[material]) for material in sorted(families)],
     }  # fmt: skip
+
+
+def _read(files: list[Path], progress: Progress) -> list[dict]:
+    """Return what the page holds of the files, in their order; many files are read by several processes."""
+    found: dict[Path, dict] = {}
+    few = files[:1] if len(files) > _ALONE else files  # the first one loads compiled code, before processes are forked
+    for path in few:
+        found[path] = strips.branch_of(path)
+        progress.part_done()
+    if len(few) < len(files):
+        rest = iter(files[1:])
+        with executor() as (submit, wait, count):
+            for path, branch in run_jobs(lambda running: next(rest, None), strips.branch_of, submit, count, wait):
+                if isinstance(branch, BaseException):
+                    raise branch
+                found[path] = branch
+                progress.part_done()
+    return [found[path] for path in files]
+
+
+def _size(texts: dict) -> int:
+    return sum(len(text) for text in texts.values() if isinstance(text, str))
+
+
+def _leave_out(families: dict[tuple, list[dict]]) -> None:
+    """Remove the shapes of some families if all together would make the page too large; those that stay are spread evenly."""
+    branches = [branch for one in families.values() for branch in one]
+    columns, shapes = (sum(_size(branch[name]) for branch in branches) for name in ("columns", "shapes"))
+    part = min(1.0, max(_MOST_BYTES - columns, 0) / shapes)
+    for number, material in enumerate(sorted(families)):
+        if math.ceil((number + 1) * part) == math.ceil(number * part):
+            for branch in families[material]:
+                branch["shapes"] = None
 
 
 def _files_of(path: Path) -> tuple[list[Path], str]:

@@ -113,7 +113,7 @@ function listChoices() {
     FIRST_VALUES[id] = now[id];
   }
   $("x-label").hidden = STRIPS;
-  $("colour").parentElement.hidden = !FAMILIES.some(({ branches }) => branches.some((branch) => branch.columns.index));
+  $("colour").parentElement.hidden = !FAMILIES.some(({ branches }) => branches.some((branch) => branch.hasIndex));
 }
 
 /** Show all of the map, or the part that was shown first. */
@@ -183,7 +183,7 @@ function keyPressed(event) {
 
 async function redraw() {
   await drawDiagram();
-  if (STRIPS && !flat) await Plotly.react("ribbon", ribbonTraces(shownStrip()), $("ribbon").layout);
+  if (STRIPS && !flat && $("ribbon").data && !now.branch.leftOut) await Plotly.react("ribbon", ribbonTraces(shownStrip()), $("ribbon").layout);
   await update();
 }
 
@@ -202,7 +202,6 @@ async function start() {
   $("diagram").on("plotly_click", clicked);
   $("diagram").on("plotly_relayout", mapMoved);
   $("diagram").on("plotly_relayouting", placeMarker);
-  if (STRIPS && !flat) $("ribbon").on("plotly_relayout", () => !now.playing && (drawStates(), remember()));
   drawStates();
   return performance.now();
 }

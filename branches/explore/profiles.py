@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from branches.explore.packing import packed, quantised
+from branches.explore.packing import column, compressed
 from branches.files import StoreError
 from contin import StoredColumns, read_columns
 
@@ -67,16 +67,17 @@ def _read(path: Path) -> StoredColumns:
 def _branch(path: Path, stored: StoredColumns, axes: list[str]) -> dict:
     kept = [*axes, *(name for name in ("arclength", "index") if name in stored.columns and name not in axes)]
     count = min(max(len(times) for times, _ in stored.profiles), _MOST_NODES)
-    values, scale = quantised(np.array([_sampled(times, states, count) for times, states in stored.profiles]))
+    values = np.array([_sampled(times, states, count) for times, states in stored.profiles])
     marks = [
         {"point": number, "kind": _KINDS.get(label, "end"), "name": " ".join(filter(None, (label, stored.names[number])))}
         for number, label in enumerate(stored.labels)
         if label
     ]
     return {
-        "profile": True, "name": path.stem, "file": path.name, "stop": stored.stop, "marks": marks, "labels": stored.labels,
-        "columns": {name: packed(stored.columns[name], "<f8") for name in kept}, "components": stored.states,
-        "nodes": count, "channels": values.shape[2], "shapes": packed(values, "<i2"), "scale": packed(scale, "<f8"),
+        "profile": True, "name": path.stem, "file": path.name, "stop": stored.stop, "marks": marks,
+        "labels": {number: label for number, label in enumerate(stored.labels) if label},
+        "columns": {name: column(stored.columns[name]) for name in kept}, "components": stored.states,
+        "shapes": compressed(values, each=True),
     }  # fmt: skip
 
 

@@ -10,8 +10,8 @@ function readOut() {
   const rows = [
     ["branch", escaped(nameOf(branch))],
     ...COLUMNS.map((name) => [AXES.get(name).brief, digits(branch.value(name, s)), name]),
-    ...(STRIPS || branch.columns.index ? [["stability", tag, "stability"]] : []),
-    ...(STRIPS && branch.ruled ? [["rulings cross beyond", percent(widest(shownStrip())), "widest"]] : []),
+    ...(STRIPS || branch.hasIndex ? [["stability", tag, "stability"]] : []),
+    ...(STRIPS && branch.ruled && !branch.leftOut ? [["rulings cross beyond", percent(widest(shownStrip())), "widest"]] : []),
     ["point", pointName(branch, s), "point"],
   ];
   $("readout").innerHTML = rows
@@ -64,6 +64,7 @@ function drawStates() {
   $("states")
     .querySelectorAll("canvas")
     .forEach((canvas, i) => {
+      if (found[i].branch.leftOut) return;
       const strip = found[i].branch.strip(found[i].s);
       paint(canvas, strip, eyeNow(), scaleOf(strip) * 1.05, Math.max(1, Math.round(count(strip) / 190)));
     });

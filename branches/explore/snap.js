@@ -122,8 +122,8 @@ function snapTarget(branch, s) {
 /** Whether a strip can come to this place and must leave it: a fold, and stable on one side if the index is known. */
 function canSnap() {
   const { branch, s } = now;
-  if (!STRIPS || (markAt(branch, s) || {}).kind !== "fold") return false;
-  return !branch.columns.index || [-0.5, 0.5].some((side) => branch.index(s + side) === 0);
+  if (!STRIPS || branch.leftOut || (markAt(branch, s) || {}).kind !== "fold") return false;
+  return !branch.hasIndex || [-0.5, 0.5].some((side) => branch.index(s + side) === 0);
 }
 
 /** Play the way from the fold to the state that `snapTarget` finds, then stay there. */

@@ -51,7 +51,7 @@ const nameOf = (branch) => {
 function stability(branch, s) {
   const index = branch.index(s);
   const there = Math.abs(s - Math.round(s)) < 1e-6 && !(branch.m <= 0); // a point where some direction is neutral
-  if (index === null) return ["unknown", !branch.columns.index ? "not computed" : there ? "on the verge" : "not known", ""];
+  if (index === null) return ["unknown", !branch.hasIndex ? "not computed" : there ? "on the verge" : "not known", ""];
   return index === 0 ? ["stable", "stable", "0"] : ["unstable", "unstable", index === -2 ? "∞" : String(index)];
 }
 

@@ -70,6 +70,7 @@ const shownStrip = () => now.morph || now.branch.strip(now.s);
 
 async function createState() {
   if (!STRIPS) return drawProfile();
+  if (now.branch.leftOut) return;
   const strip = shownStrip();
   if (flat) return drawFlat(strip);
   const scene = {
@@ -86,10 +87,18 @@ async function createState() {
     { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", scene, showlegend: false },
     { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: true },
   );
+  $("ribbon").on("plotly_relayout", () => !now.playing && (drawStates(), remember()));
+}
+
+/** Say that the page leaves out the shapes of a branch, in the place of the strip, and how to see them. */
+function tellLeftOut({ leftOut, path }) {
+  document.body.classList.toggle("left-out", Boolean(leftOut));
+  if (leftOut) $("left-out-command").textContent = `python -m branches.explore "${path}"`;
 }
 
 async function updateState() {
-  if (!STRIPS || flat || !$("ribbon").data) return createState();
+  tellLeftOut(now.branch);
+  if (!STRIPS || flat || !$("ribbon").data || now.branch.leftOut) return createState();
   const strip = shownStrip(),
     scale = scaleOf(strip),
     mesh = sheets(strip, width(), scale),

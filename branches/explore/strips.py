@@ -1,27 +1,29 @@
 """Branch files of closed strips for the page: branches and circles with their columns, and a shape for every point.
 
-A shape is kept as the states at a few equidistant nodes of the domain that was solved (a quarter wave of most branches), in 16
-bits a number; the browser unfolds it by the symmetries of `ribbon_model.shape`.
+A shape is kept as the states at a few nodes of the domain that was solved (a quarter wave of most branches), compressed along
+the branch; the browser unfolds it by the symmetries of `ribbon_model.shape`.
 """
 
 from __future__ import annotations
 
-import itertools
+import functools
 import math
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from branches.config import Config, dump
-from branches.explore.packing import packed, quantised
+from branches.explore.packing import column, compressed
+from branches.explore.solutions import solutions
 from branches.files import StoreError
 from branches.labels import ON_PAGE, kind_of
-from branches.read import StoredBranch
+from branches.read import StoredBranch, read_branch
 from contin import exact_text
 from ribbon_model.domains import DOMAINS
-from ribbon_model.equilibrium import directors
 from ribbon_model.laws import LAWS, from_label, label
 from ribbon_model.linear import circle, covering, energy_interval, index
+from ribbon_model.solution import Solution
 
 #: What is kept of a shape at each node, in this order.
 CHANNELS = ("q0", "q1", "q2", "q3", "eta", "x1", "x2", "x3")
@@ -32,46 +34,73 @@ AXES = (
     ("energy", "energy, in units 2πB/L", "energy"),
     ("elastic", "elastic energy (energy + κ<sub>n</sub>²/2), in units 2πB/L", "elastic energy"),
 )
-#: Columns of a circle: those of every law that the page reads.
-CIRCLE_COLUMNS = ("kappa_n", "kappa_star", "energy", "index")
+#: Those of them in files, and the columns of a circle.
+_MAP = ("kappa_n", "kappa_star", "energy")
+CIRCLE_COLUMNS = (*_MAP, "index")
 #: The index where a whole band of wavenumbers is unstable, which no number counts; and where it is not known.
 INFINITE, UNKNOWN = -2, -1
 #: About so many nodes make a closed strip; a quarter wave has no fewer than the second number.
 _LOOP_NODES, _FEWEST = 384, 16
 #: Circles reach a little farther in kappa_n than the branches do, so that they are there at the outermost fold (ten times more
-#: would leave a fifth of the map to them), in about twice so many steps. (On a circle all columns are parabolas.)
-_BEYOND, _CIRCLE_STEPS = 0.02, 50
-#: An integration takes a few hundred evaluations; the end conditions, which hold moments, are met to about 1e-6 of those.
-_MOST_EVALUATIONS, _OPEN = 50_000, 1e-3
+#: would leave a fifth of the map to them), in so many steps. (On a circle all columns are parabolas: the page makes it finer.)
+_BEYOND, _CIRCLE_STEPS = 0.02, 6
 
 
-def material(branch: StoredBranch) -> tuple:
-    """Return what the branches of one family share: the place of their law, Gamma (-1 without) and nu."""
-    Gamma = branch.config["Gamma"]
-    return list(LAWS).index(branch.config["law"]), -1.0 if Gamma is None else Gamma, branch.config["nu"]
-
-
-def family(found: list[tuple[Path, StoredBranch]]) -> dict:
-    """Return the branches of one law and nu, and the circles that they meet.
+def branch_of(path: Path) -> dict:
+    """Return what the page holds of a branch file; ``family`` and ``reach`` are for `family_of` alone.
 
     Raises
     ------
     StoreError
-        A branch has fewer than two points, or columns that are not those of a closed strip.
+        The file cannot be read, it holds fewer than two points, or its columns are not those of a closed strip.
     """
-    for path, branch in found:
-        if len(branch.points) < 2:
-            raise StoreError(f"{str(path)!r} holds {len(branch.points)} points; a branch has two at least")
-    config = found[0][1].config
-    law, nu = label(config["law"], config["Gamma"]), config["nu"]
-    branches = [_branch(path, branch) for path, branch in found]
-    branches.sort(key=lambda branch: (branch["m"] * branch["n"], branch["m"], "origin" in branch))
-    ends = [end for _, branch in found for end in (branch.points["kappa_n"].min(), branch.points["kappa_n"].max())]
+    with _blas().limit(limits=1, user_api="blas"):  # more threads only slow down matrices this small
+        return _branch(path, read_branch(path))
+
+
+@functools.cache
+def _blas() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def _branch(path: Path, branch: StoredBranch) -> dict:
+    config, points = branch.config, branch.points
+    if len(points) < 2:
+        raise StoreError(f"{str(path)!r} holds {len(points)} points; a branch has two at least")
+    if bad := [name for name in ("arclength", *_MAP) if not np.isfinite(points[name]).all()]:
+        raise StoreError(f"{str(path)!r}: the column {bad[0]!r} holds values that are no numbers")
+    names = [name for name in points.dtype.names if points.dtype[name].kind in "if" and name not in ("point", "length")]
+    marks = [_mark(event, branch.reason, bool(config["origin"])) for event in branch.events]
+    about = {
+        "family": _family(config), "reach": (float(points["kappa_n"].min()), float(points["kappa_n"].max())),
+        "title": config["title"], "m": config["m"], "n": config["n"], "to": marks[-1].get("covering"),
+        "domain": config["domain"], "stop": branch.stop, "file": path.name, "config": dump(Config.model_validate(config)),
+        "marks": marks, "labels": {int(event["point"]): event["label"].decode() for event in branch.events},
+        "columns": {name: column(points[name]) for name in names}, "shapes": compressed(shapes(branch)),
+    }  # fmt: skip
+    return about | ({"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"]} if config["origin"] else {})
+
+
+def _family(config: dict) -> tuple:
+    """Return what the branches of one family share: the place of their law, Gamma (-1 without) and nu."""
+    Gamma = config["Gamma"]
+    return list(LAWS).index(config["law"]), -1.0 if Gamma is None else Gamma, config["nu"]
+
+
+def family_of(branches: list[dict]) -> dict:
+    """Return the branches of one law and nu, as of `branch_of`, and the circles that they meet."""
+    number, Gamma, nu = branches[0]["family"]
+    law = label(list(LAWS)[number], None if Gamma < 0 else Gamma)
+    branches = sorted(branches, key=lambda branch: (branch["m"] * branch["n"], branch["m"], "origin" in branch))
+    ends = [end for branch in branches for end in branch["reach"]]
     coverings = {branch["m"] for branch in branches} | {branch["to"] for branch in branches if branch["to"] is not None}
     bifurcations = [mark for branch in branches for mark in branch["marks"] if mark["kind"] == "circle"]
     beyond = _BEYOND * (max(ends) - min(ends))
-    reach = float(min(ends) - beyond), float(max(ends) + beyond)
+    reach = min(ends) - beyond, max(ends) + beyond
     circles = [_circle(law, nu, m, reach, bifurcations) for m in sorted(coverings)]
+    for branch in branches:
+        for name in ("family", "reach", "title", *(["path"] if branch["shapes"] else [])):
+            del branch[name]
     about = {"name": f"{law}, ν = {exact_text(nu)}", "law": law, "nu": nu, "parameter": "kappa_n"}
     return about | {"branches": branches, "circles": circles}
 
@@ -79,75 +108,44 @@ def family(found: list[tuple[Path, StoredBranch]]) -> dict:
 # --- branches -----------------------------------------------------------------------------------------------------
 
 
-def _branch(path: Path, branch: StoredBranch) -> dict:
-    config, points = branch.config, branch.points
-    names = [name for name in points.dtype.names if points.dtype[name].kind in "if" and name != "length"]
-    marks = [_mark(event, branch.reason, bool(config["origin"])) for event in branch.events]
-    values, scale = quantised(shapes(branch))
-    about = {
-        "m": config["m"], "n": config["n"], "to": marks[-1].get("covering"), "domain": config["domain"], "stop": branch.stop,
-        "file": path.name, "config": dump(Config.model_validate(config)), "marks": marks,
-        "labels": [name.decode() for name in points["label"]],
-        "columns": {name: packed(points[name], "<f8") for name in names},
-        "nodes": values.shape[1], "shapes": packed(values, "<i2"), "scale": packed(scale, "<f8"),
-    }  # fmt: skip
-    return about | ({"origin": config["origin"]["kappa_n"], "mode": config["origin"]["mode"]} if config["origin"] else {})
-
-
 def _mark(event, reason: str, secondary: bool) -> dict:
-    """A labelled point: its number, kind, and what it is called."""
+    """A labelled point: its number, kind, and what it is called; kappa_n where it is on a circle."""
     name, place = event["name"].decode(), {"point": int(event["point"])}
-    values = {column: float(event[column]) for column in ("kappa_n", "kappa_star", "energy")}
+    values = {column: float(event[column]) for column in _MAP}
     if not all(map(math.isfinite, values.values())):
         raise StoreError(f"the labelled point {event['point']} has columns that are no numbers")
     kind = kind_of(event["label"].decode(), name, reason, secondary)
     if kind == "circle":
-        return place | {"kind": kind, "covering": covering(**values)} | values
-    return place | {"kind": ON_PAGE.get(kind, "end"), "name": name} | values
+        return place | {"kind": kind, "covering": covering(**values), "kappa_n": values["kappa_n"]}
+    return place | {"kind": ON_PAGE.get(kind, "end"), "name": name}
 
 
 def shapes(branch: StoredBranch) -> np.ndarray:
-    """Every point's states at equidistant nodes of the domain, shape (points, nodes, len(CHANNELS)).
+    """Return every point's states at equidistant nodes of the domain, shape (points, nodes, len(CHANNELS)); see `solutions`.
 
-    All of a solution follows from the moment and force at S = 0, which are columns: the equations of the domain are integrated
-    from there, whether the file keeps the solution or not.
-
-    Raises
-    ------
-    StoreError
-        The columns of a point are not those of a closed strip.
+    Where no solution is found, states are interpolated linearly over arclength between the neighbours.
     """
-    config = branch.config
-    domain = DOMAINS[config["domain"]]
-    problem = domain.problem(LAWS[config["law"]])
-    t = np.linspace(0, 1, max(_FEWEST, math.ceil(_LOOP_NODES / domain.parts(config["n"]))) + 1)
-    name = f"branch ({config['m']}, {config['n']})"
-    return np.array([_integrated(problem, row, t, f"{name}, point {row['point']}") for row in branch.points])
+    domain = DOMAINS[branch.config["domain"]]
+    t = np.linspace(0, 1, max(_FEWEST, math.ceil(_LOOP_NODES / domain.parts(branch.config["n"]))) + 1)
+    problem = domain.problem(LAWS[branch.config["law"]])
+    found = solutions(branch)
+    known = [number for number, solution in enumerate(found) if solution is not None]
+    values = np.array([_channels(problem, found[number], t) for number in known])
+    if len(known) == len(found):
+        return values
+    s = branch.points["arclength"]
+    place = np.interp(s, s[known], np.arange(len(known)))
+    low = np.minimum(place.astype(int), len(known) - 2)
+    part = (place - low)[:, None, None]
+    return (1 - part) * values[low] + part * values[low + 1]
 
 
-def _integrated(problem, row, t, name: str) -> np.ndarray:
-    """The states of one point at t, shape (len(t), len(CHANNELS)); it is called ``name`` in messages."""
-    from scipy.integrate import solve_ivp
-
-    wrong = StoreError(f"{name}: its columns are not those of a closed strip")
-    parameters = np.array([row[name] if name in row.dtype.names else value for name, value in problem.parameters.items()])
-    field, none, size = problem.batch("field"), np.empty((0, len(problem.states))), len(problem.states)
-    evaluations = itertools.count()
-
-    def rates(s, u):
-        frame = field.values(np.array([s]), u[None, :size], none, parameters)[0]
-        if next(evaluations) > _MOST_EVALUATIONS or not np.isfinite(frame).all():
-            raise wrong
-        return frame if size > 4 else np.append(frame, row["length"] * np.array(directors(*u[:4])[6:]))
-
-    start = np.array([1.0, 0, 0, 0, 0, 0, 0])
-    states = solve_ivp(rates, (0, 1), start, method="DOP853", t_eval=t, rtol=1e-9, atol=1e-10).y.T
-    frames = np.ascontiguousarray(states[:, :size])
-    open_ends = problem.batch("boundary").values(t[:1], frames[:1], frames[-1:], parameters)
-    if len(states) < len(t) or np.abs(open_ends).max() > _OPEN * (1 + np.abs(parameters).max()):
-        raise wrong
+def _channels(problem, solution: Solution, t: np.ndarray) -> np.ndarray:
+    """Return the states of one solution at t, shape (K, len(CHANNELS))."""
+    states, size, none = solution.sampled(t), len(problem.states), np.empty((0, len(problem.states)))
+    parameters = np.array([solution.parameters[name] for name in problem.parameters])
     q0, q1, q2, q3 = states[:, :4].T
-    p0, p1, p2, p3 = field.values(t, frames, none, parameters)[:, :4].T
+    p0, p1, p2, p3 = problem.batch("field").values(t, np.ascontiguousarray(states[:, :size]), none, parameters)[:, :4].T
     omega_1 = q0 * p1 - q1 * p0 - q2 * p3 + q3 * p2  # times length / 2: `spin` of the equations, inverted
     omega_3 = q0 * p3 - q3 * p0 - q1 * p2 + q2 * p1
     eta = np.divide(omega_3, omega_1, out=np.zeros_like(t), where=omega_1 != 0)
@@ -168,7 +166,7 @@ def _circle(law: str, nu: float, m: int, ends: tuple[float, float], bifurcations
     values = [circle(material, m, k, nu, Gamma) for k in kappa_n]
     columns = {"kappa_n": kappa_n, "index": [_circle_index(material, m, k, nu, Gamma, neutral) for k in kappa_n]}
     columns |= {name: [value[name] for value in values] for name in ("kappa_star", "energy")}
-    return {"m": m, "columns": {name: packed(columns[name], "<f8") for name in CIRCLE_COLUMNS}}
+    return {"m": m, "columns": {name: column(np.array(columns[name])) for name in CIRCLE_COLUMNS}}
 
 
 def _circle_index(law, m, kappa_n, nu, Gamma, neutral) -> int:

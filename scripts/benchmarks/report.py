@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cores, cost, fold, like_for_like, startup, stress
+from benchmarks import cores, cost, fold, like_for_like, many, startup, stress
 
 TITLES = {
     "like-for-like": "Like for like",
     "fold": "Tool for tool: the fold of (1, 2)",
     "cost": "Cost laws",
     "startup": "Start-up",
+    "many": "Many branches",
     "stress": "Numerical stability",
     "cores": "Two cores",
 }
@@ -22,6 +23,7 @@ TABLES = {
     "fold": fold.table,
     "cost": cost.table,
     "startup": startup.table,
+    "many": many.table,
     "stress": stress.table,
     "cores": cores.table,
 }

@@ -1,19 +1,24 @@
 """Scenes of many branches: the graph, the questions, the executor."""
 
+import contextlib
+import itertools
 import json
 import os
 import runpy
 import signal
+import sys
 import threading
 import time
+from concurrent.futures import Future
 
 import networkx
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from branches import diagram as diagrams
 from branches import diagram_graph as diagram
-from branches import draw_diagram
+from branches import draw_diagram, job
 from branches import executor as executors
 from branches.config import ConfigError, parse
 from branches.diagram import run_diagram
@@ -23,9 +28,11 @@ from branches.executor import ExecutorError, executor
 from branches.explore.gather import gather
 from branches.files import StoreError, only_run
 from branches.graph import main as graph_command
+from branches.interpolation import places
 from branches.names import primary_file
 from branches.preview import preview
 from branches.read import read_branch
+from branches.run import main as run_command
 from ribbon_model import exact
 
 #: Fig. 12a of Audoly & Seffen (2015), a part of it: all ends of m = 1 and 3 up to n = 4.
@@ -79,6 +86,29 @@ def test_states_at_a_curvature_against_the_quadrature(folder):
     circles = {state["circle"]: state["energy"] for state in states if "circle" in state}
     assert circles[1] == pytest.approx(0.5 - 3.2) and set(circles) == {1, 3, 5, 7}
     assert [state["energy"] for state in states] == sorted(state["energy"] for state in states)
+
+
+def test_values_between_points_are_those_of_single_splines():
+    """SciPy's spline of each piece; straight lines through two and three points. One piece has a point twice."""
+    random, pieces = np.random.default_rng(5), []
+    for count in (2, 3, 4, 5, 30, 4, 2, 12):
+        s = np.cumsum(random.uniform(0.5, 1, count))
+        columns = {"arclength": s, "kappa_n": np.tanh(s - s.mean()), "energy": np.cos(s)}
+        pieces.append({name: values.tolist() for name, values in columns.items()})
+    pieces[-1] = {name: [*values[:5], values[4], *values[5:]] for name, values in pieces[-1].items()}
+    for value in (-0.3, 0.0, 0.2):
+        found = places(pieces, "kappa_n", value, ["energy"])
+        assert [number for number, _ in found] == list(range(len(pieces)))
+        for number, values in found:
+            s, keep = np.unique(pieces[number]["arclength"], return_index=True)
+            kappa_n, energy = (np.array(pieces[number][name])[keep] for name in ("kappa_n", "energy"))
+            if len(s) < 4:
+                expected = np.interp(value, kappa_n, energy)
+            else:
+                (place,) = CubicSpline(s, kappa_n - value).roots(extrapolate=False)
+                expected = CubicSpline(s, energy)(place)
+            assert values["energy"] == pytest.approx(expected, abs=1e-12)
+    assert places(pieces, "kappa_n", 5.0, ["energy"]) == [] == places([], "kappa_n", 0.0, [])
 
 
 def _guesses(m, n, kappa_n):
@@ -169,17 +199,16 @@ def test_a_cluster_makes_no_difference(computed_here, tmp_path):
 
 
 def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
-    scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), diagrams.compute
+    scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), job.compute_branch
 
-    def troubled(text):
-        config = parse(text, "scene")
+    def troubled(config, display):
         if (config.m, config.n) == (1, 4):
             os.kill(os.getpid(), signal.SIGKILL)
         if (config.m, config.n) == (3, 4):
             time.sleep(60)
-        return compute(text)
+        return compute(config, display)
 
-    monkeypatch.setattr(diagrams, "compute", troubled)
+    monkeypatch.setattr(job, "compute_branch", troubled)
     assert run_diagram(scene, tmp_path, Display(), workers=2, time_limit=5) == "lost"
     graph = diagram.read(tmp_path)
     assert [family[2:] for family in diagram.families(graph)] == [(1, 2)]
@@ -255,6 +284,19 @@ def test_a_scheduler_that_is_not_there():
     pytest.importorskip("distributed", reason="Dask is not installed")
     with pytest.raises(ExecutorError, match="no Dask scheduler answers"), executor("nowhere://x"):
         pass
+
+
+def test_a_scheduler_without_workers_is_refused(tmp_path, call, monkeypatch):
+    """At the start; and, after all workers have left, while jobs are waited for."""
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    monkeypatch.setattr(executors, "_WORKERS_WITHIN", 0.3)
+    (tmp_path / "scene.yaml").write_text(PAIR)
+    with distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster:
+        done = call(run_command, "scene.yaml", "--out", "x", "--scheduler", cluster.scheduler_address)
+        assert done.returncode == 2 and done.err.count("\n") == 1
+        assert "the scheduler answers, but has no workers" in done.err and "dask worker" in done.err
+        with distributed.Client(cluster) as client, pytest.raises(ExecutorError, match="no workers"):
+            executors._first_done_by(client, cluster.scheduler_address)([Future()])
 
 
 def test_a_sweep_over_laws_and_nu_says_what_does_not_exist():
@@ -392,3 +434,41 @@ def test_the_pictures(folder, call, tmp_path, root, source):
     assert (tmp_path / "x.svg").stat().st_size > 10_000
     refused = call(main, what, "--out", "x.gif")
     assert refused.returncode == 2 and "must end in .pdf, .svg or .png" in refused.err
+
+
+def test_the_work_for_a_branch_does_not_grow_with_the_diagram(tmp_path, monkeypatch):
+    """Calls of functions in the process that collects the branches, each with its line, for one of 60 and for one of 240."""
+
+    @contextlib.contextmanager
+    def at_once(*options):
+        yield lambda function, config: _done((b"", "", _course(config))), executors.first_done, 1
+
+    monkeypatch.setattr(diagrams, "executor", at_once)
+    monkeypatch.setattr(diagrams, "write_bytes", lambda path, data: None)
+    monkeypatch.setattr(diagrams, "_load_kernels", lambda configs: None)
+    calls = {}
+    for count in (60, 240):
+        scene, counter = parse(f"{{m: 1, n: 2, nu: {[k / 1000 for k in range(count)]}}}", "scene"), itertools.count()
+        sys.setprofile(lambda frame, event, argument, counter=counter: next(counter) if event == "call" else None)
+        try:
+            run_diagram(scene, tmp_path / str(count), Display())
+        finally:
+            sys.setprofile(None)
+        calls[count] = next(counter) / count
+        assert len(diagram.families(diagram.read(tmp_path / str(count)))) == count
+    assert calls[240] < calls[60]
+
+
+def _done(result):
+    """A future with its result."""
+    future = Future()
+    future.set_result(result)
+    return future
+
+
+def _course(config):
+    """A branch of two points."""
+    family = {"law": config.law, "nu": config.nu, "m": config.m, "n": config.n}
+    values = {"kappa_n": 1.0, "kappa_star": 1.0, "energy": -0.5}
+    nodes = [diagram.node(family, kind, values, number) for number, kind in enumerate(("circle", "leaves"))]
+    return diagram.Course(family, nodes, [dict.fromkeys(diagram.COLUMNS, [0.0, 1.0])])

@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import shutil
+from dataclasses import replace
 from io import BytesIO
 from xml.etree import ElementTree
 
@@ -18,9 +19,13 @@ import contin
 from branches.config import Config, parse
 from branches.diagram import run_diagram
 from branches.display import Display
+from branches.explore import gather as gather_module
 from branches.explore.__main__ import main
 from branches.explore.gather import gather
-from branches.explore.strips import CHANNELS, shapes
+from branches.explore.packing import TOLERANCE
+from branches.explore.packing import column as packed_column
+from branches.explore.solutions import solutions
+from branches.explore.strips import shapes
 from branches.files import StoreError
 from branches.job import run_branch
 from branches.read import read_branch
@@ -59,10 +64,30 @@ def numbers(text, kind="<f8"):
     return np.frombuffer(base64.b64decode(text), kind)
 
 
+def column(branch, name):
+    """A column of the page, as the browser sees it."""
+    text = branch["columns"][name]
+    if not isinstance(text, str):
+        return text
+    return numbers(text[1:], {"d": "<f8", "b": "<i1", "h": "<i2", "i": "<i4"}[text[0]])
+
+
 def decoded(branch):
-    """The shapes that the page holds, as the browser sees them."""
-    packed = numbers(branch["shapes"], "<i2").reshape(-1, branch["nodes"], len(CHANNELS))
-    return packed * numbers(branch["scale"]).reshape(len(packed), 1, len(CHANNELS))
+    """The shapes that the page holds, as the browser sees them: (points, nodes, channels)."""
+    about = branch["shapes"]
+    size = numbers(about["size"]).reshape(-1, 1, about["channels"])
+    functions, products, wide = about["functions"], about["products"], about["wide"]
+    basis = numbers(about["basis"], "<i2").reshape(functions, -1) / 32767
+    assert basis.shape[1] == about["nodes"]
+
+    def rows(text):
+        data = base64.b64decode(text)
+        length = len(data) // (products + wide)
+        parts = data[: 2 * wide * length], data[2 * wide * length :]
+        return np.concatenate([np.frombuffer(part, kind).reshape(-1, length) for part, kind in zip(parts, ("<i2", "<i1"))])
+
+    left, right = rows(about["left"]).astype(float), rows(about["right"]).reshape(products, functions, -1)
+    return np.einsum("k,kp,kjc,ji->pic", numbers(about["scale"]), left, right, basis) * size
 
 
 # --- what the page holds ------------------------------------------------------------------------------------------
@@ -83,38 +108,98 @@ def test_columns_are_those_of_the_file(pages):
     with h5py.File(pages / "m1_n2.h5") as file:
         points = file["points"][:]
     for name in ("kappa_n", "kappa_star", "energy", "index"):
-        assert np.array_equal(numbers(branch["columns"][name]), points[name])
+        assert np.array_equal(column(branch, name), points[name])
     assert Config.model_validate(parse(branch["config"], "config").model_dump()).m == 1
     assert [mark["kind"] for mark in branch["marks"]] == ["circle", "fold", "circle"]
     assert [circle["m"] for circle in family["circles"]] == [1, 3]
 
 
 def test_shapes_are_the_kept_solutions(pages):
-    """Every kept solution of Fig. 12: integrated from S = 0, and packed, within 2e-5 of the collocation.
-
-    At the end of the domain, a node of both; packing may cost half of a 32767th of the largest value of a channel.
-    """
+    """Every kept solution of Fig. 12, at the end of the domain (a node of both), within `TOLERANCE` of its channel."""
     (family,) = data_of(pages / "fig12.html")["families"]
     assert len(family["branches"]) == 18
     for about in family["branches"]:
         branch = read_branch(pages / "fig12" / about["file"])
         found = decoded(about)
         assert len(found) == len(branch.points)
+        allowed = 1.5 * TOLERANCE * np.abs(found).max(axis=(0, 1))
         for point in branch.kept():
             shape, solution = branch.shape(point), branch.solution(point)
-            states, parameters = solution.states, solution.parameters
-            last = np.argmin(np.abs(shape.arclength - 3 * parameters["length"]))  # S = 0 lies in the middle of a wave
-            assert np.abs(found[point, -1, :4] - states[-1]).max() < 2e-5
-            assert abs(found[point, -1, 4] - shape.eta[last]) < 2e-5 * (1 + np.abs(found[point, :, 4]).max())
-            assert np.abs(found[point, -1, 5:] - shape.centreline[last]).max() < 2e-5 * (1 + parameters["length"])
+            last = np.argmin(np.abs(shape.arclength - 3 * solution.parameters["length"]))  # S = 0 lies in the middle of a wave
+            end = [*solution.states[-1], shape.eta[last], *shape.centreline[last]]
+            assert (np.abs(found[point, -1] - end) < allowed).all()
+
+
+def test_shapes_between_kept_solutions_are_those_of_a_run_that_keeps_all(results, tmp_path):
+    """(7, 1) at nu = -.1, which cannot be integrated from S = 0, and (1, 3), with two folds: every point, and every tenth."""
+    for m, n, nu in ((7, 1, -0.1), (1, 3, 0.3)):
+        files = []
+        for stride in (1, 10):
+            files.append(tmp_path / f"{m}{n}{stride}.h5")
+            run_branch(Config(m=m, n=n, nu=nu, stride=stride), files[-1], Display(silent=True))
+        every, tenth = (shapes(read_branch(path)) for path in files)
+        assert every.shape == tenth.shape
+        assert (np.abs(every - tenth).max(axis=(0, 1)) < TOLERANCE * np.abs(every).max(axis=(0, 1))).all()
+        assert None not in solutions(read_branch(files[1]))
+
+
+def test_shapes_after_the_last_kept_solution(results):
+    """An interrupted run keeps every tenth solution, and no last one: the others are found all the same."""
+    branch = read_branch(results / "m1_n2.h5")
+    few = replace(branch, index=branch.index[branch.index["point"] % 10 == 0])
+    assert few.kept()[-1] < len(branch.points) - 3
+    largest = np.abs(shapes(branch)).max(axis=(0, 1))
+    assert (np.abs(shapes(few) - shapes(branch)).max(axis=(0, 1)) < TOLERANCE * (largest + 1e-9)).all()
 
 
 def test_packing_error(pages):
-    """Half of a 32767th of the largest value of a channel."""
+    """At most `TOLERANCE` of the largest value of a channel, and half of that for the rounding of small parts."""
     branch = read_branch(pages / "m1_n2.h5")
     exact, (family,) = shapes(branch), data_of(pages / "m1_n2.html")["families"]
-    error = np.abs(decoded(family["branches"][0]) - exact).max(axis=1)
-    assert (error <= np.abs(exact).max(axis=1) / 65534 * (1 + 1e-9) + 1e-300).all()
+    error = np.abs(decoded(family["branches"][0]) - exact).max(axis=(0, 1))
+    assert (error <= 1.5 * TOLERANCE * np.abs(exact).max(axis=(0, 1)) + 1e-300).all()
+
+
+def test_columns_are_packed_without_loss():
+    """Each kind of column: constant, numbers, whole numbers of one, two and four bytes, and numbers that are not finite."""
+    for values, letter in (
+        ([0.1, 0.2], "d"), ([np.nan, np.nan], "d"), ([3, -128], "d"), ([np.inf, np.inf], "d"),
+    ):  # fmt: skip
+        assert packed_column(np.array(values, float))[0] == letter
+    for values, letter in (([1, -127], "b"), ([1, 128], "h"), ([1, 32768], "i")):
+        text = packed_column(np.array(values, "<i4"))
+        assert text[0] == letter and column({"columns": {"x": text}}, "x").tolist() == values
+    assert packed_column(np.full(3, 0.3)) == 0.3 and packed_column(np.full(3, 7, "<i4")) == 7
+
+
+def test_a_page_that_would_be_too_large_leaves_out_shapes_and_says_so(results, monkeypatch, capsys, tmp_path):
+    """Of six materials four keep their shapes, if the limit is two thirds of the size of all; the first is among them."""
+    whole = gather_module.gather([str(results / "laws")])
+    assert gather_module.left_out(whole) == []
+    sizes = [sum(gather_module._size(branch[name]) for family in whole["families"] for branch in family["branches"])
+             for name in ("columns", "shapes")]  # fmt: skip
+    monkeypatch.setattr(gather_module, "_MOST_BYTES", sizes[0] + 2 * sizes[1] // 3)
+    assert main([str(results / "laws"), "--out", str(tmp_path / "page.html")]) == 0
+    data = data_of(tmp_path / "page.html")
+    missing = gather_module.left_out(data)
+    assert len(missing) == 2 and all((results / "laws" / branch["path"]).exists() for branch in missing)
+    assert data["families"][0]["branches"][0]["shapes"] is not None
+    assert "the shapes of 2 branches" in capsys.readouterr().out
+    if not CHROMIUM:
+        return
+    browser = Browser(tmp_path)
+    try:
+        browser.open(tmp_path / "page.html")
+        number = next(i for i, family in enumerate(data["families"]) if family["branches"][0]["shapes"] is None)
+        browser.js(f"document.getElementById('family').onchange({{ target: {{ value: {number} }} }})")
+        browser.until("document.getElementById('left-out').offsetParent !== null")
+        shown = browser.js("document.getElementById('left-out-command').textContent")
+        assert shown == f'python -m branches.explore "{missing[0]["path"]}"'
+        browser.js("document.getElementById('family').onchange({ target: { value: 0 } })")
+        browser.until("document.getElementById('left-out').offsetParent === null")
+        assert browser.colours("#ribbon") > 200 and browser.errors == []
+    finally:
+        browser.close()
 
 
 def test_families_by_law_and_nu(results):
@@ -230,7 +315,10 @@ def distances_of(shape, n):
 @needs_chromium
 @pytest.mark.parametrize("name", ["m1_n2", "fig12", "laws"])
 def test_unfolded_strips_close_and_have_the_length(name, pages, browser):
-    """At points and between: the last station is as far from the first as any other from the next, L / stations."""
+    """At points and between: the last station is as far from the first as any other from the next, L / stations.
+
+    Within 5 % of that distance, 8e-4 L / 2 pi: mirrors and copies multiply the error of the frame at the end, 5e-5, by ten.
+    """
     browser.open(pages / f"{name}.html")
     gaps = browser.js("""explore.families.flatMap(({branches}) => branches.flatMap((branch) => [0, 0.3, 0.77, 1].map((part) => {
         const strip = branch.strip(part * (branch.size - 1)), n = strip.length / 13, lengths = [];
@@ -240,7 +328,7 @@ def test_unfolded_strips_close_and_have_the_length(name, pages, browser):
         }
         return Math.max(...lengths) * n / (2 * Math.PI) - 1;
     })))""")
-    assert max(map(abs, gaps)) < 0.02  # chords are shorter than arcs, and between points states are interpolated
+    assert max(map(abs, gaps)) < 0.05  # chords are shorter than arcs, and between points states are interpolated
 
 
 @needs_chromium
@@ -519,7 +607,7 @@ def stored(tmp_path_factory):
 
 
 def test_page_of_a_stored_branch_holds_its_columns_and_states(stored):
-    """Columns to the last digit; the states are those at the nodes, within half of a 32767th of the largest."""
+    """Columns to the last digit; the states are those at the nodes, within `TOLERANCE` of the largest."""
     folder, branch = stored
     data = data_of(folder / "bratu.html")
     ((about,),) = [family["branches"] for family in data["families"]]
@@ -527,14 +615,14 @@ def test_page_of_a_stored_branch_holds_its_columns_and_states(stored):
         "branches", ["lam", "mean"], ["arclength", "lam", "mean", "norm"],
     )  # fmt: skip
     for name in ("lam", "mean"):
-        assert np.array_equal(numbers(about["columns"][name]), branch.column(name))
+        assert np.array_equal(column(about, name), branch.column(name))
     assert [mark["kind"] for mark in about["marks"]] == ["end", "fold", "end"]
-    packed = numbers(about["shapes"], "<i2").reshape(-1, about["nodes"], 3) * numbers(about["scale"]).reshape(-1, 1, 3)
-    assert len(packed) == len(branch)
-    for found, point in zip(packed, branch):
+    shown = decoded(about)
+    assert len(shown) == len(branch)
+    for found, point in zip(shown, branch):
         states = point.system.evaluate(point.x, found[:, 0])
         assert np.abs(found[:, 1:] - states).max() < 1e-2 * np.abs(states).max()  # between nodes the page draws chords
-        assert np.abs(found[-1, 1:] - states[-1]).max() < 5e-5 * np.abs(states).max()
+        assert np.abs(found[-1, 1:] - states[-1]).max() < 1.5 * TOLERANCE * np.abs(states).max()
 
 
 @needs_chromium

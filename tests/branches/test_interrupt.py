@@ -33,7 +33,7 @@ def primary(tmp_path_factory):
     from branches.display import Display
     from branches.job import compute_branch
 
-    return compute_branch(parse(PRIMARY, "scene"), Display(silent=True))[0]
+    return compute_branch(parse(PRIMARY, "scene"), Display(silent=True)).image
 
 
 def interrupted(process, module: str, delay: float) -> list[str]:
