@@ -244,3 +244,6 @@ def response(M1, M2, M3, kappa_n, nu, Gamma):
 def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
     """Return H alone."""
     return response(M1, M2, M3, kappa_n, nu, Gamma)[0]
+
+
+hamiltonian.gradient = response
