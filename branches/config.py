@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
@@ -21,11 +21,13 @@ class ConfigError(Exception):
     """A scene that cannot be run; the message is one sentence that names the field, the value and what is allowed."""
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
+    """A part of a scene: unknown fields, other types and numbers that are not finite are rejected."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-class MeshConfig(_Strict):
+class MeshConfig(Strict):
     """Fields of the mesh."""
 
     degree: int = Field(7, ge=2, le=8, description="polynomial degree of the collocation")
@@ -43,7 +45,7 @@ class MeshConfig(_Strict):
         return self
 
 
-class StepConfig(_Strict):
+class StepConfig(Strict):
     """Fields of the steps along a branch."""
 
     first: float | None = Field(None, ge=1e-6, le=10, description="first step of arclength; 0.05 if the bounds allow it")
@@ -78,7 +80,7 @@ Interval = Annotated[tuple[float, float], BeforeValidator(_two_ordered_numbers)]
 Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]
 
 
-class OriginConfig(_Strict):
+class OriginConfig(Strict):
     """The point at which a secondary branch leaves the primary branch (m, n)."""
 
     kappa_n: float = Field(description="natural curvature there")
@@ -86,7 +88,7 @@ class OriginConfig(_Strict):
     mode: str = Field(description="class of the critical mode: the name of the labelled point SB on the primary branch")
 
 
-class Config(_Strict):
+class Config(Strict):
     """One branch: that of the mode of wavenumber n on the m-covered circle, or a secondary branch that leaves it."""
 
     title: str = ""
@@ -302,14 +304,23 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
         if not equals or "" in parts:
             raise ConfigError(f"--set {setting!r}: must be key=value, as in nu=0.2 or mesh.degree=5")
         _put(values, parts, _yaml(value, f"--set {_plain(key)}"))
+    if "stages" in values:
+        from branches.open_config import OpenConfig  # needs the models of this module
+
+        return _validated(OpenConfig, values, name, settings)
     if "strip" in values:
         values = _of_strip(values, name)
     if _is_diagram(values):
         return _diagram(values, name, settings)
+    return _validated(Config, values, name, settings)
+
+
+def _validated(model: type[Strict], values: dict, name: str, settings: list[str]) -> Any:
+    """Return the scene with these values; raise ConfigError with one sentence."""
     try:
-        return Config.model_validate(values)
+        return model.model_validate(values)
     except ValidationError as error:
-        raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
+        raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error, model)}") from error
 
 
 #: Fields that follow from ``strip``, in the order in which `_of_strip` sets them.
@@ -464,13 +475,13 @@ def _plain(text: str) -> str:
     return text if len(text) <= 200 else text[:197] + "..."
 
 
-def _sentence(error: ValidationError) -> str:
+def _sentence(error: ValidationError, model: type[BaseModel] = Config) -> str:
     """Return the first error as `field: value ... what is allowed`, and the number of further errors."""
     errors = error.errors()
     first = errors[0]
     where, kind, message = _where(first), first["type"], first["msg"].removeprefix("Value error, ")
     if kind == "extra_forbidden":
-        text = f"unknown field {where!r}; the fields are {', '.join(_fields(first['loc']))}"
+        text = f"unknown field {where!r}; the fields are {', '.join(_fields(first['loc'], model))}"
     elif kind == "missing":
         text = f"the field {where!r} is missing"
     elif kind == "value_error":
@@ -483,14 +494,16 @@ def _sentence(error: ValidationError) -> str:
     return text + (f" (and {len(errors) - 1} more)" if len(errors) > 1 else "")
 
 
-def _fields(location) -> list[str]:
-    model = Config
+def _fields(location, model: type[BaseModel]) -> list[str]:
     for part in location[:-1]:
         field = model.model_fields.get(part)
-        if field is None or not isinstance(field.annotation, type) or not issubclass(field.annotation, BaseModel):
-            break
-        model = field.annotation
+        inner = [kind for kind in (field.annotation, *get_args(field.annotation)) if _is_model(kind)] if field else []
+        model = inner[0] if inner else model
     return list(model.model_fields)
+
+
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 
 def _show(value: Any) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from branches.config import Config, ConfigError, difference, dump, parse
 from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
+from branches.open_config import OpenConfig
 from branches.start import UntilPrimary, seed, settings_of
 from branches.store import BranchWriter, open_branch, read_state
 from contin import Continuation, Stop, exact_text
@@ -21,7 +22,7 @@ from ribbon_model.laws import LAWS
 _CHANGEABLE = ("title", "limits", "zeros", "stride", "steps.max_points")
 
 
-def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=False) -> str:
+def run_branch(config: Config | OpenConfig, path: Path, display, *, resume=False, overwrite=False) -> str:
     """Follow the branch of ``config`` into the file ``path``, telling ``display`` about it.
 
     Returns
@@ -58,9 +59,13 @@ def whole_branch(config: Config, path: Path, display) -> None:
         raise KeyboardInterrupt
 
 
-def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bool) -> str:
+def _run_branch(config: Config | OpenConfig, path: Path, display, resume: bool, overwrite: bool) -> str:
+    if isinstance(config, OpenConfig):
+        from branches.open_job import run_stages  # imports the open strips, which closed ones do not need
+
+        return run_stages(config, path, display, resume, overwrite)
     began = time.perf_counter()
-    done = _look_at(path, config, resume, overwrite)
+    done = look_at(path, config, resume, overwrite)
     if done is not None:
         display.note(f"{path} is complete already ({done}); nothing to do")
         return "complete"
@@ -68,7 +73,7 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
     (run, watch), image = _resumed(config, path) if resume else (begun(config), None)
     with contextlib.closing(_writer(path, config, run, watch, image)) as writer:
         display.begin(config, writer.count, len(writer.events()))
-        outcome = _follow(config, run, writer, display, _Interruption())
+        outcome = _follow(config, run, writer, display, Interruption())
         seconds = time.perf_counter() - began
         display.summary(config, writer.events(), writer.count, seconds, path, outcome, _shown(run.stop))
     return outcome
@@ -88,7 +93,7 @@ def compute_branch(config: Config, display) -> tuple[bytes, str]:
     """
     run, watch = begun(config)
     with contextlib.closing(_writer(None, config, run, watch)) as writer:
-        outcome = _follow(config, run, writer, display, _Interruption(()))
+        outcome = _follow(config, run, writer, display, Interruption(()))
         return writer.image(), outcome
 
 
@@ -140,7 +145,7 @@ def _resumed(config: Config, path: Path):
     return (_kind(config)(state.system, state.x, settings, state=state, start=start), watch), image
 
 
-def _follow(config: Config, run: Continuation, writer: BranchWriter, display, interruption: _Interruption) -> str:
+def _follow(config: Config, run: Continuation, writer: BranchWriter, display, interruption: Interruption) -> str:
     """Write all points of a run to the file; return the outcome."""
     with interruption:
         for point in run:
@@ -160,7 +165,7 @@ def _follow(config: Config, run: Continuation, writer: BranchWriter, display, in
     return outcome
 
 
-def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str | None:
+def look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str | None:
     """Raise unless the file at ``path`` may be replaced or resumed; return its reason to stop if it is complete."""
     if not path.exists() or (overwrite and not resume):
         return None
@@ -188,7 +193,7 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
     return stop if status == "complete" and not goes_on else None
 
 
-class _Interruption:
+class Interruption:
     """Stop the run after the current point on Ctrl-C, SIGTERM or a closed terminal; on the second signal, at once."""
 
     _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]

@@ -139,6 +139,12 @@ def prescribed(turn, bend, swing):
     return product((math.cos(turn / 2), 0, 0, math.sin(turn / 2)), second)
 
 
+def angles_of(q) -> tuple[float, float, float]:
+    """Return turn, bend and swing (the inverse of `prescribed`, turn and swing from -pi to pi) of a quaternion."""
+    d = directors(*q)
+    return math.atan2(-d[3], d[4]), math.asin(min(max(d[5], -1.0), 1.0)), math.atan2(-d[2], d[8])
+
+
 def relative(q, q1):
     """Return conj(q1) q: the rotation from the prescribed frame to the frame, on the prescribed frame."""
     return product((q1[0], -q1[1], -q1[2], -q1[3]), q)

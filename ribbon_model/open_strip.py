@@ -15,10 +15,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contin import Collocation, ContinError, Point, ProblemError, VariationalProblem, solve
+from contin import Collocation, ContinError, Point, ProblemError, TestFunction, Trial, VariationalProblem, solve
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, PLACE, End
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, spin
+from ribbon_model.laws import FINITE_WIDTH, RIBBON
 from ribbon_model.material import Material
 from ribbon_model.shape import Shape, frames
 
@@ -26,12 +27,16 @@ from ribbon_model.shape import Shape, frames
 #: ``weight_direction``), stiffness per length of a foundation.
 FORCES = ("force_width", "force_normal", "force_tangent")
 LOADS = (*FORCES, "moment", "weight", "foundation")
-#: Conditions that fix what symmetry leaves open on closed strips: place along the strip, and angle about the tangent. Each is
-#: an integral condition, whose multiplier vanishes.
+#: A further displacement of the last end, along ``stroke_direction``.
+STROKE = "stroke"
+#: Conditions that fix what symmetry leaves open: the angle about the tangent (a homogeneous ring, an isotropic rod between ends on
+#: one line), the place along a closed strip that is twisted to the right or to the left. Each is an integral condition that
+#: holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and x2 sin(2 pi s), those with the factors -3 and 0
+#: lose their slope on the way to a Moebius band of a flat strip; with +3 they keep it.)
 PHASES = {
-    "shift": lambda t, x: x.x1 * math.sin(2 * math.pi * t),
-    "shift, upright": lambda t, x: x.x2 * math.sin(2 * math.pi * t),
     "spin": lambda t, x: x.x1,
+    "shift, right": lambda t, x: x.x1 + 3 * x.x2 * math.sin(2 * math.pi * t),
+    "shift, left": lambda t, x: x.x1 - 3 * x.x2 * math.sin(2 * math.pi * t),
 }
 #: Columns of the reactions.
 REACTIONS = tuple(
@@ -56,8 +61,9 @@ class OpenStrip:
     numbers : mapping of str to float
         Values of what is prescribed (`ends.PLACE`, `ends.ANGLES`) and of loads (`LOADS`); a load that is not named is absent.
         Others that are not named have the values of the natural state, or zero.
-    weight_direction, foundation_direction : tuple of float
-        Where the weight pulls to; the direction in which the foundation holds.
+    weight_direction, foundation_direction, stroke_direction : tuple of float
+        Where the weight pulls to; the direction in which the foundation holds; that of a further displacement of the last end,
+        whose number is ``stroke``.
     phases : tuple of str
         Names of `PHASES`, for strips that can shift along themselves or spin about their tangents.
 
@@ -85,10 +91,11 @@ class OpenStrip:
     numbers: Mapping[str, float] = field(default_factory=dict)
     weight_direction: ends.Vector = (0.0, -1.0, 0.0)
     foundation_direction: ends.Vector = DIRECTIONS["normal"]
+    stroke_direction: ends.Vector = DIRECTIONS["tangent"]
     phases: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("weight_direction", "foundation_direction"):
+        for name in ("weight_direction", "foundation_direction", "stroke_direction"):
             object.__setattr__(self, name, ends.unit(name, getattr(self, name)))
         ends.check_known(self.numbers, self.known)
         for name, value in self.numbers.items():
@@ -113,14 +120,16 @@ class OpenStrip:
         forces = tuple(
             name for name, axis in zip(FORCES, DIRECTIONS.values()) if not _spanned(axis, self.finish.held)
         )  # fmt: skip
-        return (*ends.numbers_of(self.finish), *forces, *(name for name in LOADS if name not in FORCES))
+        along = np.array(self.finish.held).reshape(-1, 3) @ self.stroke_direction
+        stroke = (STROKE,) if np.any(abs(along) > _LOOSE) else ()
+        return (*ends.numbers_of(self.finish), *stroke, *forces, *(name for name in LOADS if name not in FORCES))
 
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
         natural = self._natural_numbers()
         prescribed = {name: self.numbers.get(name, natural[name]) for name in ends.numbers_of(self.finish)}
-        loads = {name: self.numbers[name] for name in LOADS if name in self.numbers}
+        loads = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
         return {**prescribed, **loads, **self.material.parameters}
 
     # --- the problem --------------------------------------------------------------------------------------------------
@@ -134,24 +143,23 @@ class OpenStrip:
         ProblemError
             Conditions that repeat or contradict each other.
         """
-        phases = [PHASES[name] for name in self.phases]
-        states = (*FRAME, *CENTRELINE, *(f"phase{i}" for i in range(len(phases))))
+        states = (*FRAME, *CENTRELINE, *(f"phase{i}" for i in range(len(self.phases))))
         return VariationalProblem(
             None, states, self.parameters, hamiltonian=self._hamiltonian(), ends=self._conditions(),
             end_energy=self._end_energy(), symmetries={"plane": _mirrored},
+            functionals={name: rate for name, rate in _PLACES.items() if name not in self.parameters},
         )  # fmt: skip
 
     def _hamiltonian(self) -> Callable:
         section, potential = self.material.hamiltonian(), self._potential()
-        phases = tuple(PHASES[name] for name in self.phases)
+        phases = _together(self.phases)
 
         def hamiltonian(t, x, lam, p):
             q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam[:7]
             rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
             M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
             d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
-            held = sum([multiplier * phase(t, x) for multiplier, phase in zip(lam[7:], phases)])
-            return section(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + held
+            return section(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + phases(t, x, lam[7:])
 
         return hamiltonian
 
@@ -190,10 +198,17 @@ class OpenStrip:
         """Return ``prescribed(p)``: turn, bend, swing, shear, rise and distance of the last end; zero where nothing is held."""
         turned, placed = self.finish.rotation != FREE, ends.numbers_of(self.finish)
         shear, rise, distance = (name in placed for name in PLACE)
-        return lambda p: (
-            p.turn if turned else 0, p.bend if turned else 0, p.swing if turned else 0,
-            p.shear if shear else 0, p.rise if rise else 0, p.distance if distance else 0,
-        )  # fmt: skip
+        moved, (x, y, z) = STROKE in self.numbers, self.stroke_direction
+
+        def prescribed(p):
+            stroke = p.stroke if moved else 0
+            return (
+                p.turn if turned else 0, p.bend if turned else 0, p.swing if turned else 0,
+                (p.shear if shear else 0) + stroke * x, (p.rise if rise else 0) + stroke * y,
+                (p.distance if distance else 0) + stroke * z,
+            )  # fmt: skip
+
+        return prescribed
 
     def _end_energy(self) -> Callable | None:
         """Return the potential of the loads at the last end."""
@@ -242,13 +257,9 @@ class OpenStrip:
         if all(self.material.parameters.get(name, 0) == 0 and name not in self.material.along for name in _STRAINS):
             return {**dict.fromkeys(PLACE + ANGLES, 0.0), "distance": 1.0}
         state = self.natural_states([1.0])[0]
-        d = np.array(directors(*state[:4])).reshape(3, 3)
-        bend = math.asin(min(max(d[1, 2], -1.0), 1.0))  # frame = R3(turn) R1(bend) R2(swing): columns are d1, d2, d3
-        bend_full = _winding(self.material) if abs(d[0, 0] - 1) < 1e-9 else bend
-        turn, swing = math.atan2(-d[1, 0], d[1, 1]), math.atan2(-d[0, 2], d[2, 2])
-        if abs(d[0, 0] - 1) < 1e-9:  # in the plane: the whole angle
-            turn, bend, swing = 0.0, bend_full, 0.0
-        return dict(zip(PLACE + ANGLES, map(float, (*state[4:], turn, bend, swing))))
+        planar = abs(directors(*state[:4])[0] - 1) < _LOOSE
+        angles = (0.0, _winding(self.material), 0.0) if planar else ends.angles_of(state[:4])  # in the plane, the whole angle
+        return dict(zip(PLACE + ANGLES, (*map(float, state[4:]), *angles)))
 
     def arch(self, distance: float | None = None, side: float = 1.0) -> Callable[[float], list[float]]:
         """Return a guess of a planar state whose ends are nearer than its length: an Euler mode of these ends.
@@ -277,7 +288,11 @@ class OpenStrip:
 
         return guess
 
-    def twisted_circle(self, half_twists: int = 0) -> Callable[[float], list[float]]:
+    def twisted(self, turn: float) -> Callable[[float], list[float]]:
+        """Return a guess of a straight strip that is evenly twisted."""
+        return lambda t: [math.cos(turn * t / 2), 0, 0, math.sin(turn * t / 2), 0, 0, t, *[0] * len(self.phases)]
+
+    def twisted_circle(self, half_twists: float = 0) -> Callable[[float], list[float]]:
         """Return a guess of a closed strip: a circle that bends about d1 at the start, evenly twisted by half twists."""
 
         def guess(t):
@@ -324,7 +339,9 @@ class OpenStrip:
         if not sizes.size or sizes.min() > _ZERO * sizes.max():
             return
         if self._rigid_freedom(point):
-            raise ProblemError("ends: the strip can move as a rigid body without resistance; hold more of its place or rotation")
+            raise ProblemError(
+                "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
+            )
         raise ProblemError(
             "ends: the strip can change its shape or turn about itself without a change of energy, so its state is not "
             "determined; hold more, or give one of the phases " + ", ".join(PHASES)
@@ -341,6 +358,50 @@ class OpenStrip:
         by_ends = np.concatenate([jacobian[:count, :n], jacobian[:count, 2 * n : 3 * n]], axis=1)
         motions = np.array([np.concatenate([_moved(states[i, :7], k, n) for i in (0, -1)]) for k in range(6)])
         return int(np.linalg.matrix_rank(by_ends @ motions.T, tol=_LOOSE)) < 6
+
+    # --- where the law ends -------------------------------------------------------------------------------------------
+
+    def domain_tests(self) -> list[TestFunction]:
+        """Return the test function that ends a run where the law ends; none for a law that is regular everywhere."""
+        law = self.material.of_paper
+        margin = {RIBBON.name: self._ribbon_margin, FINITE_WIDTH.name: self._convexity}.get(law.name) if law else None
+        return [TestFunction("EP", LAW_ENDS[law.name], margin, terminal=True)] if margin else []
+
+    def explained(self, run) -> str:
+        """Return why a run failed: the end of the law where its state is near it, else the run's own reason."""
+        for test in self.domain_tests():
+            state = run.state
+            if test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
+                return test.name
+        return str(run.stop)
+
+    def _ribbon_margin(self, trial: Trial) -> float:
+        """Return the least p = M1 + (1 - nu) kappa_n at the nodes, over the largest: the law holds where it is positive."""
+        system, x = trial.system, trial.x
+        states, p = system.states(x), _Numbers(dict(zip(system.problem.parameters, system.all_parameters(x))))
+        kappa_n = np.array([self.material.datum("kappa_n")(t, p) for t in system.nodes])
+        n = self.problem.dimension
+        moments = np.array([_components(row[:4], row[n : n + 4])[0] for row in states])
+        values = moments + (1 - p.nu) * kappa_n
+        return float(values.min() / max(abs(values).max(), _LOOSE))
+
+    def _convexity(self, trial: Trial) -> float:
+        """Return the least det D2U/(U_11 U_33) at the nodes and halfway between: positive where U is convex."""
+        system, x = trial.system, trial.x
+        p = _Numbers(dict(zip(system.problem.parameters, system.all_parameters(x))))
+        omega = self.strains(system, x)
+        if not np.all(np.isfinite(omega)):
+            return -1.0
+        places = np.concatenate([omega, (omega[1:] + omega[:-1]) / 2])
+        t = np.concatenate([system.nodes, (system.nodes[1:] + system.nodes[:-1]) / 2])
+        data = [self.material.datum(name) for name in ("kappa_n", "width", "thickness")]
+        least = math.inf
+        for s, (w1, _, w3) in zip(t, places):
+            kappa_n, width, thickness = (datum(s, p) for datum in data)
+            here = _Numbers({"kappa_n": kappa_n, "nu": p.nu, "Gamma": p.Gamma * width**2 / thickness})
+            U11, U13, U33 = FINITE_WIDTH.curvatures_at(w1, w3, here)
+            least = min(least, (U11 * U33 - U13**2) / (U11 * U33) if U11 > 0 and U33 > 0 else -1.0)
+        return least
 
     # --- what a state is ----------------------------------------------------------------------------------------------
 
@@ -364,12 +425,30 @@ class OpenStrip:
         return shape_of(point.system.nodes, point.system.states(point.x), self.strains(point.system, point.x))
 
 
+#: Why a run ends where its law does.
+LAW_ENDS = {
+    RIBBON.name: "the end of the law 'ribbon', which has no value where a strip is bent less than it is twisted (omega_1 -> 0); "
+    "the law 'finite width' goes on",
+    FINITE_WIDTH.name: "the end of the law 'finite width', whose energy is not convex at larger twist; the law 'flat rod' goes on",
+}
+#: A run that fails with a smaller margin of its law has met the end of it. The margin falls like a square root there.
+_NEARLY_ENDED = 0.1
 #: Why reactions are not determined.
 UNDETERMINED = (
     "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip that does not "
     "bend in its plane is held sideways at both ends); begin with an arch, a twist or a softness, or hold less"
 )
+#: Place of the last end from the first one, as integrals over the strip.
+_PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))
 _STRAINS = ("kappa_n", "kappa_2", "tau_n")
+
+
+def _together(names: tuple[str, ...]) -> Callable:
+    """Return the sum of these phases times their multipliers."""
+    if not names:
+        return lambda t, x, lam: 0
+    rest, last, place = _together(names[:-1]), PHASES[names[-1]], len(names) - 1
+    return lambda t, x, lam: rest(t, x, lam) + lam[place] * last(t, x)
 
 
 class _Numbers:
@@ -394,11 +473,14 @@ def shape_of(t: np.ndarray, states: np.ndarray, omega: np.ndarray) -> Shape:
     return Shape(np.asarray(t), states[:, 4:7], frames(states), eta)
 
 
+def _components(q, lam) -> np.ndarray:
+    """Return the moment on the directors from the multipliers of the quaternion."""
+    return np.array([np.dot(lam, rate) for rate in (spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1))])
+
+
 def _moment(q, lam) -> np.ndarray:
     """Return the moment on the lab axes from the multipliers of the quaternion."""
-    rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)
-    components = np.array([np.dot(lam, rate) for rate in rates])
-    result: np.ndarray = components @ np.array(directors(*q)).reshape(3, 3)
+    result: np.ndarray = _components(q, lam) @ np.array(directors(*q)).reshape(3, 3)
     return result
 
 
