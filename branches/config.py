@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +10,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import yaml
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
+from branches.fields import Interval, MeshConfig, StepConfig, Strict, show
 from contin import exact_text
 from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, label
 
@@ -21,62 +21,6 @@ class ConfigError(Exception):
     """A scene that cannot be run; the message is one sentence that names the field, the value and what is allowed."""
 
 
-class Strict(BaseModel):
-    """A part of a scene: unknown fields, other types and numbers that are not finite are rejected."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class MeshConfig(Strict):
-    """Fields of the mesh."""
-
-    degree: int = Field(7, ge=2, le=8, description="polynomial degree of the collocation")
-    intervals: int = Field(8, ge=1, le=2000, description="intervals of the first mesh")
-    max_intervals: int = Field(2000, ge=1, le=2000)
-    tolerance: float = Field(
-        1e-12, ge=1e-14, le=1e-2, description="tolerance of the discretization error; the number of intervals adapts to it"
-    )
-    adapt_every: int = Field(3, ge=0, description="steps between adaptations of the mesh, 0 for a fixed mesh")
-
-    @model_validator(mode="after")
-    def _order(self):
-        if self.intervals > self.max_intervals:
-            raise ValueError(f"intervals = {self.intervals} must not exceed max_intervals = {self.max_intervals}")
-        return self
-
-
-class StepConfig(Strict):
-    """Fields of the steps along a branch."""
-
-    first: float | None = Field(None, ge=1e-6, le=10, description="first step of arclength; 0.05 if the bounds allow it")
-    smallest: float = Field(1e-6, gt=0, le=1)
-    largest: float = Field(10.0, gt=0, description="largest step of arclength")
-    max_points: int = Field(2000, ge=1, le=1_000_000)
-    angle: float = Field(0.35, gt=0.001, le=1.0, description="largest angle between consecutive tangents, radians")
-
-    @model_validator(mode="after")
-    def _order(self):
-        if self.smallest > self.largest:
-            raise ValueError(f"smallest = {exact_text(self.smallest)} must not exceed largest = {exact_text(self.largest)}")
-        if self.first is not None and not self.smallest <= self.first <= self.largest:
-            bounds = f"smallest = {exact_text(self.smallest)} and largest = {exact_text(self.largest)}"
-            raise ValueError(f"first = {exact_text(self.first)} must lie between {bounds}")
-        return self
-
-    @property
-    def first_step(self) -> float:
-        """The first step of arclength; chosen if ``first`` is not given."""
-        return min(max(0.05, self.smallest), self.largest) if self.first is None else self.first
-
-
-def _two_ordered_numbers(ends: Any) -> Any:
-    numbers = isinstance(ends, (list, tuple)) and all(type(end) in (int, float) and math.isfinite(end) for end in ends)
-    if not (numbers and len(ends) == 2 and ends[0] < ends[1]):
-        raise ValueError(f"must be two finite numbers, the smaller first, as in [-100, 100], not {_show(ends)}")
-    return tuple(ends)
-
-
-Interval = Annotated[tuple[float, float], BeforeValidator(_two_ordered_numbers)]
 Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]
 
 
@@ -263,7 +207,7 @@ def _pairs(values: dict, lists: dict, name: str) -> list[tuple]:
         raise ConfigError(f"{name}: pairs: must not be given together with m or n")
     pairs = values["pairs"]
     if not (isinstance(pairs, list) and pairs and all(isinstance(pair, list) and len(pair) == 2 for pair in pairs)):
-        raise ConfigError(f"{name}: pairs: must be a list of [m, n], not {_show(pairs)}")
+        raise ConfigError(f"{name}: pairs: must be a list of [m, n], not {show(pairs)}")
     return [tuple(pair) for pair in pairs]
 
 
@@ -296,7 +240,7 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
     """Return the scene of a YAML text; messages call the text ``name``."""
     values = _yaml(text, name)
     if not isinstance(values, dict):
-        found = "it is empty" if values is None else f"not {_show(values)}"
+        found = "it is empty" if values is None else f"not {show(values)}"
         raise ConfigError(f"{name}: must hold `key: value` lines; {found}")
     for setting in settings:
         key, equals, value = setting.partition("=")
@@ -333,7 +277,7 @@ def _of_strip(values: dict, name: str) -> dict:
 
     strip = values["strip"]
     if not isinstance(strip, dict):
-        raise ConfigError(f"{name}: strip: must hold the fields {', '.join(NAMES)}, not {_show(strip)}")
+        raise ConfigError(f"{name}: strip: must hold the fields {', '.join(NAMES)}, not {show(strip)}")
     for field in strip:
         if field not in NAMES:
             raise ConfigError(f"{name}: unknown field 'strip.{_plain(str(field))}'; the fields are {', '.join(NAMES)}")
@@ -487,10 +431,10 @@ def _sentence(error: ValidationError, model: type[BaseModel] = Config) -> str:
     elif kind == "value_error":
         text = f"{where}: {message}" if where else message
     elif kind in ("model_type", "dict_type"):
-        text = f"{where}: must hold `key: value` fields, not {_show(first['input'])}"
+        text = f"{where}: must hold `key: value` fields, not {show(first['input'])}"
     else:
         message = message.replace("Input should be", "must be")
-        text = f"{where}: {message[0].lower()}{message[1:]}, not {_show(first['input'])}"
+        text = f"{where}: {message[0].lower()}{message[1:]}, not {show(first['input'])}"
     return text + (f" (and {len(errors) - 1} more)" if len(errors) > 1 else "")
 
 
@@ -504,8 +448,3 @@ def _fields(location, model: type[BaseModel]) -> list[str]:
 
 def _is_model(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, BaseModel)
-
-
-def _show(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -6,12 +6,12 @@ import contextlib
 import dataclasses
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from branches.config import Config, ConfigError, difference, dump, parse
 from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
-from branches.open_config import OpenConfig
 from branches.start import UntilPrimary, seed, settings_of
 from branches.store import BranchWriter, open_branch, read_state
 from contin import Continuation, Stop, exact_text
@@ -22,7 +22,7 @@ from ribbon_model.laws import LAWS
 _CHANGEABLE = ("title", "limits", "zeros", "stride", "steps.max_points")
 
 
-def run_branch(config: Config | OpenConfig, path: Path, display, *, resume=False, overwrite=False) -> str:
+def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=False) -> str:
     """Follow the branch of ``config`` into the file ``path``, telling ``display`` about it.
 
     Returns
@@ -35,14 +35,26 @@ def run_branch(config: Config | OpenConfig, path: Path, display, *, resume=False
     StoreError, ConfigError
         A result file that cannot be written, that another run is writing, or that belongs to another scene.
     """
-    path = Path(path)
+    with writing(Path(path), display, resume) as resume:
+        return _run_branch(config, Path(path), display, resume, overwrite)
+
+
+@contextlib.contextmanager
+def writing(path: Path, display, resume: bool) -> Iterator[bool]:
+    """Make the folder of a result file and lock the file for this run; the value is whether there is a run to resume.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written, or another run is writing it.
+    """
     if not path.exists():
         if resume:
             display.note(f"--resume: there is no file {str(path)!r}; the run starts from the beginning")
             resume = False
         prepare(path)  # makes its folder, which will contain the lock file
     with only_run(path):
-        return _run_branch(config, path, display, resume, overwrite)
+        yield resume
 
 
 def whole_branch(config: Config, path: Path, display) -> None:
@@ -59,11 +71,7 @@ def whole_branch(config: Config, path: Path, display) -> None:
         raise KeyboardInterrupt
 
 
-def _run_branch(config: Config | OpenConfig, path: Path, display, resume: bool, overwrite: bool) -> str:
-    if isinstance(config, OpenConfig):
-        from branches.open_job import run_stages  # imports the open strips, which closed ones do not need
-
-        return run_stages(config, path, display, resume, overwrite)
+def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bool) -> str:
     began = time.perf_counter()
     done = look_at(path, config, resume, overwrite)
     if done is not None:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from branches.config import Interval, MeshConfig, StepConfig, Strict
+from branches.fields import Interval, MeshConfig, StepConfig, Strict
 from contin import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH
@@ -40,7 +40,7 @@ MEANINGS = {
     "force_tangent": "along the tangent; negative compresses", "moment": "dead moment about the hinge of the last end",
     "weight": "weight per length", "foundation": "stiffness per length of the foundation",
     "kappa_n": "natural curvature about the width", "kappa_2": "natural curvature about the normal", "tau_n": "natural twist",
-    "nu": "Poisson's ratio", "Gamma": "w^2/(h L) of the law finite width", "softness": "compliance about the normal, 0: the law",
+    "nu": "Poisson's ratio", "Gamma": "w^2/(h L) of the law finite width", "softness": "compliance about the normal",
     "energy": "elastic energy, zero in the natural state, and potential of weight and foundation",
     "stage": "stage of the scene, from 1",
 }  # fmt: skip

@@ -17,7 +17,7 @@ import numpy as np
 
 from branches.config import ConfigError, dump
 from branches.files import prepare
-from branches.job import Interruption, look_at
+from branches.job import Interruption, look_at, writing
 from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
 from branches.store import BranchWriter, Kind
@@ -59,13 +59,18 @@ class Change:
     breaks: str
 
 
-def run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite: bool) -> str:
+def run_stages(config: OpenConfig, path: Path, display, *, resume: bool = False, overwrite: bool = False) -> str:
     """Follow the stages of ``config`` into the file ``path``; return the outcome, as `branches.job.run_branch`.
 
     Raises
     ------
     StoreError, ConfigError
     """
+    with writing(Path(path), display, resume) as resume:
+        return _run_stages(config, Path(path), display, resume, overwrite)
+
+
+def _run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite: bool) -> str:
     began = time.perf_counter()
     done = look_at(path, config, resume, overwrite)
     if done is not None:
@@ -84,8 +89,8 @@ def run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite:
 def writer_of(config: OpenConfig, strip: OpenStrip, path: Path | None) -> BranchWriter:
     """Return the writer of the result file."""
     meaning = {
-        name: f"{_WORDS[name.removeprefix('start_')[0]]} on the strip at its {'first' if name.startswith('start_') else 'last'} "
-        f"end, along the {name.rpartition('_')[2]} of the first one" for name in REACTIONS
+        name: f"{_WORDS[name.removeprefix('start_')[0]]} on the strip at its {'first' if name[0] == 's' else 'last'} end, "
+        f"along the {name.rpartition('_')[2]} of the first one" for name in REACTIONS
     }  # fmt: skip
     columns = (("stage", "i4", MEANINGS["stage"]), *((name, "f8", text) for name, text in meaning.items()))
     length = "1" if config.dimensions is None else f"1 ({exact_text(config.dimensions.length)} m)"

@@ -73,11 +73,16 @@ def _run(options) -> int:
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.files import StoreError
-    from branches.job import run_branch
+    from branches.open_config import OpenConfig
     from contin import ContinError
 
+    if isinstance(config, OpenConfig):
+        from branches.open_job import run_stages as run
+    else:
+        from branches.job import run_branch as run
+
     try:
-        outcome = run_branch(config, path, display, resume=options.resume, overwrite=options.overwrite)
+        outcome = run(config, path, display, resume=options.resume, overwrite=options.overwrite)
     except (ConfigError, StoreError, ContinError) as error:
         display.clear()
         return _refuse(error)

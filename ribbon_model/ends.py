@@ -1,9 +1,9 @@
 """What is held at an end of an open strip, and the conditions that follow.
 
-At the first end the clamp is given: its frame is the lab axes, its place the origin. Directions are named after the strip there:
-``width`` (d1), ``normal`` (d2), ``tangent`` (d3). At the last end the prescribed frame q1 comes from the first one by ``swing``
-about the normal, then ``bend`` about the width, then ``turn`` about the tangent, all axes fixed in space; the prescribed place
-is (``shear``, ``rise``, ``distance``) along width, normal and tangent.
+At the first end the clamp is given: its frame is the lab axes, its place the origin. Directions are named after the strip
+there: ``width`` (d1), ``normal`` (d2), ``tangent`` (d3). At the last end the prescribed frame q1 comes from the first one by
+``swing`` about the normal, then ``bend`` about the width, then ``turn`` about the tangent, all axes fixed in space; the
+prescribed place is (``shear``, ``rise``, ``distance``) along width, normal and tangent.
 
 A frame is held by conditions on v = vec(conj(q1) q), which vanishes for q = q1 and q = -q1. The length of q is kept by the
 equations: a clamp has three conditions, at the first end four numbers are fixed instead. What is not held is free, and its

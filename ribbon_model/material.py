@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, LAWS, RIBBON, Law
+from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, LAWS, Law
 
 #: The general Kirchhoff rod, which is no law of the paper.
 ROD = "rod"
@@ -82,7 +82,7 @@ class Material:
             check_expression(f"along: {name}", text, set(numbers) | set(self.natural))
         if self.law in (ROD, ISOTROPIC_ROD.name) and {"width", "thickness"} & set(self.along):
             raise ValueError(f"along: width, thickness: are for flat strips, not for the law {self.law!r}")
-        rest = {name: 0.0 for name in (*self.natural, *(["softness"] if self.constrained else []))}
+        rest = dict.fromkeys((*self.natural, *(["softness"] if self.constrained else [])), 0.0)
         object.__setattr__(self, "numbers", {**numbers, **{name: 0.0 for name in rest if name not in numbers}})
 
     def _check(self, numbers: Mapping[str, float]) -> None:

@@ -1,7 +1,7 @@
 """An open strip (or a closed, twisted one) between two ends, under loads: a variational problem from what a person says of it.
 
-The state is the quaternion of the frame and the centreline; lengths are over that of the strip, B = 1 (`ribbon_model.material`).
-The Hamiltonian is that of the section, H(M), plus n.d3 for the growth of the centreline, minus the potential of distributed
+The state is the quaternion of the frame and the centreline; the length is 1, and so is B (`ribbon_model.material`). The
+Hamiltonian is that of the section, H(M), plus n.d3 for the growth of the centreline, minus the potential of distributed
 loads: the multipliers of the quaternion carry the moment, 2 M_i = lambda_q . (q e_i), those of the centreline are the force n.
 Conditions at the ends: `ribbon_model.ends`. The reactions are the force and the moment that the supports exert on the strip.
 """
@@ -23,14 +23,14 @@ from ribbon_model.laws import FINITE_WIDTH, RIBBON
 from ribbon_model.material import Material
 from ribbon_model.shape import Shape, frames
 
-#: Numbers of loads: dead force at the last end along the three directions, dead moment about its hinge, weight per length (along
-#: ``weight_direction``), stiffness per length of a foundation.
+#: Numbers of loads: dead force at the last end along the three directions, dead moment about its hinge, weight per length
+#: (along ``weight_direction``), stiffness per length of a foundation.
 FORCES = ("force_width", "force_normal", "force_tangent")
 LOADS = (*FORCES, "moment", "weight", "foundation")
 #: A further displacement of the last end, along ``stroke_direction``.
 STROKE = "stroke"
-#: Conditions that fix what symmetry leaves open: the angle about the tangent (a homogeneous ring, an isotropic rod between ends on
-#: one line), the place along a closed strip that is twisted to the right or to the left. Each is an integral condition that
+#: Conditions that fix what symmetry leaves open: the angle about the tangent (a homogeneous ring, an isotropic rod between ends
+#: on one line), the place along a closed strip that is twisted to the right or to the left. Each is an integral condition that
 #: holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and x2 sin(2 pi s), those with the factors -3 and 0
 #: lose their slope on the way to a Moebius band of a flat strip; with +3 they keep it.)
 PHASES = {
@@ -427,16 +427,17 @@ class OpenStrip:
 
 #: Why a run ends where its law does.
 LAW_ENDS = {
-    RIBBON.name: "the end of the law 'ribbon', which has no value where a strip is bent less than it is twisted (omega_1 -> 0); "
-    "the law 'finite width' goes on",
-    FINITE_WIDTH.name: "the end of the law 'finite width', whose energy is not convex at larger twist; the law 'flat rod' goes on",
+    RIBBON.name: "the end of the law 'ribbon', which has no value where a strip is bent less than it is twisted "
+    "(omega_1 -> 0); the law 'finite width' goes on",
+    FINITE_WIDTH.name: "the end of the law 'finite width', whose energy is not convex at larger twist; the law 'flat rod' "
+    "goes on",
 }
 #: A run that fails with a smaller margin of its law has met the end of it. The margin falls like a square root there.
 _NEARLY_ENDED = 0.1
 #: Why reactions are not determined.
 UNDETERMINED = (
-    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip that does not "
-    "bend in its plane is held sideways at both ends); begin with an arch, a twist or a softness, or hold less"
+    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip that does "
+    "not bend in its plane is held sideways at both ends); begin with an arch, a twist or a softness, or hold less"
 )
 #: Place of the last end from the first one, as integrals over the strip.
 _PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))

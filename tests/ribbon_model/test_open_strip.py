@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk, jv
 
 import contin
-from ribbon_model.ends import BALL, CLAMP, DIRECTIONS, FREE_END, End, angles_of, hinge
+from ribbon_model.ends import CLAMP, DIRECTIONS, FREE_END, End, angles_of, hinge
 from ribbon_model.equilibrium import directors
 from ribbon_model.laws import LAWS
 from ribbon_model.material import Material
