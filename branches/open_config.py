@@ -150,6 +150,7 @@ class StageConfig(Strict):
     start_at: str | None = Field(None, description="labelled point to start from, as in BP 2 (the end of the stage before)")
     stage: int | None = Field(None, ge=1, description="number of the stage of that point (the one before)")
     way: Literal["forward", "backward"] = Field("forward", description="which of the two ways away from a branch point")
+    max_points: int | None = Field(None, ge=1, le=1_000_000, description="steps.max_points of this stage")
     limits: dict[str, Interval] = Field(default_factory=dict)
     label: dict[str, Annotated[list[float], Field(max_length=100)]] = Field(
         default_factory=dict, description="values at which points are labelled UZ"

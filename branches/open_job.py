@@ -200,7 +200,7 @@ def _run(config: OpenConfig, strip: OpenStrip, stage: StageConfig, origin: Point
     forward = 1 if stage.way == "forward" else -1
     settings = Settings(
         primary=stage.follow, direction=forward if switched else int(np.sign(to - here)) or 1, step=steps.first_step,
-        min_step=steps.smallest, max_step=steps.largest, max_points=steps.max_points, angle=steps.angle, limits=limits,
+        min_step=steps.smallest, max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits,
         zeros=zeros, mesh=_mesh_control(config), test_functions=strip.domain_tests(),
     )  # fmt: skip
     free = (stage.follow, *strip.problem.multipliers)

@@ -376,13 +376,18 @@ class OpenStrip:
         return str(run.stop)
 
     def _ribbon_margin(self, trial: Trial) -> float:
-        """Return the least p = M1 + (1 - nu) kappa_n at the nodes, over the largest: the law holds where it is positive."""
+        """Return the least M1 + (1 + nu) kappa_n at the nodes, over the largest: the law holds where it is positive.
+
+        With p and a of `ribbon_hamiltonian`, the two roots a belong to omega_1 of either sign, and their H differ by
+        sqrt(p**2 + M3**2) (p + 2 nu kappa_n)/2. Where that is negative, bending to the other side lowers the energy at this
+        moment: strips with an inflection of this kind need the width.
+        """
         system, x = trial.system, trial.x
         states, p = system.states(x), _Numbers(dict(zip(system.problem.parameters, system.all_parameters(x))))
         kappa_n = np.array([self.material.datum("kappa_n")(t, p) for t in system.nodes])
         n = self.problem.dimension
         moments = np.array([_components(row[:4], row[n : n + 4])[0] for row in states])
-        values = moments + (1 - p.nu) * kappa_n
+        values = moments + (1 + p.nu) * kappa_n
         return float(values.min() / max(abs(values).max(), _LOOSE))
 
     def _convexity(self, trial: Trial) -> float:
@@ -427,8 +432,8 @@ class OpenStrip:
 
 #: Why a run ends where its law does.
 LAW_ENDS = {
-    RIBBON.name: "the end of the law 'ribbon', which has no value where a strip is bent less than it is twisted "
-    "(omega_1 -> 0); the law 'finite width' goes on",
+    RIBBON.name: "the end of the law 'ribbon', which has no value where the bending vanishes (omega_1 -> 0); the law "
+    "'finite width' goes on",
     FINITE_WIDTH.name: "the end of the law 'finite width', whose energy is not convex at larger twist; the law 'flat rod' "
     "goes on",
 }
