@@ -166,9 +166,9 @@ class StageConfig(Strict):
 class OpenMesh(MeshConfig):
     """Fields of the mesh."""
 
-    degree: int = Field(6, ge=2, le=8)
+    degree: int = Field(7, ge=2, le=8)
     intervals: int = Field(10, ge=1, le=2000)
-    tolerance: float = Field(1e-10, ge=1e-14, le=1e-2)
+    tolerance: float = Field(1e-9, ge=1e-14, le=1e-2)
 
 
 class OpenConfig(Strict):

@@ -384,9 +384,9 @@ class OpenStrip:
         """
         system, x = trial.system, trial.x
         states, p = system.states(x), _Numbers(dict(zip(system.problem.parameters, system.all_parameters(x))))
-        kappa_n = np.array([self.material.datum("kappa_n")(t, p) for t in system.nodes])
-        n = self.problem.dimension
-        moments = np.array([_components(row[:4], row[n : n + 4])[0] for row in states])
+        natural, n = self.material.datum("kappa_n"), self.problem.dimension
+        kappa_n = np.array([natural(t, p) for t in system.nodes])
+        moments = _components(states.T[:4], states.T[n : n + 4])[0]
         values = moments + (1 + p.nu) * kappa_n
         return float(values.min() / max(abs(values).max(), _LOOSE))
 
@@ -480,8 +480,9 @@ def shape_of(t: np.ndarray, states: np.ndarray, omega: np.ndarray) -> Shape:
 
 
 def _components(q, lam) -> np.ndarray:
-    """Return the moment on the directors from the multipliers of the quaternion."""
-    return np.array([np.dot(lam, rate) for rate in (spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1))])
+    """Return the moment on the directors, shape (3, ...), from quaternions (4, ...) and their multipliers (4, ...)."""
+    rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)
+    return np.array([sum(a * b for a, b in zip(lam, rate)) for rate in rates])
 
 
 def _moment(q, lam) -> np.ndarray:
