@@ -201,7 +201,7 @@ class OpenConfig(Strict):
 
     @model_validator(mode="after")
     def _fits(self):
-        if self.closed is not None and {"start", "finish"} & self.model_fields_set:
+        if self.closed is not None and (self.start, self.finish) != (EndConfig(), EndConfig()):
             raise ValueError("closed: must not be given together with start or finish")
         strip = self.strip()
         for number, stage in enumerate(self.stages, 1):
