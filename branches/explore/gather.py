@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from branches import diagram_graph as diagram
-from branches.explore import profiles, strips
+from branches.explore import open_strips, profiles, strips
 from branches.files import StoreError
 from branches.names import DIAGRAM
 from branches.read import read_branch
@@ -25,7 +25,7 @@ def gather(results: list[str]) -> dict:
     Returns
     -------
     dict
-        ``title``; ``kind``: 'strips' or 'branches'; ``axes``: columns of the map (name, title, short name), of which ``shown``
+        ``title``; ``kind``: 'strips', 'open' or 'branches'; ``axes``: columns of the map (name, title, short name), of which ``shown``
         are drawn first; ``families``: dicts with ``name``, ``parameter``, ``branches`` and ``circles``.
 
     Raises
@@ -49,10 +49,16 @@ def gather(results: list[str]) -> dict:
 
 def _of_strips(files: list[Path], titles: list[str]) -> dict:
     branches = [(path, read_branch(path)) for path in files]
+    title = next((title or branch.config["title"] for title, (_, branch) in zip(titles, branches)), "")
+    opened = [(path, branch) for path, branch in branches if "stages" in branch.config]
+    if opened and len(opened) < len(branches):
+        other = next(path for path, branch in branches if "stages" not in branch.config)
+        raise StoreError(f"{str(other)!r} is of a closed strip, {str(opened[0][0])!r} is not; a page shows one kind of result")
+    if opened:
+        return open_strips.gathered(opened, title)
     families: dict[tuple, list] = {}
     for path, branch in branches:
         families.setdefault(strips.material(branch), []).append((path, branch))
-    title = next((title or branch.config["title"] for title, (_, branch) in zip(titles, branches)), "")
     return {
         "title": title, "kind": "strips", "axes": strips.AXES, "shown": ["kappa_n", "kappa_star"],
         "families": [strips.family(families[material]) for material in sorted(families)],

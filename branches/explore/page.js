@@ -143,8 +143,8 @@ function connect() {
   $("width").oninput = resized;
   if (flat) $("triads").parentElement.hidden = true;
   $("triads").onchange = () => redraw();
-  $("view").onclick = () => (STRIPS ? look(EYE) : drawProfile());
-  if (STRIPS) $("ribbon").addEventListener("keydown", turnByKey);
+  $("view").onclick = () => (SHAPES ? look(EYE) : drawProfile());
+  if (SHAPES) $("ribbon").addEventListener("keydown", turnByKey);
   $("slider").oninput = (event) => go(now.branch, now.branch.fromWay(Number(event.target.value) / 1000));
   $("previous").onclick = () => step(-1, false);
   $("next").onclick = () => step(1, false);
@@ -183,7 +183,7 @@ function keyPressed(event) {
 
 async function redraw() {
   await drawDiagram();
-  if (STRIPS && !flat) await Plotly.react("ribbon", ribbonTraces(shownStrip()), $("ribbon").layout);
+  if (SHAPES && !flat) await Plotly.react("ribbon", ribbonTraces(shownStrip()), $("ribbon").layout);
   await update();
 }
 
@@ -202,7 +202,7 @@ async function start() {
   $("diagram").on("plotly_click", clicked);
   $("diagram").on("plotly_relayout", mapMoved);
   $("diagram").on("plotly_relayouting", placeMarker);
-  if (STRIPS && !flat) $("ribbon").on("plotly_relayout", () => !now.playing && (drawStates(), remember()));
+  if (SHAPES && !flat) $("ribbon").on("plotly_relayout", () => !now.playing && (drawStates(), remember()));
   drawStates();
   return performance.now();
 }

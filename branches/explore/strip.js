@@ -69,7 +69,7 @@ const sceneAxis = { visible: false, range: [-1, 1], autorange: false };
 const shownStrip = () => now.morph || now.branch.strip(now.s);
 
 async function createState() {
-  if (!STRIPS) return drawProfile();
+  if (!SHAPES) return drawProfile();
   const strip = shownStrip();
   if (flat) return drawFlat(strip);
   const scene = {
@@ -89,7 +89,7 @@ async function createState() {
 }
 
 async function updateState() {
-  if (!STRIPS || flat || !$("ribbon").data) return createState();
+  if (!SHAPES || flat || !$("ribbon").data) return createState();
   const strip = shownStrip(),
     scale = scaleOf(strip),
     mesh = sheets(strip, width(), scale),
