@@ -200,9 +200,9 @@ def _run(config: OpenConfig, strip: OpenStrip, stage: StageConfig, origin: Point
     forward = 1 if stage.way == "forward" else -1
     direction = forward if switched else int(np.sign(to - here)) or 1
     settings = Settings(
-        primary=stage.follow, direction=direction, step=steps.first_step,
-        min_step=steps.smallest, max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits,
-        zeros=zeros, mesh=_mesh_control(config), test_functions=strip.domain_tests(),
+        primary=stage.follow, direction=direction, step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
+        max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits, zeros=zeros,
+        mesh=_mesh_control(config), test_functions=strip.domain_tests(),
     )  # fmt: skip
     free = (stage.follow, *strip.problem.multipliers)
     if switched:

@@ -327,6 +327,8 @@ class OpenStrip:
         text = str(error)
         if "repeat or contradict" in text:
             return UNDETERMINED
+        if "vanishes along a mode" in text:
+            return UNHELD
         return text
 
     def check_determined(self, point: Point) -> None:
@@ -342,10 +344,7 @@ class OpenStrip:
             raise ProblemError(
                 "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
             )
-        raise ProblemError(
-            "ends: the strip can change its shape or turn about itself without a change of energy, so its state is not "
-            "determined; hold more, or give one of the phases " + ", ".join(PHASES)
-        )
+        raise ProblemError(UNHELD)
 
     def _rigid_freedom(self, point: Point) -> bool:
         """Return whether a rigid motion violates no condition at the ends."""
@@ -439,6 +438,11 @@ LAW_ENDS = {
 }
 #: A run that fails with a smaller margin of its law has met the end of it. The margin falls like a square root there.
 _NEARLY_ENDED = 0.1
+#: Why a state is not determined.
+UNHELD = (
+    "ends: the strip can move, turn about itself or change its shape without a change of energy, so nothing determines its "
+    "state; hold more, or give one of the phases " + ", ".join(map(repr, PHASES))
+)
 #: Why reactions are not determined.
 UNDETERMINED = (
     "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip that does "

@@ -25,8 +25,8 @@ def gather(results: list[str]) -> dict:
     Returns
     -------
     dict
-        ``title``; ``kind``: 'strips', 'open' or 'branches'; ``axes``: columns of the map (name, title, short name), of which ``shown``
-        are drawn first; ``families``: dicts with ``name``, ``parameter``, ``branches`` and ``circles``.
+        ``title``; ``kind``: 'strips', 'open' or 'branches'; ``axes``: columns of the map (name, title, short name), of which
+        ``shown`` are drawn first; ``families``: dicts with ``name``, ``parameter``, ``branches`` and ``circles``.
 
     Raises
     ------

@@ -57,10 +57,10 @@ def _stage(path: Path, branch: OpenBranch, number: int, columns: list[str]) -> d
         for place, (row, label) in enumerate(zip(rows, labels))
         if label
     ]
-    kept = [*columns, "arclength", "index"]
+    kept, last = [*columns, "arclength", "index"], number == branch.points["stage"][-1]
     return {
         "profile": True, "domain": "open", "name": f"{path.stem}, stage {number}: {branch.followed(number)}",
-        "file": f"{path.stem}_{number}.h5", "stop": branch.stop * (number == branch.points["stage"][-1]), "marks": marks, "labels": labels,
+        "file": f"{path.stem}_{number}.h5", "stop": branch.stop * last, "marks": marks, "labels": labels,
         "columns": {name: packed(branch.points[name][rows].astype(float), "<f8") for name in kept}, "components": [],
         "nodes": values.shape[1], "shapes": packed(values, "<i2"), "scale": packed(scale, "<f8"),
     }  # fmt: skip
