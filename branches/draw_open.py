@@ -48,7 +48,7 @@ def figure(branch: OpenBranch, shapes: int = 6, width: float | None = None):
     columns = max(len(chosen), 1)
     result = Figure(figsize=(max(9, 3.6 * panels), 5.9 if chosen else 4.2), layout="constrained")
     rows = result.subfigures(2 if chosen else 1, 1, height_ratios=[1, 2.4] if chosen else [1], squeeze=False)[:, 0]
-    strips = [centred(branch.shape(point)) for point in chosen]
+    strips = [centred(branch.shape(point), branch.up) for point in chosen]
     if strips:
         wide = width_of(branch, strips, width)
         reach = reach_of(strips, wide)
@@ -74,9 +74,9 @@ def chosen_points(branch: OpenBranch, count: int) -> list[int]:
     return [point for point in choose(branch, count, s) if point not in again]
 
 
-def centred(shape: Shape) -> Shape:
-    """Return the shape with the normal of its first end upwards, in the middle of the picture."""
-    shape = standing(shape)
+def centred(shape: Shape, up) -> Shape:
+    """Return the shape with this direction upwards, in the middle of the picture."""
+    shape = standing(shape, up)
     middle = (shape.centreline.max(axis=0) + shape.centreline.min(axis=0)) / 2
     return Shape(shape.arclength, shape.centreline - middle, shape.directors, shape.eta)
 

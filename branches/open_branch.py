@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from branches.diagram_graph import common_index
 from branches.files import StoreError
 from branches.labels import SPECIAL
 from branches.open_config import OpenConfig
 from branches.read_closed import StoredBranch
+from ribbon_model.ends import DIRECTIONS
 from ribbon_model.open_strip import shape_of, strains_of
 from ribbon_model.shape import Shape
 
@@ -19,9 +19,12 @@ from ribbon_model.shape import Shape
 CONJUGATE = {
     "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
     "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
+    "weight": "rise",
 }  # fmt: skip
 #: Followed numbers that are dead loads, with the column whose product with them is the work to subtract from the energy.
 _WORK = {"force_tangent": "distance", "force_normal": "rise", "force_width": "shear"}
+#: A direction with a larger component along the tangent is that of a strip that stands upright.
+_UPRIGHT = 0.99
 #: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
 _SAME = 1e-6
 
@@ -82,11 +85,20 @@ class OpenBranch(StoredBranch):
         raise StoreError("this result is of an open strip; use shape(point) and strains(point)")
 
     def placed(self, point: int, length: float) -> tuple[Shape, np.ndarray]:
-        """Return the strip of this length, its middle at the origin (axes: tangent, width, normal), and its strains."""
-        shape = standing(self.shape(point))
+        """Return the strip of this length, its middle at the origin, and its strains (K, 3) in radians per unit of length.
+
+        The axes are tangent, width and normal of its first end, or the weight points downwards.
+        """
+        shape = standing(self.shape(point), self.up)
         middle = shape.centreline.mean(axis=0)
         scaled = Shape(shape.arclength * length, (shape.centreline - middle) * length, shape.directors, shape.eta)
         return scaled, self.strains(point) / length
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """The direction that is up in pictures: against the weight, if there is one, otherwise the normal of the first end."""
+        strip = self.scene.strip()
+        return tuple(-x for x in strip.weight_direction) if "weight" in strip.parameters else DIRECTIONS["normal"]
 
     def plot(self, shapes: int = 6, width: float | None = None):
         """Return the stages as a matplotlib figure; see `branches.draw_open.figure`."""
@@ -106,7 +118,8 @@ class OpenBranch(StoredBranch):
 
     def conjugate(self, name: str) -> str:
         """Return the column that is shown where a number is followed."""
-        return CONJUGATE.get(name, "energy")
+        conjugate = CONJUGATE.get(name, "energy")
+        return conjugate if conjugate in self.points.dtype.names else "energy"
 
     def pieces(self) -> list[Piece]:
         """Return the parts of all stages between special points."""
@@ -116,12 +129,15 @@ class OpenBranch(StoredBranch):
             rows = np.flatnonzero(self.points["stage"] == stage)
             ends = sorted({rows[0], rows[-1], *(row for row in rows if row in special)})
             for first, last in pairwise(ends):
-                index = common_index(self.points["index"][first : last + 1])
-                if index < 0:
-                    inner = self.points["index"][first : last + 1]
-                    index = int(inner.max()) if inner.min() == inner.max() else -1
+                index = self._index(np.arange(first, last + 1))
                 found.append(Piece(int(stage), np.arange(first, last + 1), None if index < 0 else index == 0))
         return found
+
+    def _index(self, rows: np.ndarray) -> int:
+        """Return the index on a piece, that of its points which are not special; -1 if they differ or there are none."""
+        regular = [row for row in rows if self.points["label"][row] not in (b"LP", b"BP")]
+        values = set(self.points["index"][regular].tolist())
+        return int(values.pop()) if len(values) == 1 else -1
 
     def potential(self, name: str) -> np.ndarray:
         """Return the energy of all points with the work of the load that is followed."""
@@ -170,7 +186,11 @@ class OpenBranch(StoredBranch):
         return True
 
 
-def standing(shape: Shape) -> Shape:
-    """Return the shape on axes along tangent, width and normal of the first end: the normal points upwards."""
-    order = [2, 0, 1]
-    return Shape(shape.arclength, shape.centreline[:, order], shape.directors[:, :, order], shape.eta)
+def standing(shape: Shape, up: tuple[float, float, float] = DIRECTIONS["normal"]) -> Shape:
+    """Return the shape on axes of which the last one is ``up``, and the first one the tangent of the first end if it may be."""
+    z = np.array(up)
+    ahead = DIRECTIONS["tangent"] if abs(z[2]) < _UPRIGHT else DIRECTIONS["normal"]
+    x = np.array(ahead) - z * (z @ ahead)
+    x /= np.linalg.norm(x)
+    axes = np.array([x, np.cross(z, x), z])
+    return Shape(shape.arclength, shape.centreline @ axes.T, shape.directors @ axes.T, shape.eta)
