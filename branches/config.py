@@ -369,7 +369,7 @@ def difference(stored: Config, config: Config, ignored: Sequence[str] = ()) -> s
     for field in ignored:
         name, _, inner = field.partition(".")
         for values in (a, b):
-            (values[name] if inner else values).pop(inner or name)
+            (values[name] if inner else values).pop(inner or name, None)
     for name in a:
         if a[name] != b[name]:
             return f"{name} = {a[name]!r} there, {b[name]!r} here"

@@ -205,7 +205,8 @@ def _describe_stage(config, event) -> str:
     what = event["name"].decode()
     change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
     broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""
-    kind = f" ({what})" if what and label not in ("LP", "BP") else f" ({what})" if "kernel" in what else ""
+    shown = what if "=" not in what and (label not in ("LP", "BP") or "kernel" in what) else ""  # not the value once more
+    kind = f" ({shown})" if shown else ""
     return f"stage {event['stage']}: {label_of(label).word}{kind} at {place}{change}{broken}"
 
 

@@ -82,7 +82,9 @@ class OpenBranch(StoredBranch):
 
     def solution(self, point: int):
         """Open strips have no `ribbon_model.solution.Solution`; raise StoreError."""
-        raise StoreError("this result is of an open strip; use shape(point) and strains(point)")
+        raise StoreError(
+            "films and loops are of closed strips, and this result is of an open one (shape and strains give its states)"
+        )
 
     def placed(self, point: int, length: float) -> tuple[Shape, np.ndarray]:
         """Return the strip of this length, its middle at the origin, and its strains (K, 3) in radians per unit of length.

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from branches.fields import Interval, MeshConfig, StepConfig, Strict
+from branches.fields import Interval, MeshConfig, StepConfig, Strict, show
 from contin import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH
@@ -163,6 +163,26 @@ class StageConfig(Strict):
         return self
 
 
+def _expression(value: Any) -> Any:
+    """Return data along the strip as an expression: a table is the polynomial through its points (Newton's form)."""
+    if not isinstance(value, list):
+        return value
+    pairs = all(isinstance(pair, list) and len(pair) == 2 and all(type(x) in (int, float) for x in pair) for pair in value)
+    if not (pairs and 2 <= len(value) <= 12):
+        raise ValueError(f"a table must have 2 to 12 points [s, value], not {show(value)}")
+    s, y = ([float(pair[i]) for pair in value] for i in (0, 1))
+    if s != sorted(set(s)) or s[0] != 0 or s[-1] != 1:
+        raise ValueError("the places s of a table must increase from 0 to 1")
+    differences = list(y)
+    for order in range(1, len(s)):
+        for i in reversed(range(order, len(s))):
+            differences[i] = (differences[i] - differences[i - 1]) / (s[i] - s[i - order])
+    text = repr(differences[-1])
+    for i in reversed(range(len(s) - 1)):
+        text = f"({differences[i]!r}) + (s - {s[i]!r}) * ({text})"
+    return text
+
+
 class OpenMesh(MeshConfig):
     """Fields of the mesh."""
 
@@ -177,7 +197,9 @@ class OpenConfig(Strict):
     title: str = ""
     material: dict[str, float | int | str] = Field(description="law, and its numbers")
     dimensions: DimensionsConfig | None = None
-    along: dict[str, str | list[tuple[float, float]]] = Field(default_factory=dict, description="data along the strip")
+    along: dict[str, Annotated[str, BeforeValidator(_expression)]] = Field(
+        default_factory=dict, description="data along the strip: expressions in s, or tables of [s, value]"
+    )
     start: EndWords = EndConfig()
     finish: EndWords = EndConfig()
     closed: ClosedConfig | None = None
@@ -250,7 +272,7 @@ class OpenConfig(Strict):
             if not name.isidentifier():
                 raise ValueError(f"material: {name!r} is not usable as a name")
             numbers[name] = math.inf if isinstance(value, str) else value / self.factor(name)
-        return Material(str(law), numbers, {name: _expression(name, value) for name, value in self.along.items()})
+        return Material(str(law), numbers, self.along)
 
     @functools.lru_cache(maxsize=8)  # noqa: B019
     def _strip(self):
@@ -302,22 +324,3 @@ def _unit_of(name: str) -> tuple[int, int, str]:
     if base.startswith("F_"):
         return _UNITS["force_width"]
     return _UNITS["moment"] if base.startswith("M_") else (0, 0, "")
-
-
-def _expression(name: str, value: str | list) -> str:
-    """Return data along the strip as an expression: a table is the polynomial through its points (Newton's form)."""
-    if isinstance(value, str):
-        return value
-    if not 2 <= len(value) <= 12:
-        raise ValueError(f"along: {name}: a table must have 2 to 12 points [s, value], not {len(value)}")
-    s, y = ([float(pair[i]) for pair in value] for i in (0, 1))
-    if s != sorted(set(s)) or s[0] != 0 or s[-1] != 1:
-        raise ValueError(f"along: {name}: the places s of a table must increase from 0 to 1")
-    differences = list(y)
-    for order in range(1, len(s)):
-        for i in reversed(range(order, len(s))):
-            differences[i] = (differences[i] - differences[i - 1]) / (s[i] - s[i - order])
-    text = repr(differences[-1])
-    for i in reversed(range(len(s) - 1)):
-        text = f"({differences[i]!r}) + (s - {s[i]!r}) * ({text})"
-    return text

@@ -60,7 +60,7 @@ def _stage(path: Path, branch: OpenBranch, number: int, columns: list[str]) -> d
     kept, last = [*columns, "arclength", "index"], number == branch.points["stage"][-1]
     return {
         "profile": True, "domain": "open", "name": f"{path.stem}, stage {number}: {branch.followed(number)}",
-        "file": f"{path.stem}_{number}.h5", "stop": branch.stop * last, "marks": marks, "labels": labels,
+        "file": f"{path.stem}_{number}.h5", "stop": branch.stop if last else "", "marks": marks, "labels": labels,
         "columns": {name: packed(branch.points[name][rows].astype(float), "<f8") for name in kept}, "components": [],
         "nodes": values.shape[1], "shapes": packed(values, "<i2"), "scale": packed(scale, "<f8"),
     }  # fmt: skip
