@@ -6,9 +6,8 @@ import numpy as np
 
 from branches.draw_branch import choose, letters
 from branches.draw_diagram import LINES, in_words, smooth
-from branches.draw_strip import draw_strip, reach_of
+from branches.draw_strip import draw_strip, reach_of, standing
 from branches.labels import label_of
-from branches.open_branch import OpenBranch, standing
 from branches.solid import widest
 from ribbon_model.shape import Shape
 
@@ -29,12 +28,12 @@ WORDS = {
 }  # fmt: skip
 
 
-def figure(branch: OpenBranch, shapes: int = 6, width: float | None = None):
+def figure(branch, shapes: int = 6, width: float | None = None):
     """Return the figure of a result: strips at equal distances along the way, and one diagram for each number followed.
 
     Parameters
     ----------
-    branch : OpenBranch
+    branch : branches.open_branch.OpenBranch
     shapes : int
         Number of strips; labelled points are among them where they fit.
     width : float, optional
@@ -63,7 +62,7 @@ def figure(branch: OpenBranch, shapes: int = 6, width: float | None = None):
     return result
 
 
-def chosen_points(branch: OpenBranch, count: int) -> list[int]:
+def chosen_points(branch, count: int) -> list[int]:
     """Return the points whose strip is drawn: as `draw_branch.choose`, the arclength of all stages in a row."""
     s, offset = branch.points["arclength"].copy(), 0.0
     for stage in np.unique(branch.points["stage"]):
@@ -81,7 +80,7 @@ def centred(shape: Shape, up) -> Shape:
     return Shape(shape.arclength, shape.centreline - middle, shape.directors, shape.eta)
 
 
-def width_of(branch: OpenBranch, strips, asked: float | None) -> float:
+def width_of(branch, strips, asked: float | None) -> float:
     """Return the width of the drawn strips over the length: that of the scene's dimensions, or the one asked for."""
     sizes = branch.config["dimensions"]
     if asked is None:
@@ -89,7 +88,7 @@ def width_of(branch: OpenBranch, strips, asked: float | None) -> float:
     return min([asked, *(ROOM * widest(strip) for strip in strips)])
 
 
-def panel(axes, branch: OpenBranch, name: str, chosen, seen: set) -> None:
+def panel(axes, branch, name: str, chosen, seen: set) -> None:
     """Draw all stages that follow a number: solid where stable, with marks at labelled points and arrows at snaps."""
     scene, conjugate = branch.scene, branch.conjugate(name)
     across, up = branch.points[name] * scene.factor(name), branch.points[conjugate] * scene.factor(conjugate)
@@ -137,7 +136,7 @@ def _mark(axes, event, columns, seen: set) -> None:
     axes.scatter(*place, marker=mark.marker, s=mark.size, zorder=3, label=_once(mark.word, seen), **colours)
 
 
-def _arrow(axes, snap, branch: OpenBranch, columns) -> None:
+def _arrow(axes, snap, branch, columns) -> None:
     """Draw where a fold snaps to, with the energy that it releases."""
     across, up = columns
     conjugate, scene = branch.conjugate(snap.column), branch.scene

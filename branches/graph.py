@@ -15,6 +15,7 @@ from pathlib import Path
 from branches import diagram_graph as diagram
 from branches.config import ConfigError, load
 from branches.files import StoreError
+from branches.open_config import OpenConfig
 from branches.preview import preview
 from contin import exact_text
 
@@ -29,7 +30,12 @@ def read(path: str | Path):
     ConfigError
         The scene is none.
     """
-    return preview(load(path)) if Path(path).suffix in (".yaml", ".yml") else diagram.read(path)
+    if Path(path).suffix not in (".yaml", ".yml"):
+        return diagram.read(path)
+    config = load(path)
+    if isinstance(config, OpenConfig):
+        raise ConfigError(f"{str(path)!r} is a scene of an open strip, for which there is no exact solution; run it")
+    return preview(config)
 
 
 def main(argv=None) -> int:

@@ -7,6 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from branches.config import dump
+from branches.draw_strip import standing
 from branches.files import StoreError
 from branches.labels import SPECIAL
 from branches.open_config import OpenConfig
@@ -23,8 +25,6 @@ CONJUGATE = {
 }  # fmt: skip
 #: Followed numbers that are dead loads, with the column whose product with them is the work to subtract from the energy.
 _WORK = {"force_tangent": "distance", "force_normal": "rise", "force_width": "shear"}
-#: A direction with a larger component along the tangent is that of a strip that stands upright.
-_UPRIGHT = 0.99
 #: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
 _SAME = 1e-6
 
@@ -108,6 +108,21 @@ class OpenBranch(StoredBranch):
 
         return figure(self, shapes, width)
 
+    @property
+    def about(self) -> str:
+        """The strip in words."""
+        return self.scene.title or self.scene.name
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Columns of labelled points that a notebook shows."""
+        followed = dict.fromkeys(stage["follow"] for stage in self.config["stages"])
+        return ("point", "label", "name", "stage", *followed, "energy", "index")
+
+    def scene_text(self) -> str:
+        """Return the scene as YAML."""
+        return dump(self.scene)
+
     def place(self, row: int) -> str:
         """Return where a labelled point is, in words; ``row`` counts labelled points from 0."""
         event = self.events[row]
@@ -186,13 +201,3 @@ class OpenBranch(StoredBranch):
             if other != name and abs(a - b) > _SAME * (1 + abs(a)):
                 return False
         return True
-
-
-def standing(shape: Shape, up: tuple[float, float, float] = DIRECTIONS["normal"]) -> Shape:
-    """Return the shape on axes of which the last one is ``up``, and the first one the tangent of the first end if it may be."""
-    z = np.array(up)
-    ahead = DIRECTIONS["tangent"] if abs(z[2]) < _UPRIGHT else DIRECTIONS["normal"]
-    x = np.array(ahead) - z * (z @ ahead)
-    x /= np.linalg.norm(x)
-    axes = np.array([x, np.cross(z, x), z])
-    return Shape(shape.arclength, shape.centreline @ axes.T, shape.directors @ axes.T, shape.eta)

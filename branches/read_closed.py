@@ -11,8 +11,9 @@ from branches.config import Config, dump
 from branches.draw_strip import flat_across
 from branches.files import StoreError
 from branches.store import meaning_of
+from contin import exact_text
 from ribbon_model.domains import DOMAINS, LOOP
-from ribbon_model.laws import LAWS
+from ribbon_model.laws import LAWS, label
 from ribbon_model.shape import Shape
 from ribbon_model.solution import Solution
 
@@ -56,6 +57,22 @@ class StoredBranch:
         parameters = {name: float(self.points[point][name]) for name in names}
         return Solution(law, domain, self.t[here], self.states[here], int(row["degree"]), parameters)
 
+    @property
+    def about(self) -> str:
+        """The branch in words."""
+        config = self.config
+        mode, nu = f"(m, n) = ({config['m']}, {config['n']})", exact_text(config["nu"])
+        return f"{label(config['law'], config['Gamma'])}, {mode}, nu = {nu}"
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Columns of labelled points that a notebook shows."""
+        return ("point", "label", "name", "kappa_n", "kappa_star", "energy")
+
+    def scene_text(self) -> str:
+        """Return the scene as YAML."""
+        return dump(Config.model_validate(self.config))
+
     def place(self, row: int) -> str:
         """Return where a labelled point is, in words; ``row`` counts labelled points from 0."""
         return f"kappa_n = {self.events['kappa_n'][row]:.4f}"
@@ -91,7 +108,7 @@ class StoredBranch:
         columns = {name: self.points[name] for name in self.points.dtype.names if name not in ("point", "label")}
         columns["label"] = np.array([label.decode() for label in self.points["label"]])
         variables = {name: ("point", values, {"long_name": meaning_of(name)}) for name, values in columns.items()}
-        about = {"config": dump(Config.model_validate(self.config)), "status": self.status, "stop": self.stop}
+        about = {"config": self.scene_text(), "status": self.status, "stop": self.stop}
         return xarray.Dataset(variables, {"point": self.points["point"]}, about)
 
     def plot(self, shapes: int = 6, width: float | None = None):

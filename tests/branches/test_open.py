@@ -1,10 +1,12 @@
 """Scenes of open strips: what is asked of them, their files, pictures and pages. Their numbers: test_open_scenes."""
 
 import math
+import signal
 
 import numpy as np
 import pytest
 
+import contin
 from branches import export, run
 from branches.config import ConfigError, dump, load, parse
 from branches.display import Display
@@ -118,3 +120,50 @@ def test_the_ribbon_ends_where_its_bending_vanishes(tmp_path):
     outcome = run_stages(parse(text, "scene"), path, Display(silent=True))
     if outcome == "lost":
         assert "the law 'finite width' goes on" in read_branch(path).stop
+
+
+@pytest.mark.parametrize(
+    "words, sentence",
+    [
+        (["branches.secondary", "FILE"], "holds no branch with its index on the cell"),
+        (["branches.graph", "SCENE"], "no exact solution"),
+        (["branches.export", "FILE", "--point", "1", "--movie", "tip.gif"], "films and loops are of closed strips"),
+        (["branches.export", "FILE", "--point", "LP", "--out", "tip.csv"], "1 (EP at force_width = 0.0000 of stage 1)"),
+    ],
+)
+def test_what_other_commands_say(tip, root, command, words, sentence):
+    places = {"FILE": tip, "SCENE": root / "configs" / "open_tip.yaml"}
+    done = command(*[places.get(word, word) for word in words[1:]], program=("-m", words[0]))
+    assert done.returncode == 2 and sentence in done.err and done.err.count("\n") == 1
+
+
+def test_interrupted_and_run_again(root, tmp_path):
+    """Ctrl-C keeps the points so far; --resume computes the scene again, to the same points."""
+
+    class Interrupts(Display):
+        def stage_point(self, config, stage, point, number):
+            if number == 5:
+                signal.raise_signal(signal.SIGINT)
+
+    config, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
+    assert run_stages(config, path, Interrupts(silent=True)) == "interrupted"
+    assert read_branch(path).status == "interrupted" and len(read_branch(path).points) == 6
+    with pytest.raises(StoreError, match="unfinished run of this scene; --resume"):
+        run_stages(config, path, Display(silent=True))
+    assert run_stages(config, path, Display(silent=True), resume=True) == "complete"
+    assert len(read_branch(path).points) > 20
+
+
+def test_a_table_and_a_taper():
+    """A table is the polynomial through its points; a strip with half the width at its tip buckles under less weight."""
+    text = "material: {law: flat rod, nu: 0.3}\nfinish: free\ndirections: {weight: [-1, 0, 0]}\n"
+    text += "stages: [{follow: weight, to: 25}]\n"
+    tapered = parse(text + "along: {width: [[0, 1], [0.5, 0.75], [1, 0.5]]}\n", "scene")
+    width = tapered.strip().material.datum("width")
+    assert [width(s, None) for s in (0, 0.25, 1)] == pytest.approx([1, 0.875, 0.5])
+    found = []
+    for config in (parse(text, "scene"), tapered):
+        start = first_state(config)
+        branch = contin.trace(start, free=["weight"], limits={"weight": (-1, 25)})
+        found.append(branch.labelled("BP")[0]["weight"])
+    assert found[1] < found[0]
