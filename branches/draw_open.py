@@ -144,8 +144,8 @@ def _arrow(axes, snap, branch, columns) -> None:
     released = f"{snap.released * scene.factor('energy'):.3g} {scene.unit('energy')}".strip()
     style = {"arrowstyle": "->", "color": "#000000", "lw": 1.2}
     axes.annotate("", (across[snap.row], target), (across[snap.row], up[snap.row]), arrowprops=style, zorder=2)
-    middle = (across[snap.row], (up[snap.row] + target) / 2)
-    axes.annotate(f"snaps,\nreleases {in_words(released)}", middle, (6, 0), textcoords="offset points", fontsize=9, va="center")
+    words = f"snap, releases {in_words(released)}"
+    axes.plot([], [], color="#000000", ls="", marker=r"$\downarrow$", ms=12, label=words)  # in the legend: no curve is hidden
 
 
 def _once(name, seen: set):

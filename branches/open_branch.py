@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import BarycentricInterpolator
 
 from branches.config import dump
 from branches.draw_strip import standing
@@ -183,16 +184,17 @@ class OpenBranch(StoredBranch):
         """Return the columns of a stable piece where the followed number has a value, None if it does not get there."""
         if self.followed(piece.stage) != name or not self._same_numbers(piece.rows[0], row, name):
             return None
-        x = self.points[name][piece.rows]
+        x, conjugate = self.points[name][piece.rows], self.conjugate(name)
         for i in range(len(x) - 1):
             if (x[i] - value) * (x[i + 1] - value) <= 0 and x[i] != x[i + 1] and row not in piece.rows[i : i + 2]:
-                part = (value - x[i]) / (x[i + 1] - x[i])
-                columns = {self.conjugate(name), "energy"}
-                state = {
-                    column: float(np.interp(part, [0, 1], self.points[column][piece.rows[i : i + 2]])) for column in columns
-                }
-                return state | {"potential": float(np.interp(part, [0, 1], self.potential(name)[piece.rows[i : i + 2]]))}
+                columns = {conjugate: self.points[conjugate], "potential": self.potential(name)}
+                return {column: self._between(piece.rows, i, name, value, values) for column, values in columns.items()}
         return None
+
+    def _between(self, rows: np.ndarray, i: int, name: str, value: float, column: np.ndarray) -> float:
+        """Return a column where a number has a value between points i and i + 1 of a piece, from the points around."""
+        near = rows[max(i - 1, 0) : i + 3]
+        return float(BarycentricInterpolator(self.points[name][near], column[near])(value))
 
     def _same_numbers(self, first: int, second: int, name: str) -> bool:
         """Return whether two points agree in all prescribed numbers but the followed one."""

@@ -274,7 +274,7 @@ class OpenConfig(Strict):
             numbers[name] = math.inf if isinstance(value, str) else value / self.factor(name)
         return Material(str(law), numbers, self.along)
 
-    @functools.lru_cache(maxsize=8)  # noqa: B019
+    @functools.cached_property
     def _strip(self):
         from ribbon_model.open_strip import LOADS, STROKE, OpenStrip
 
@@ -298,10 +298,7 @@ class OpenConfig(Strict):
         ValueError
             Fields that do not fit; one sentence.
         """
-        return self._strip()
-
-    def __hash__(self) -> int:
-        return id(self)
+        return self._strip
 
     @property
     def name(self) -> str:

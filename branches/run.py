@@ -19,7 +19,8 @@ def arguments(argv=None):
     parser = argparse.ArgumentParser(
         prog="python -m branches.run",
         allow_abbrev=False,
-        description="Follow one branch of buckled equilibria of a closed elastic strip and write it to an HDF5 file.",
+        description="Follow one branch of buckled equilibria of a closed elastic strip, or the stages of an open one, and "
+        "write it to an HDF5 file.",
         epilog="Exit code: 0 done, 1 the run failed on the way (the file holds the points before), 2 bad input, "
         "130 interrupted.",
     )

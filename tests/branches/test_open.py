@@ -5,11 +5,13 @@ import signal
 
 import numpy as np
 import pytest
+from browser import CHROMIUM, Browser
 
 import contin
 from branches import export, run
 from branches.config import ConfigError, dump, load, parse
 from branches.display import Display
+from branches.explore import __main__ as page
 from branches.explore.gather import gather
 from branches.files import StoreError
 from branches.open_branch import OpenBranch
@@ -95,6 +97,19 @@ def test_picture_and_page(tip, tmp_path):
     ]  # fmt: skip
     assert export.main([str(tip), "--point", "1", "--out", str(tmp_path / "tip.csv")]) == 0
     assert (tmp_path / "tip.csv").read_text().startswith("s,x,y,z")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+def test_the_page_in_a_browser(tip, tmp_path):
+    pytest.importorskip("websocket", reason="the package websocket-client drives the browser")
+    assert page.main([str(tip), "--out", str(tmp_path / "tip.html")]) == 0
+    browser = Browser(tmp_path / "chromium")
+    try:
+        browser.open(tmp_path / "tip.html")
+        assert browser.colours("#diagram") > 20 and browser.colours("#ribbon") > 20
+        assert browser.errors == []
+    finally:
+        browser.close()
 
 
 def test_dimensions_scale_the_numbers(tmp_path):

@@ -239,6 +239,22 @@ def test_the_twist_threshold_under_tension(scene):
         assert math.isclose(brentq(determinant, at - 0.01, at + 0.01, xtol=1e-13), at, abs_tol=1e-8)
 
 
+def test_the_snap_of_the_clamped_strip(scene):
+    """At the fold the stable branch ends; it snaps to the one that was left, whose energy at this turn is interpolated."""
+    name, branch = scene
+    if name != "open_clamped":
+        pytest.skip("another scene")
+    (snap,) = branch.snaps()
+    fold, _ = special_point(branch, "turn", 3, 0)
+    assert snap.row == fold["point"] and fold["index_before"] == 0 and fold["index_after"] == 1
+    before = branch.points[branch.points["stage"] == 2]
+    nearest = before[np.argmin(abs(before["turn"] - fold["turn"]))]
+    # dE/dturn is the moment, so the nearest point gives the energy up to the square of the distance
+    below = nearest["energy"] + nearest["M_tangent"] * (fold["turn"] - nearest["turn"])
+    assert snap.released == pytest.approx(fold["energy"] - below, rel=1e-3)
+    assert snap.to["M_tangent"] == pytest.approx(nearest["M_tangent"], abs=0.3)
+
+
 @pytest.mark.full
 def test_the_fold_of_the_imperfect_loop_against_shooting(scene):
     """The state and the determinant of the slopes vanish together: to 1e-7."""

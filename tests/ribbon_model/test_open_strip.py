@@ -136,6 +136,15 @@ def test_a_strip_buckles_under_its_weight(nu):
     assert_bifurcations(follow(strip.first_point(), "weight", -1, 25), "weight", [critical])
 
 
+def test_a_strip_of_finite_width_buckles_under_its_weight():
+    """The same weight, where B is the plate's: 1 - nu**2 times the value with that of the beam."""
+    material = Material("finite width", {"nu": 0.3, "Gamma": 0.5})
+    strip = OpenStrip(material, finish=FREE_END, numbers={"weight": 0.0}, weight_direction=(-1, 0, 0))
+    critical = own_weight() * math.sqrt((1 - 0.3**2) * 2 * (1 - 0.3))
+    assert math.isclose(critical, (1 - 0.3**2) * 18.178 / math.sqrt(1.3), rel_tol=5e-6)
+    assert_bifurcations(follow(strip.first_point(), "weight", -1, 25), "weight", [critical])
+
+
 def test_pure_bending_in_the_stiff_plane():
     """Ends held against twist, moment M: M L = pi sqrt(B1 C) (Prandtl 1899; Timoshenko & Gere, sect. 6.2)."""
     strip = OpenStrip(LATERAL["rod"][0], hinge("width"), End("joint", axis=NORMAL, director=0, held=(NORMAL,)), {"moment": 0.0})
