@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import itertools
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import yaml
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
+from branches.fields import Interval, MeshConfig, StepConfig, Strict, show
 from contin import exact_text
 from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, label
 
@@ -21,64 +21,10 @@ class ConfigError(Exception):
     """A scene that cannot be run; the message is one sentence that names the field, the value and what is allowed."""
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class MeshConfig(_Strict):
-    """Fields of the mesh."""
-
-    degree: int = Field(7, ge=2, le=8, description="polynomial degree of the collocation")
-    intervals: int = Field(8, ge=1, le=2000, description="intervals of the first mesh")
-    max_intervals: int = Field(2000, ge=1, le=2000)
-    tolerance: float = Field(
-        1e-12, ge=1e-14, le=1e-2, description="tolerance of the discretization error; the number of intervals adapts to it"
-    )
-    adapt_every: int = Field(3, ge=0, description="steps between adaptations of the mesh, 0 for a fixed mesh")
-
-    @model_validator(mode="after")
-    def _order(self):
-        if self.intervals > self.max_intervals:
-            raise ValueError(f"intervals = {self.intervals} must not exceed max_intervals = {self.max_intervals}")
-        return self
-
-
-class StepConfig(_Strict):
-    """Fields of the steps along a branch."""
-
-    first: float | None = Field(None, ge=1e-6, le=10, description="first step of arclength; 0.05 if the bounds allow it")
-    smallest: float = Field(1e-6, gt=0, le=1)
-    largest: float = Field(10.0, gt=0, description="largest step of arclength")
-    max_points: int = Field(2000, ge=1, le=1_000_000)
-    angle: float = Field(0.35, gt=0.001, le=1.0, description="largest angle between consecutive tangents, radians")
-
-    @model_validator(mode="after")
-    def _order(self):
-        if self.smallest > self.largest:
-            raise ValueError(f"smallest = {exact_text(self.smallest)} must not exceed largest = {exact_text(self.largest)}")
-        if self.first is not None and not self.smallest <= self.first <= self.largest:
-            bounds = f"smallest = {exact_text(self.smallest)} and largest = {exact_text(self.largest)}"
-            raise ValueError(f"first = {exact_text(self.first)} must lie between {bounds}")
-        return self
-
-    @property
-    def first_step(self) -> float:
-        """The first step of arclength; chosen if ``first`` is not given."""
-        return min(max(0.05, self.smallest), self.largest) if self.first is None else self.first
-
-
-def _two_ordered_numbers(ends: Any) -> Any:
-    numbers = isinstance(ends, (list, tuple)) and all(type(end) in (int, float) and math.isfinite(end) for end in ends)
-    if not (numbers and len(ends) == 2 and ends[0] < ends[1]):
-        raise ValueError(f"must be two finite numbers, the smaller first, as in [-100, 100], not {_show(ends)}")
-    return tuple(ends)
-
-
-Interval = Annotated[tuple[float, float], BeforeValidator(_two_ordered_numbers)]
 Column = Literal["kappa_n", "kappa_star", "energy", "M1", "M2"]
 
 
-class OriginConfig(_Strict):
+class OriginConfig(Strict):
     """The point at which a secondary branch leaves the primary branch (m, n)."""
 
     kappa_n: float = Field(description="natural curvature there")
@@ -86,7 +32,7 @@ class OriginConfig(_Strict):
     mode: str = Field(description="class of the critical mode: the name of the labelled point SB on the primary branch")
 
 
-class Config(_Strict):
+class Config(Strict):
     """One branch: that of the mode of wavenumber n on the m-covered circle, or a secondary branch that leaves it."""
 
     title: str = ""
@@ -261,7 +207,7 @@ def _pairs(values: dict, lists: dict, name: str) -> list[tuple]:
         raise ConfigError(f"{name}: pairs: must not be given together with m or n")
     pairs = values["pairs"]
     if not (isinstance(pairs, list) and pairs and all(isinstance(pair, list) and len(pair) == 2 for pair in pairs)):
-        raise ConfigError(f"{name}: pairs: must be a list of [m, n], not {_show(pairs)}")
+        raise ConfigError(f"{name}: pairs: must be a list of [m, n], not {show(pairs)}")
     return [tuple(pair) for pair in pairs]
 
 
@@ -294,7 +240,7 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
     """Return the scene of a YAML text; messages call the text ``name``."""
     values = _yaml(text, name)
     if not isinstance(values, dict):
-        found = "it is empty" if values is None else f"not {_show(values)}"
+        found = "it is empty" if values is None else f"not {show(values)}"
         raise ConfigError(f"{name}: must hold `key: value` lines; {found}")
     for setting in settings:
         key, equals, value = setting.partition("=")
@@ -302,14 +248,23 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
         if not equals or "" in parts:
             raise ConfigError(f"--set {setting!r}: must be key=value, as in nu=0.2 or mesh.degree=5")
         _put(values, parts, _yaml(value, f"--set {_plain(key)}"))
+    if "stages" in values:
+        from branches.open_config import OpenConfig  # needs the models of this module
+
+        return _validated(OpenConfig, values, name, settings)
     if "strip" in values:
         values = _of_strip(values, name)
     if _is_diagram(values):
         return _diagram(values, name, settings)
+    return _validated(Config, values, name, settings)
+
+
+def _validated(model: type[Strict], values: dict, name: str, settings: list[str]) -> Any:
+    """Return the scene with these values; raise ConfigError with one sentence."""
     try:
-        return Config.model_validate(values)
+        return model.model_validate(values)
     except ValidationError as error:
-        raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error)}") from error
+        raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error, model)}") from error
 
 
 #: Fields that follow from ``strip``, in the order in which `_of_strip` sets them.
@@ -322,7 +277,7 @@ def _of_strip(values: dict, name: str) -> dict:
 
     strip = values["strip"]
     if not isinstance(strip, dict):
-        raise ConfigError(f"{name}: strip: must hold the fields {', '.join(NAMES)}, not {_show(strip)}")
+        raise ConfigError(f"{name}: strip: must hold the fields {', '.join(NAMES)}, not {show(strip)}")
     for field in strip:
         if field not in NAMES:
             raise ConfigError(f"{name}: unknown field 'strip.{_plain(str(field))}'; the fields are {', '.join(NAMES)}")
@@ -414,7 +369,7 @@ def difference(stored: Config, config: Config, ignored: Sequence[str] = ()) -> s
     for field in ignored:
         name, _, inner = field.partition(".")
         for values in (a, b):
-            (values[name] if inner else values).pop(inner or name)
+            (values[name] if inner else values).pop(inner or name, None)
     for name in a:
         if a[name] != b[name]:
             return f"{name} = {a[name]!r} there, {b[name]!r} here"
@@ -464,35 +419,32 @@ def _plain(text: str) -> str:
     return text if len(text) <= 200 else text[:197] + "..."
 
 
-def _sentence(error: ValidationError) -> str:
+def _sentence(error: ValidationError, model: type[BaseModel] = Config) -> str:
     """Return the first error as `field: value ... what is allowed`, and the number of further errors."""
     errors = error.errors()
     first = errors[0]
     where, kind, message = _where(first), first["type"], first["msg"].removeprefix("Value error, ")
     if kind == "extra_forbidden":
-        text = f"unknown field {where!r}; the fields are {', '.join(_fields(first['loc']))}"
+        text = f"unknown field {where!r}; the fields are {', '.join(_fields(first['loc'], model))}"
     elif kind == "missing":
         text = f"the field {where!r} is missing"
     elif kind == "value_error":
         text = f"{where}: {message}" if where else message
     elif kind in ("model_type", "dict_type"):
-        text = f"{where}: must hold `key: value` fields, not {_show(first['input'])}"
+        text = f"{where}: must hold `key: value` fields, not {show(first['input'])}"
     else:
         message = message.replace("Input should be", "must be")
-        text = f"{where}: {message[0].lower()}{message[1:]}, not {_show(first['input'])}"
+        text = f"{where}: {message[0].lower()}{message[1:]}, not {show(first['input'])}"
     return text + (f" (and {len(errors) - 1} more)" if len(errors) > 1 else "")
 
 
-def _fields(location) -> list[str]:
-    model = Config
+def _fields(location, model: type[BaseModel]) -> list[str]:
     for part in location[:-1]:
         field = model.model_fields.get(part)
-        if field is None or not isinstance(field.annotation, type) or not issubclass(field.annotation, BaseModel):
-            break
-        model = field.annotation
+        inner = [kind for kind in (field.annotation, *get_args(field.annotation)) if _is_model(kind)] if field else []
+        model = inner[0] if inner else model
     return list(model.model_fields)
 
 
-def _show(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)

@@ -124,6 +124,46 @@ class Display:
             lines.append(f"  stopped: {stop}")
         self.note("\n".join([*lines, f"  written to {path}"]))
 
+    # --- open strips ---------------------------------------------------------------------------------------------
+
+    def begin_stages(self, config) -> None:
+        """Say what is about to be computed."""
+        if not self._quiet:
+            self.note(config.title or config.name)
+
+    def stage(self, config, number: int) -> None:
+        """Say which stage begins."""
+        if not self._quiet:
+            name, unit = config.stages[number - 1].follow, config.unit(config.stages[number - 1].follow)
+            head = f"stage {number}: {name}{f' in {unit}' if unit else ''}"
+            self.note(f"{head}\n   PT  TY  LAB  {name:>14s}     energy      F_tangent      index   N  it")
+
+    def stage_point(self, config, stage, point: Point, number: int) -> None:
+        """Show a point of a stage."""
+        if self._quiet or not (point.label or number % _EVERY == 0):
+            return
+        self._label += bool(point.label)
+        label = f"{self._label:3d}" if point.label else "   "
+        force = config.strip().reactions(point)["F_tangent"] * config.factor("F_tangent")
+        value, energy = (point[name] * config.factor(name) for name in (stage.follow, "energy"))
+        self.note(
+            f"{number:5d}  {point.label:2s}  {label}  {value:14.8g}  {energy:12.6g}  {force:12.6g}"
+            f"  {'-' if point.index is None else point.index:>5}  {point.system.intervals:4d} {point.iterations:3d}"
+        )
+
+    def stages_summary(self, config, events, count: int, seconds: float, path, ended) -> None:
+        """What came out of all stages, in lines to quote; ``ended`` is the outcome and the reason of the stop."""
+        self.clear()
+        outcome, stop = ended
+        lines = [] if self._quiet else [""]
+        lines.append(f"{config.title or config.name}: {count} points in {seconds:.2f} s")
+        lines += [f"  {_describe_stage(config, event)}" for event in events]
+        if outcome == "interrupted":
+            lines.append(f"  interrupted; run it again with --resume --out {shlex.quote(str(path))}")
+        elif outcome == "lost":
+            lines.append(f"  stopped: {stop}")
+        self.note("\n".join([*lines, f"  written to {path}"]))
+
     # --- diagrams ------------------------------------------------------------------------------------------------
 
     def begin_diagram(self, config, total: int, kept: int) -> None:
@@ -165,6 +205,20 @@ def name_of(config) -> str:
 
     what = "secondary branch from " if config.origin else ""
     return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {exact_text(config.nu)}"
+
+
+def _describe_stage(config, event) -> str:
+    """A labelled point of an open strip in words."""
+    name = config.stages[event["stage"] - 1].follow
+    label, error = event["label"].decode(), event[f"error_{name}"] * config.factor(name)
+    found = label in ("LP", "BP") and not math.isnan(error)
+    place = f"{name} = {event[name] * config.factor(name):.10g}" + (f" (± {error:.0e})" if found else "")
+    what = event["name"].decode()
+    change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
+    broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""
+    shown = what if "=" not in what and (label not in ("LP", "BP") or "kernel" in what) else ""  # not the value once more
+    kind = f" ({shown})" if shown else ""
+    return f"stage {event['stage']}: {label_of(label).word}{kind} at {place}{change}{broken}"
 
 
 def _describe(config, event) -> str:

@@ -56,12 +56,15 @@ def _strips(branch, chosen) -> list:
     return [turned[point] for point in chosen]
 
 
-def choose(branch, count: int) -> list[int]:
-    """Numbers of the points whose strip is drawn: nearest to equal distances along the branch, labelled ones preferred."""
+def choose(branch, count: int, arclength=None) -> list[int]:
+    """Numbers of the points whose strip is drawn: nearest to equal distances along the branch, labelled ones preferred.
+
+    ``arclength`` of all points stands in for the column of that name.
+    """
     kept = branch.kept()
     if not count or not len(kept):
         return []
-    s = branch.points["arclength"][kept]
+    s = (branch.points["arclength"] if arclength is None else arclength)[kept]
     labelled = branch.points["label"][kept] != b""
     spacing = (s[-1] - s[0]) / max(count - 1, 1) or 1.0
     chosen = []
@@ -157,8 +160,11 @@ def lines(branch) -> list[tuple]:
     return found
 
 
-def letters(axes, points, labels, chosen, colour) -> None:
-    """Letters of the strips drawn, to the right of the curve as it goes; at a fold, which has a number there, to its left."""
+def letters(axes, points, labels, chosen, colour, names=None) -> None:
+    """Letters of the strips drawn (a, b, ... or those given), to the right of the curve as it goes.
+
+    At a fold, which has a number there, to its left.
+    """
     axes.autoscale_view()
     place = axes.transData.transform(points)
     for column, number in enumerate(chosen):
@@ -166,5 +172,5 @@ def letters(axes, points, labels, chosen, colour) -> None:
             axes.scatter(*points[number], s=18, color=colour, zorder=2)
         way = place[min(number + 1, len(place) - 1)] - place[max(number - 1, 0)]
         right = np.array([way[1], -way[0]]) / (np.hypot(*way) or 1.0) * (-13 if labels[number] == b"LP" else 13)
-        letter, style = chr(ord("a") + column), {"ha": "center", "va": "center", "fontsize": 12}
+        letter, style = names[column] if names else chr(ord("a") + column), {"ha": "center", "va": "center", "fontsize": 12}
         axes.annotate(letter, points[number], tuple(right), textcoords="offset points", **style)

@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from branches.solid import widest
+from ribbon_model.ends import DIRECTIONS
+from ribbon_model.shape import Shape
 
 FRONT, BACK, EDGE = "#E8A33D", "#7A5195", "#2B1D0E"
 #: Width of a strip of unknown dimensions, in units of L/2 pi. Ten times more covers the loop's own radius.
@@ -26,6 +28,8 @@ _EYE = np.array([0.59967, -0.59967, 0.52992])
 _LAMP = np.array([0.29, -0.65, 0.70]) / math.hypot(0.29, 0.65, 0.70)
 #: Stations along a strip at which two strips are compared: the turn between them is a mean over all.
 _STATIONS = 200
+#: A direction with a larger component along the tangent is that of a strip that stands upright.
+_UPRIGHT = 0.99
 #: Light from everywhere; the rest is the lamp's.
 _AMBIENT = 0.45
 
@@ -42,6 +46,16 @@ def strip_of(branch, point: int):
 def flat_across(shape, law):
     """The shape with its sections straight along d1 if the law has no generators."""
     return shape if law.has_rulings else replace(shape, eta=np.zeros_like(shape.eta))
+
+
+def standing(shape: Shape, up: tuple[float, float, float] = DIRECTIONS["normal"]) -> Shape:
+    """Return the shape on axes of which the last one is ``up``, and the first one the tangent of the first end if it may be."""
+    z = np.array(up)
+    ahead = DIRECTIONS["tangent"] if abs(z[2]) < _UPRIGHT else DIRECTIONS["normal"]
+    x = np.array(ahead) - z * (z @ ahead)
+    x /= np.linalg.norm(x)
+    axes = np.array([x, np.cross(z, x), z])
+    return Shape(shape.arclength, shape.centreline @ axes.T, shape.directors @ axes.T, shape.eta)
 
 
 def steady(strips: dict) -> dict:

@@ -143,9 +143,7 @@ def labelled_point(branch: StoredBranch, text: str) -> int:
     if len(found) == 1:
         return int(branch.events["point"][found[0]])
     listed = ", ".join(
-        f"{row + 1} ({label} at kappa_n = {branch.events['kappa_n'][row]:.4f})"
-        for row, label in enumerate(labels)
-        if not found or row in found
+        f"{row + 1} ({label} at {branch.place(row)})" for row, label in enumerate(labels) if not found or row in found
     )
     problem = f"{len(found)} points have this label; name one by its number" if found else "there is no such labelled point"
     raise ConfigError(f"--point {text!r}: {problem}: {listed or 'the result has none'}")
@@ -155,13 +153,8 @@ def labelled_point(branch: StoredBranch, text: str) -> int:
 
 
 def placed(branch: StoredBranch, point: int, length: float) -> tuple[Shape, ndarray]:
-    """Return the closed strip of a point, scaled and upright, and its strains (K, 3) in radians per unit of that length."""
-    from branches.draw_strip import flat_across
-    from ribbon_model.domains import LOOP
-
-    solution = branch.solution(point).on(LOOP)
-    shape = flat_across(solution.shape(), solution.law).placed(length)
-    return shape, solution.strains() * (2 * math.pi / length)
+    """Return the strip of a point at this length, and its strains (K, 3) in radians per unit of that length."""
+    return branch.placed(point, length)
 
 
 def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
@@ -215,7 +208,7 @@ def _mesh(branch: StoredBranch, shape: Shape, options):
 
 def _width(branch: StoredBranch, options) -> float | None:
     """Return the given width, or that from the thickness and Gamma = w^2/(h L/2 pi) of the scene, or None."""
-    Gamma = branch.config["Gamma"]
+    Gamma = branch.config.get("Gamma")
     if options.width is not None or options.thickness is None or not Gamma:
         return options.width
     return math.sqrt(Gamma * options.thickness * options.length / (2 * math.pi))

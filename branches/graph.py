@@ -28,10 +28,14 @@ def read(path: str | Path):
     if Path(path).suffix not in (".yaml", ".yml"):
         return diagram.read(path)
     from branches.config import ConfigError, load  # with the quadrature they take 0.15 s: not for questions about results
+    from branches.open_config import OpenConfig
     from branches.preview import preview
 
     try:
-        return preview(load(path))
+        config = load(path)
+        if isinstance(config, OpenConfig):
+            raise StoreError(f"{str(path)!r} is a scene of an open strip, for which there is no exact solution; run it")
+        return preview(config)
     except ConfigError as error:
         raise StoreError(str(error)) from error
 

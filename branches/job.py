@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -36,14 +37,26 @@ def run_branch(config: Config, path: Path, display, *, resume=False, overwrite=F
     StoreError, ConfigError
         A result file that cannot be written, that another run is writing, or that belongs to another scene.
     """
-    path = Path(path)
+    with writing(Path(path), display, resume) as resume:
+        return _run_branch(config, Path(path), display, resume, overwrite)
+
+
+@contextlib.contextmanager
+def writing(path: Path, display, resume: bool) -> Iterator[bool]:
+    """Make the folder of a result file and lock the file for this run; the value is whether there is a run to resume.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written, or another run is writing it.
+    """
     if not path.exists():
         if resume:
             display.note(f"--resume: there is no file {str(path)!r}; the run starts from the beginning")
             resume = False
         prepare(path)  # makes its folder, which will contain the lock file
     with only_run(path):
-        return _run_branch(config, path, display, resume, overwrite)
+        yield resume
 
 
 def whole_branch(config: Config, path: Path, display) -> None:
@@ -62,7 +75,7 @@ def whole_branch(config: Config, path: Path, display) -> None:
 
 def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bool) -> str:
     began = time.perf_counter()
-    done = _look_at(path, config, resume, overwrite)
+    done = look_at(path, config, resume, overwrite)
     if done is not None:
         display.note(f"{path} is complete already ({done}); nothing to do")
         return "complete"
@@ -70,7 +83,7 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
     (run, watch), image = _resumed(config, path) if resume else (begun(config), None)
     with contextlib.closing(_writer(path, config, run, watch, image)) as writer:
         display.begin(config, writer.count, len(writer.events()))
-        outcome = _follow(config, run, writer, display, _Interruption())
+        outcome = _follow(config, run, writer, display, Interruption())
         seconds = time.perf_counter() - began
         display.summary(config, writer.events(), writer.count, seconds, path, outcome, _shown(run.stop))
     return outcome
@@ -103,7 +116,7 @@ def compute_branch(config: Config, display) -> Computed:
     """
     run, watch = begun(config)
     with contextlib.closing(_writer(None, config, run, watch)) as writer:
-        outcome = _follow(config, run, writer, display, _Interruption(()))
+        outcome = _follow(config, run, writer, display, Interruption(()))
         stop = run.stop.reason if run.stop else ""
         tables = writer.points(), writer.events()
         return Computed(writer.image(), outcome, str(run.stop or ""), stop, config.model_dump(), *tables)
@@ -157,7 +170,7 @@ def _resumed(config: Config, path: Path):
     return (_kind(config)(state.system, state.x, settings, state=state, start=start), watch), image
 
 
-def _follow(config: Config, run: Continuation, writer: BranchWriter, display, interruption: _Interruption) -> str:
+def _follow(config: Config, run: Continuation, writer: BranchWriter, display, interruption: Interruption) -> str:
     """Write all points of a run to the file; return the outcome."""
     with interruption:
         for point in run:
@@ -177,7 +190,7 @@ def _follow(config: Config, run: Continuation, writer: BranchWriter, display, in
     return outcome
 
 
-def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str | None:
+def look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str | None:
     """Raise unless the file at ``path`` may be replaced or resumed; return its reason to stop if it is complete."""
     if not path.exists() or (overwrite and not resume):
         return None
@@ -205,7 +218,7 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
     return stop if status == "complete" and not goes_on else None
 
 
-class _Interruption:
+class Interruption:
     """Stop the run after the current point on Ctrl-C, SIGTERM or a closed terminal; on the second signal, at once."""
 
     _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]

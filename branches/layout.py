@@ -13,10 +13,18 @@ from branches.files import StoreError
 
 FORMAT = "ribbon continuation branch"
 FORMAT_VERSION = 1
+#: Kinds of strips: the attribute ``kind`` of a file. Files without it are of closed strips.
+CLOSED, OPEN = "closed strip", "open strip"
 #: Columns that every reader may count on, whatever the version that wrote them.
 _COLUMNS = {
-    "points": ("point", "label", "arclength", "kappa_n", "kappa_star", "energy", "nu", "M1", "M2", "length"),
-    "events": ("point", "label", "name", "kappa_n", "kappa_star", "energy", "error_kappa_n"),
+    CLOSED: {
+        "points": ("point", "label", "arclength", "kappa_n", "kappa_star", "energy", "nu", "M1", "M2", "length"),
+        "events": ("point", "label", "name", "kappa_n", "kappa_star", "energy", "error_kappa_n"),
+    },
+    OPEN: {
+        "points": ("point", "label", "arclength", "energy", "stage", "index", "F_tangent"),
+        "events": ("point", "label", "name", "energy", "stage", "index", "index_before", "index_after"),
+    },
 }
 _TEXTS = {"points": ("label",), "events": ("label", "name")}
 #: A compressed file holds at most so many times its size.
@@ -55,7 +63,9 @@ def check(file: h5py.File, path: Path) -> None:
     try:
         for name in ("config", "status", "stop", "stop_reason"):
             _require(isinstance(file.attrs[name], str), f"its attribute {name} is no text")
-        rows = {name: len(_table(file, name)) for name in _COLUMNS}
+        kind = file.attrs.get("kind", CLOSED)
+        _require(isinstance(kind, str) and kind in _COLUMNS, f"it is of the kind {kind}")
+        rows = {name: len(_table(file, name, columns)) for name, columns in _COLUMNS[kind].items()}
         _require(rows["points"] and rows["events"], "it holds no points")
         _check_solutions(file, rows["points"])
     except Exception as error:  # there is nothing that h5py may not raise for a file that is garbled
@@ -63,11 +73,11 @@ def check(file: h5py.File, path: Path) -> None:
         raise StoreError(f"cannot read {str(path)!r}: the file is damaged ({reason})") from error
 
 
-def _table(file: h5py.File, name: str) -> h5py.Dataset:
+def _table(file: h5py.File, name: str, columns: tuple[str, ...]) -> h5py.Dataset:
     """One of the two tables."""
     table = dataset(file, name, 1, "V")
     kinds = {column: table.dtype[column] for column in table.dtype.names or ()}
-    for column in _COLUMNS[name]:
+    for column in columns:
         _require(column in kinds, f"no column {column} in /{name}")
     for column, kind in kinds.items():
         texts = column in ("label", "name", "breaks")

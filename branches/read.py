@@ -1,98 +1,16 @@
-"""Read a branch file: tables, and the solution of a point as a shape."""
+"""Read a branch file: of a closed strip, or of an open one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from branches.config import Config, ConfigError, dump, parse
 from branches.files import StoreError
-from branches.store import meaning_of, open_branch
-from ribbon_model.domains import DOMAINS
-from ribbon_model.laws import LAWS
-from ribbon_model.shape import Shape
-from ribbon_model.solution import Solution
+from branches.open_config import OpenConfig
+from branches.read_closed import StoredBranch
+from branches.store import open_branch
 
-
-@dataclass(frozen=True)
-class StoredBranch:
-    """A branch file in memory: the scene, the tables of points and of labelled points (structured arrays), the kept solutions.
-
-    ``stop`` is a sentence with the reason why the run ended, ``reason`` a key word ("trivial branch", "limit", ...).
-    """
-
-    config: dict
-    status: str
-    stop: str
-    reason: str
-    points: np.ndarray
-    events: np.ndarray
-    index: np.ndarray
-    t: np.ndarray
-    states: np.ndarray
-
-    def kept(self) -> np.ndarray:
-        """Return the numbers of the points whose full solution is kept."""
-        return self.index["point"]
-
-    def solution(self, point: int) -> Solution:
-        """Return the solution of a kept point.
-
-        Raises
-        ------
-        StoreError
-            The solution of this point is not kept.
-        """
-        found = np.flatnonzero(self.index["point"] == point)
-        if not found.size:
-            raise StoreError(f"the solution of point {point} is not kept; a smaller stride keeps more")
-        row = self.index[found[0]]
-        here = slice(row["start"], row["start"] + row["count"])
-        law, domain = LAWS[self.config["law"]], DOMAINS[self.config["domain"]]
-        names = [name for name in domain.problem(law).parameters if name in self.points.dtype.names]
-        parameters = {name: float(self.points[point][name]) for name in names}
-        return Solution(law, domain, self.t[here], self.states[here], int(row["degree"]), parameters)
-
-    def shape(self, point: int) -> Shape:
-        """Return the closed strip at a kept point; see `solution`."""
-        return self.solution(point).shape()
-
-    def to_pandas(self):
-        """Return the table of points as a ``pandas.DataFrame``; ImportError says what to install if pandas is missing."""
-        try:
-            import pandas
-        except ImportError as error:
-            raise ImportError("to_pandas needs pandas, which is not installed: pip install pandas") from error
-        return pandas.DataFrame(self.points).assign(label=[label.decode() for label in self.points["label"]])
-
-    def to_xarray(self):
-        """Return the table of points as an ``xarray.Dataset`` along ``point``, with the meaning of each column.
-
-        Each variable has its meaning as ``long_name``; the attributes of the dataset are the scene as YAML, ``status`` and
-        ``stop``. ImportError says what to install if xarray is missing.
-        """
-        try:
-            import xarray
-        except ImportError as error:
-            raise ImportError("to_xarray needs xarray, which is not installed: pip install xarray") from error
-        columns = {name: self.points[name] for name in self.points.dtype.names if name not in ("point", "label")}
-        columns["label"] = np.array([label.decode() for label in self.points["label"]])
-        variables = {name: ("point", values, {"long_name": meaning_of(name)}) for name, values in columns.items()}
-        about = {"config": dump(Config.model_validate(self.config)), "status": self.status, "stop": self.stop}
-        return xarray.Dataset(variables, {"point": self.points["point"]}, about)
-
-    def plot(self, shapes: int = 6, width: float | None = None):
-        """Return the branch as a matplotlib figure; see `branches.draw_branch.figure`."""
-        from branches.draw_branch import figure
-
-        return figure(self, shapes, width)
-
-    def _repr_html_(self) -> str:
-        from branches.notebook import to_html
-
-        return to_html(self)
+__all__ = ["StoredBranch", "complete_run", "read_branch"]
 
 
 def read_branch(path: str | Path) -> StoredBranch:
@@ -106,13 +24,23 @@ def read_branch(path: str | Path) -> StoredBranch:
     with open_branch(Path(path)) as file:
         solutions, attributes = file["solutions"], file.attrs
         try:
-            config = parse(attributes["config"], str(path)).model_dump()
+            scene = parse(attributes["config"], str(path))
+            config = scene.model_dump()
         except ConfigError as error:
             raise StoreError(f"cannot read {str(path)!r}: its scene is unknown ({error})") from error
-        return StoredBranch(
+        return _class_of(scene)(
             config, attributes["status"], attributes["stop"], attributes["stop_reason"], file["points"][:],
             file["events"][:], solutions["index"][:], solutions["t"][:], solutions["states"][:],
         )  # fmt: skip
+
+
+def _class_of(scene: Config | OpenConfig) -> type[StoredBranch]:
+    """Return the class of a result."""
+    if not isinstance(scene, OpenConfig):
+        return StoredBranch
+    from branches.open_branch import OpenBranch  # needs the mechanics of open strips, which closed ones do not
+
+    return OpenBranch
 
 
 def complete_run(path: Path, config: Config) -> StoredBranch | None:

@@ -19,7 +19,8 @@ def arguments(argv=None):
     parser = argparse.ArgumentParser(
         prog="python -m branches.run",
         allow_abbrev=False,
-        description="Follow one branch of buckled equilibria of a closed elastic strip and write it to an HDF5 file.",
+        description="Follow one branch of buckled equilibria of a closed elastic strip, or the stages of an open one, and "
+        "write it to an HDF5 file.",
         epilog="Exit code: 0 done, 1 the run failed on the way (the file holds the points before), 2 bad input, "
         "130 interrupted.",
     )
@@ -73,11 +74,16 @@ def _run(options) -> int:
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.files import StoreError
-    from branches.job import run_branch
+    from branches.open_config import OpenConfig
     from contin import ContinError
 
+    if isinstance(config, OpenConfig):
+        from branches.open_job import run_stages as run
+    else:
+        from branches.job import run_branch as run
+
     try:
-        outcome = run_branch(config, path, display, resume=options.resume, overwrite=options.overwrite)
+        outcome = run(config, path, display, resume=options.resume, overwrite=options.overwrite)
     except (ConfigError, StoreError, ContinError) as error:
         display.clear()
         return _refuse(error)

@@ -93,7 +93,7 @@ def _primaries(result: Path) -> dict[str, StoredBranch]:
         found = {name: read_branch(result / name) for name in names}
     else:
         found = {result.name: read_branch(result)}
-    found = {name: one for name, one in found.items() if one.config["stability"] and one.config["domain"] == CELL.name}
+    found = {name: one for name, one in found.items() if one.config.get("stability") and one.config["domain"] == CELL.name}
     if not found:
         raise StoreError(f"{str(result)!r} holds no branch with its index on the cell; run its scene with stability: true")
     return found

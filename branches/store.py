@@ -11,6 +11,8 @@ import functools
 import json
 import platform
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -18,7 +20,7 @@ import h5py
 import numpy as np
 
 from branches.files import StoreError, write_bytes
-from branches.layout import FORMAT, FORMAT_VERSION, check, damage_told, vector
+from branches.layout import CLOSED, FORMAT, FORMAT_VERSION, check, damage_told, vector
 from contin import Collocation, Point, State, Stop
 
 #: HDF5's format since version 1.10, which has checksums.
@@ -73,10 +75,12 @@ def _versions() -> str:
     return json.dumps(result)
 
 
-def _columns(problem, free, watched: bool) -> dict[str, tuple]:
-    """Return name, type and meaning of the columns of both tables."""
+def _columns(problem, free, watched: bool, more: tuple = ()) -> dict[str, tuple]:
+    """Return name, type and meaning of the columns of both tables; ``more`` are further ones."""
     watch = [("index", "i4", "number of negative directions of the energy; -1 where one is neutral (undecided)")] * watched
-    values = [(name, "f8", MEANINGS.get(name, name)) for name in (*problem.parameters, *problem.functionals)]
+    hidden = getattr(problem, "multipliers", ())
+    shown = [name for name in (*problem.parameters, *problem.functionals) if name not in hidden]
+    values = [*((name, "f8", MEANINGS.get(name, name)) for name in shown), *more]
     errors = [(f"error_{name}", "f8", f"estimated discretization error of {name}") for name in free]
     named = [("name", "S64", "the subject of the label")]
     changes = [
@@ -93,16 +97,26 @@ def _kind(columns) -> np.dtype:
     return np.dtype([(name, kind) for name, kind, _ in columns])
 
 
+@dataclass(frozen=True)
+class Kind:
+    """A kind of strip: its name and units in the file, its own columns (name, type, meaning), and their values at a point."""
+
+    name: str
+    units: str
+    columns: tuple[tuple[str, str, str], ...] = ()
+    values: Callable[[Point], dict] = lambda point: {}
+
+
 @functools.lru_cache(maxsize=32)  # making it takes 8 ms; the branches of a diagram differ in their text only
-def _empty_file(problem, free: tuple[str, ...], watched: bool) -> bytes:
+def _empty_file(problem, free: tuple[str, ...], watched: bool, kind: Kind) -> bytes:
     """Return the image of a file without points, and without its scene."""
     with h5py.File.in_memory(libver=_LIBRARY) as file:
         file.attrs.update({
             "format": FORMAT, "format_version": FORMAT_VERSION, "status": "running", "stop": "", "stop_reason": "",
-            "units": "bending modulus B = 1, length L = 2 pi", "platform": platform.platform(),
+            "kind": kind.name, "units": kind.units, "platform": platform.platform(),
             "versions": _versions(), "states": list(problem.states), "free_parameters": list(free),
         })  # fmt: skip
-        for table, columns in _columns(problem, free, watched).items():
+        for table, columns in _columns(problem, free, watched, kind.columns).items():
             data = file.create_dataset(table, (0,), _kind(columns), maxshape=(None,), chunks=(256,), fletcher32=True)
             for name, _, meaning in columns:
                 data.attrs[name] = meaning
@@ -144,17 +158,23 @@ class BranchWriter:
     watch : optional
         ``watch.index(point)`` is the value of the column of that name, ``watch.change(point)`` holds the further columns of
         labelled points (`branches.stability.Watch`). Without it there are no such columns.
+    kind : Kind
+        What kind of strip it is, with further columns.
     """
 
     #: Seconds between checkpoints of a run. A kill loses the points of this time; ten times less would slow short steps.
     INTERVAL = 0.5
 
-    def __init__(self, path: Path | None, config_text: str, problem, free, stride: int, image: bytes | None = None, watch=None):
+    def __init__(
+        self, path: Path | None, config_text: str, problem, free, stride: int, image: bytes | None = None, watch=None,
+        kind: Kind | None = None,
+    ):  # fmt: skip
         self.path, self._stride, self._free, self._watch = path and Path(path), stride, tuple(free), watch
+        self.kind = kind or Kind(CLOSED, "bending modulus B = 1, length L = 2 pi")
         self._buffer: list[tuple[Point, int]] = []
         self._mark: tuple[State, int] | None = None
         with damage_told(path):
-            empty = _empty_file(problem, self._free, watch is not None) if image is None else None
+            empty = _empty_file(problem, self._free, watch is not None, self.kind) if image is None else None
             self._file = h5py.File.in_memory(image or empty, libver=_LIBRARY)
             self.count = 0 if empty else self._rewind(problem)
         self._file.attrs["config"] = config_text
@@ -196,7 +216,7 @@ class BranchWriter:
             The file cannot be written; the file on disk is unchanged.
         """
         began = time.monotonic()
-        self._flush()
+        self.flush()
         self._file.attrs["status"] = status
         self._file.attrs["stop"] = str(stop or "")
         self._file.attrs["stop_reason"] = stop.reason if stop else ""
@@ -220,7 +240,8 @@ class BranchWriter:
         """Return the rows of labelled points written so far."""
         return self._file["events"][:]
 
-    def _flush(self):
+    def flush(self) -> None:
+        """Move all points so far into the tables, in memory."""
         points = [self._row("points", point, number) for point, number in self._buffer]
         events = [self._row("events", point, number) for point, number in self._buffer if point.label]
         _extend(self._file["points"], np.array(points, self._types["points"]))
@@ -243,7 +264,7 @@ class BranchWriter:
             **point.parameters, **point.functionals, "point": number, "label": point.label.encode(),
             "name": point.name.encode(), "arclength": point.arclength, "intervals": point.system.intervals,
             "iterations": point.iterations, "newton_error": point.newton_error,
-            **{f"error_{name}": point.errors.get(name, np.nan) for name in self._free},
+            **{f"error_{name}": point.errors.get(name, np.nan) for name in self._free}, **self.kind.values(point),
         }  # fmt: skip
         if self._watch is not None:
             values["index"] = self._watch.index(point)

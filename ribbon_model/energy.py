@@ -43,7 +43,7 @@ def variational_problem(law: Law, domain: Domain) -> VariationalProblem:
         rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
         M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
         d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
-        return complementary(M1, M2, M3, p.kappa_n, p.nu) + n1 * d31 + n2 * d32 + n3 * d33
+        return complementary(M1, M2, M3, *p) + n1 * d31 + n2 * d32 + n3 * d33
 
     return VariationalProblem(
         None, (*FRAME, *CENTRELINE), {"kappa_n": 0.0, **law.defaults}, hamiltonian=hamiltonian,

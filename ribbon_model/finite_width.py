@@ -261,3 +261,6 @@ def response_from(M1, M2, M3, kappa_n, nu, Gamma, found):
 def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
     """Return H alone."""
     return response(M1, M2, M3, kappa_n, nu, Gamma)[0]
+
+
+hamiltonian.gradient = response

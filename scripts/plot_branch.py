@@ -1,4 +1,7 @@
-"""``python scripts/plot_branch.py FILE``: kappa* against kappa_n with folds and ends, and the strip along the branch."""
+"""``python scripts/plot_branch.py FILE``: a branch as a picture, and the strip along it.
+
+Closed strips: kappa* against kappa_n. Open ones: what a person feels against what is followed, a diagram for each number.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,6 @@ def main(argv=None) -> int:
         "narrower where its generators would cross",
     )  # fmt: skip
     options = parser.parse_args(argv)
-    from branches.draw_branch import figure
     from branches.files import StoreError, check_picture, write_picture
     from branches.read import read_branch
 
@@ -29,7 +31,7 @@ def main(argv=None) -> int:
     try:
         check(options)
         check_picture(out)
-        write_picture(figure(read_branch(options.file), options.shapes, options.width), out)
+        write_picture(read_branch(options.file).plot(options.shapes, options.width), out)
     except (StoreError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

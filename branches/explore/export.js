@@ -71,7 +71,7 @@ function diagramFigure(paper) {
 
 /** The strip as shown, or the profiles: a figure of its own. */
 function stateFigure(paper) {
-  if (STRIPS) return { data: ribbonTraces(shownStrip()), layout: { ...$("ribbon").layout, paper_bgcolor: paper } };
+  if (SHAPES) return { data: ribbonTraces(shownStrip()), layout: { ...$("ribbon").layout, paper_bgcolor: paper } };
   const layout = profileLayout();
   return { data: profileTraces(), layout: { ...layout, paper_bgcolor: paper, font: { ...layout.font, color: colour("ink") } } };
 }

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from branches import diagram_graph as diagram
 from branches.executor import executor, run_jobs
-from branches.explore import profiles, strips
+from branches.explore import open_strips, profiles, strips
 from branches.files import StoreError
 from branches.names import DIAGRAM
 from branches.progress import Progress
+from branches.read import read_branch
 
 #: Ending of the files that `contin.save` writes.
 STORED = ".npz"
@@ -31,8 +32,8 @@ def gather(results: list[str], quiet: bool = True) -> dict:
     Returns
     -------
     dict
-        ``title``; ``kind``: 'strips' or 'branches'; ``axes``: columns of the map (name, title, short name), of which ``shown``
-        are drawn first; ``families``: dicts with ``name``, ``parameter``, ``branches`` and ``circles``.
+        ``title``; ``kind``: 'strips', 'open' or 'branches'; ``axes``: columns of the map (name, title, short name), of which
+        ``shown`` are drawn first; ``families``: dicts with ``name``, ``parameter``, ``branches`` and ``circles``.
 
     Raises
     ------
@@ -61,6 +62,8 @@ def left_out(data: dict) -> list[dict]:
 
 def _of_strips(files: dict[Path, Path], titles: list[str], progress: Progress) -> dict:
     """Return the data of a page of strips; ``files`` maps each file to its name as given."""
+    if "stages" in read_branch(next(iter(files))).config:
+        return open_strips.gathered(list(files), next(filter(None, titles), ""))
     branches = _read(list(files), progress)
     title = next((title or branch["title"] for title, branch in zip(titles, branches)), "")
     families: dict[tuple, list[dict]] = {}

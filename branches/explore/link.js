@@ -21,8 +21,8 @@ function address() {
   for (const id of CONTROLS) if ($(id).value !== FIRST_VALUES[id]) words.set(id, $(id).value);
   const [x, y] = [shownRange("x"), shownRange("y")];
   if (rounded([...x, ...y]) !== rounded([...range.x, ...range.y])) words.set("map", rounded([...x, ...y]));
-  if (STRIPS && $("triads").checked) words.set("directors", "1");
-  const eye = STRIPS ? eyeNow() : Object.values(EYE);
+  if (SHAPES && $("triads").checked) words.set("directors", "1");
+  const eye = SHAPES ? eyeNow() : Object.values(EYE);
   if (rounded(eye) !== rounded(Object.values(EYE))) words.set("eye", rounded(eye));
   return `#${words}`;
 }
@@ -53,7 +53,7 @@ async function restore(text) {
   restoring = true;
   const words = new URLSearchParams(text.replace(/^#/, ""));
   for (const id of CONTROLS) setControl($(id), words.get(id), FIRST_VALUES[id]);
-  if (STRIPS) $("triads").checked = words.has("directors");
+  if (SHAPES) $("triads").checked = words.has("directors");
   await chooseFamily(FAMILIES[Number(words.get("material"))] ? Number(words.get("material")) : 0, words.get("compare"));
   const branch = now.family.branches.find(({ id }) => id === words.get("branch")) || now.branch,
     s = words.has("point") ? Number(words.get("point")) : NaN;
@@ -61,7 +61,7 @@ async function restore(text) {
   const part = numbers(words.get("map"), 4),
     eye = numbers(words.get("eye"), 3) || Object.values(EYE);
   if (part) await zoom({ x: part.slice(0, 2), y: part.slice(2) });
-  if (STRIPS && rounded(eye) !== rounded(eyeNow())) await look({ x: eye[0], y: eye[1], z: eye[2] });
+  if (SHAPES && rounded(eye) !== rounded(eyeNow())) await look({ x: eye[0], y: eye[1], z: eye[2] });
   restoring = false;
 }
 

@@ -143,8 +143,8 @@ function connect() {
   $("width").oninput = resized;
   if (flat) $("triads").parentElement.hidden = true;
   $("triads").onchange = () => redraw();
-  $("view").onclick = () => (STRIPS ? look(EYE) : drawProfile());
-  if (STRIPS) $("ribbon").addEventListener("keydown", turnByKey);
+  $("view").onclick = () => (SHAPES ? look(EYE) : drawProfile());
+  if (SHAPES) $("ribbon").addEventListener("keydown", turnByKey);
   $("slider").oninput = (event) => go(now.branch, now.branch.fromWay(Number(event.target.value) / 1000));
   $("previous").onclick = () => step(-1, false);
   $("next").onclick = () => step(1, false);
@@ -183,7 +183,7 @@ function keyPressed(event) {
 
 async function redraw() {
   await drawDiagram();
-  if (STRIPS && !flat && $("ribbon").data && !now.branch.leftOut) await Plotly.react("ribbon", ribbonTraces(shownStrip()), $("ribbon").layout);
+  if (SHAPES && !flat && $("ribbon").data && !now.branch.leftOut) await Plotly.react("ribbon", ribbonTraces(shownStrip()), $("ribbon").layout);
   await update();
 }
 

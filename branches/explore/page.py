@@ -19,6 +19,9 @@ WORDS = {
     },
     "branches": {"hue": "branch", "state": "The states at the chosen point"},
 }
+WORDS["open"] = {"hue": "stage", "state": WORDS["strips"]["state"]}
+#: Classes of the page, by which parts of it are hidden.
+CLASSES = {"strips": "strips", "branches": "branches", "open": "branches of-open"}
 
 
 class MissingLibraryError(Exception):
@@ -55,7 +58,7 @@ def assemble(data: dict) -> str:
         "licence": html.escape(licence).replace("--", "- -"), "program": "\n".join(scripts),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }  # fmt: skip
-    parts |= {"kind": data["kind"]} | WORDS[data["kind"]]
+    parts |= {"kind": CLASSES[data["kind"]]} | WORDS[data["kind"]]
     pieces = template.split("{{")
     filled = [pieces[0]]
     for piece in pieces[1:]:

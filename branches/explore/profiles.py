@@ -16,7 +16,7 @@ NORM = "norm"
 #: Nodes of a profile, at most. Twice as many make pages twice as large; a quarter of them shows corners at steep layers.
 _MOST_NODES = 161
 #: Kinds of labelled points, as the page knows them.
-_KINDS = {"LP": "fold", "BP": "secondary", "HB": "hopf", "UZ": "user"}
+KINDS = {"LP": "fold", "BP": "secondary", "HB": "hopf", "UZ": "user"}
 
 
 def gathered(files: list[Path]) -> dict:
@@ -69,7 +69,7 @@ def _branch(path: Path, stored: StoredColumns, axes: list[str]) -> dict:
     count = min(max(len(times) for times, _ in stored.profiles), _MOST_NODES)
     values = np.array([_sampled(times, states, count) for times, states in stored.profiles])
     marks = [
-        {"point": number, "kind": _KINDS.get(label, "end"), "name": " ".join(filter(None, (label, stored.names[number])))}
+        {"point": number, "kind": KINDS.get(label, "end"), "name": " ".join(filter(None, (label, stored.names[number])))}
         for number, label in enumerate(stored.labels)
         if label
     ]

@@ -99,6 +99,17 @@ function planar(m) {
   });
 }
 
+/** An open strip, there and back, so that nothing joins its ends: its middle at the origin, the normal of its first end up. */
+function open(part) {
+  const ends = [0, 1, 2].map((i) => part.map(({ x }) => x[i])),
+    middle = ends.map((values) => (Math.min(...values) + Math.max(...values)) / 2),
+    turn = (a) => [a[2], a[0], a[1]],
+    loop = part.concat([...part].reverse()),
+    flat = new Float64Array(loop.length * STATION);
+  loop.forEach(({ x, d, eta }, k) => flat.set([...turn(along(x, -1, middle)), ...d.flatMap(turn), eta], k * STATION));
+  return flat;
+}
+
 /** Stations as one flat array, the middle at the origin, `axis` (else the normal of the enclosed area) along z, d3(0) along y. */
 function placed(loop, axis) {
   const middle = loop.reduce((sum, { x }) => along(sum, 1 / loop.length, x), [0, 0, 0]);

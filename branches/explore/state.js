@@ -3,7 +3,8 @@
 
 const $ = (id) => document.getElementById(id);
 const DATA = JSON.parse($("data").textContent);
-const STRIPS = DATA.kind === "strips"; // else branches of any problem, without shapes in space
+const STRIPS = DATA.kind === "strips"; // closed ones
+const SHAPES = DATA.kind !== "branches"; // strips, closed or open; else branches of any problem, without shapes in space
 const FAMILIES = DATA.families.map((family) => ({
   ...family,
   branches: [

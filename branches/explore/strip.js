@@ -69,7 +69,7 @@ const sceneAxis = { visible: false, range: [-1, 1], autorange: false };
 const shownStrip = () => now.morph || now.branch.strip(now.s);
 
 async function createState() {
-  if (!STRIPS) return drawProfile();
+  if (!SHAPES) return drawProfile();
   if (now.branch.leftOut) return;
   const strip = shownStrip();
   if (flat) return drawFlat(strip);
@@ -98,7 +98,7 @@ function tellLeftOut({ leftOut, path }) {
 
 async function updateState() {
   tellLeftOut(now.branch);
-  if (!STRIPS || flat || !$("ribbon").data || now.branch.leftOut) return createState();
+  if (!SHAPES || flat || !$("ribbon").data || now.branch.leftOut) return createState();
   const strip = shownStrip(),
     scale = scaleOf(strip),
     mesh = sheets(strip, width(), scale),

@@ -65,6 +65,8 @@ def _blas() -> ThreadpoolController:
 
 def _branch(path: Path, branch: StoredBranch) -> dict:
     config, points = branch.config, branch.points
+    if "stages" in config:
+        raise StoreError(f"{str(path)!r} is of an open strip, others are not; a page shows one kind of result")
     if len(points) < 2:
         raise StoreError(f"{str(path)!r} holds {len(points)} points; a branch has two at least")
     if bad := [name for name in ("arclength", *_MAP) if not np.isfinite(points[name]).all()]:

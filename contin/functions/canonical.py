@@ -7,12 +7,17 @@ With the Hamiltonian H = lambda.f - L - mu.g at the controls w that maximize it,
 and at the ends lambda(t0) = d(Phi + sigma.e)/dx(t0), lambda(t1) = -d(Phi + sigma.e)/dx(t1). Where H is quadratic in w, the
 controls come in closed form; else from Newton's method at each point, on the convex function -H of w: with real numbers first,
 then one step with complex ones, which gives the complex step its derivative (implicit function theorem).
+
+A function that sympy cannot differentiate may state its gradient (see `stated_gradient`). Only its first derivatives are known,
+which is enough in a Hamiltonian.
 """
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 import math
+import types
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -81,6 +86,57 @@ class Canonical:
     fixed: tuple[tuple[int, ...], tuple[int, ...]]
 
 
+def stated_gradient(value: Any) -> Function | None:
+    """Return the attribute ``gradient`` of a plain Python function, None without one.
+
+    ``f.gradient(*arguments)`` returns f and its derivatives by its first arguments, as `contin.gradient` does.
+    """
+    return getattr(value, "gradient", None) if isinstance(value, types.FunctionType) else None
+
+
+class _Noted(gradient.Fingerprinted):
+    """Take the fingerprint, and list the functions that state their gradients, in the order in which they are met."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stated: dict[Function, str] = {}
+
+    def function(self, function: Function) -> Any:
+        """Note the function, and its gradient where it states one."""
+        stated = stated_gradient(function)
+        if stated is not None and function not in self.stated:
+            self.stated[function] = f"stated{len(self.stated)}"
+            super().function(stated)
+        return super().function(function)
+
+
+class _Symbols(gradient.Symbolic):
+    """Call functions with symbols; those that state their gradients stay functions of these names."""
+
+    def __init__(self, stated: Mapping[Function, str]) -> None:
+        super().__init__()
+        self._stated = stated
+
+    def stand_in(self, value: Any) -> Any:
+        """Return the function as sympy knows it."""
+        if stated_gradient(value) is None:
+            return super().stand_in(value)
+        return _opaque(self._stated[value], 0)
+
+
+@functools.cache
+def _opaque(name: str, number: int) -> Any:
+    """Return the sympy function that stands for a value (number 0) or a first derivative (from 1) of a stated function."""
+    import sympy
+
+    def fdiff(self: Any, argindex: int = 1) -> Any:
+        if number:
+            raise ProblemError(f"{name}: its second derivatives are not known; use it in a hamiltonian")
+        return _opaque(name, argindex)(*self.args)
+
+    return type(f"{name}_{number}", (sympy.Function,), {"fdiff": fdiff, "is_real": True, "stated": (name, number)})
+
+
 def canonical(variation: Variation) -> Canonical:
     """Return the canonical equations of a variational problem.
 
@@ -90,7 +146,7 @@ def canonical(variation: Variation) -> Canonical:
         A function that cannot be differentiated symbolically, an energy that does not depend on a control, or end conditions
         that repeat each other.
     """
-    rewriter = gradient.Fingerprinted()
+    rewriter = _Noted()
     functions = [variation.energy, variation.kinematics, variation.ends, variation.end_energy, variation.hamiltonian]
     functions += [*variation.integrals.values(), *variation.functionals.values()]
     for function in functions:
@@ -101,7 +157,8 @@ def canonical(variation: Variation) -> Canonical:
     rewriter.note(variation.parameters, variation.starts, importlib.metadata.version("sympy"))
     rewriter.note(contents(Path(__file__), Path(str(gradient.__file__))))
     scope: dict[str, Any] = {"math": math, "numpy": np, "__name__": __name__}
-    run_kept_source(f"v{rewriter.fingerprint()[:32]}.py", lambda: _Derivation(variation).text(), scope)
+    scope |= {name: stated_gradient(function) for function, name in rewriter.stated.items()}
+    run_kept_source(f"v{rewriter.fingerprint()[:32]}.py", lambda: _Derivation(variation, rewriter.stated).text(), scope)
     if "pointwise" in scope:
         _check_starts(scope["pointwise"], variation)
     functionals = {name: _of_point(scope, f"functional{i}") for i, name in enumerate(_columns(variation))}
@@ -138,10 +195,10 @@ def _columns(variation: Variation) -> list[str]:
 class _Derivation:
     """One derivation: symbols, expressions, and the text of the functions."""
 
-    def __init__(self, variation: Variation) -> None:
+    def __init__(self, variation: Variation, stated: Mapping[Function, str]) -> None:
         import sympy  # takes .3 s, and is needed the first time only
 
-        self.sympy, self.variation = sympy, variation
+        self.sympy, self.variation, self.stated = sympy, variation, stated
         v = variation
         self.t = sympy.Symbol("T", real=True)
         self.x, self.y = self._symbols("X", v.states), self._symbols("Y", v.states)
@@ -161,7 +218,7 @@ class _Derivation:
     def _called(self, what: str, function: Function, *arguments: Any) -> list[Any]:
         """Return the values of a user's function at symbols."""
         try:
-            result = gradient.Symbolic().function(function)(*arguments)
+            result = _Symbols(self.stated).function(function)(*arguments)
         except ProblemError as error:
             raise ProblemError(f"{what}: {error}") from error
         except Exception as error:  # sympy and a user's function may raise anything
@@ -189,7 +246,7 @@ class _Derivation:
         if term.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo, sympy.I):
             raise ProblemError(f"{what} has no finite real value: {checks.shown(value)}")
         for function in term.atoms(sympy.Function):
-            if function.func.__name__ not in _FUNCTIONS:
+            if function.func.__name__ not in _FUNCTIONS and not hasattr(function, "stated"):
                 raise ProblemError(f"{what}: {function.func.__name__} cannot be used here, but {', '.join(_FUNCTIONS)} can")
         return term
 
@@ -317,15 +374,31 @@ class _Derivation:
         sign = sympy.Function("sgn")  # sympy would write copysign, which has no complex values
         terms = [sympy.sympify(value).replace(sympy.DiracDelta, lambda *_: sympy.S.Zero) for value in values]
         terms = [term.replace(sympy.sign, sign) for term in terms]
-        shared, reduced = sympy.cse(terms, symbols=sympy.numbered_symbols("Z"), optimizations="basic")
 
         def code(term: Any) -> str:
             return str(sympy.pycode(term, user_functions={"sgn": "numpy.sign"}))
 
         lines = [f"def {name}({', '.join(map(str, arguments))}):", *("    " + line for line in head)]
+        terms = self._called_once(terms, lines, code)
+        shared, reduced = sympy.cse(terms, symbols=sympy.numbered_symbols("Z"), optimizations="basic")
         lines += [f"    {symbol} = {code(term)}" for symbol, term in shared]
         result = code(reduced[0]) if single else "(" + ", ".join(map(code, reduced)) + ",)"
         return "\n".join([*lines, f"    return {result}", ""])
+
+    def _called_once(self, terms: list[Any], lines: list[str], code: Function) -> list[Any]:
+        """Return the terms with symbols for the values of functions that state their gradients; append their calls to lines."""
+        sympy = self.sympy
+        found = {atom for term in terms for atom in term.atoms(sympy.Function) if hasattr(atom, "stated")}
+        calls = sorted({(atom.stated[0], atom.args) for atom in found}, key=str)
+        symbols = {}
+        for number, (function, given) in enumerate(calls):
+            shared, reduced = sympy.cse(given, symbols=sympy.numbered_symbols(f"A{number}_"), optimizations="basic")
+            lines += [f"    {symbol} = {code(term)}" for symbol, term in shared]
+            lines.append(f"    R{number} = {function}({', '.join(map(code, reduced))})")
+            for atom in sorted((atom for atom in found if (atom.stated[0], atom.args) == (function, given)), key=str):
+                symbols[atom] = sympy.Symbol(f"R{number}_{atom.stated[1]}", real=True)
+                lines.append(f"    {symbols[atom]} = R{number}[{atom.stated[1]}]")
+        return [term.xreplace(symbols) for term in terms]
 
     def _of_point(self, name: str, values: Sequence[Any], single: bool = False) -> str:
         """Return the text of a function of (t, u, p), with the controls where the values need them."""

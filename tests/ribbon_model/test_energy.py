@@ -71,5 +71,14 @@ def test_the_fold_of_the_paper_from_the_energy():
 def test_what_has_no_such_statement():
     with pytest.raises(ValueError, match="domain 'cell'"):
         variational_problem(RIBBON, CELL)
-    with pytest.raises(contin.ProblemError, match="hamiltonian"):
-        variational_problem(FINITE_WIDTH, HALF_LOOP)
+
+
+def test_a_law_that_states_its_gradient():
+    """Finite width: the circle's bifurcation is that of the linear theory (`FiniteWidth.thresholds`)."""
+    problem, Gamma = variational_problem(FINITE_WIDTH, HALF_LOOP), 10.0
+    (threshold,) = FINITE_WIDTH.thresholds(1, 2, NU, Gamma)
+    start = contin.solve(
+        problem, lambda t: (np.cos(t / 2), np.sin(t / 2), 0, 0, 0, np.cos(t) - 1, np.sin(t)), {"kappa_n": 3.2, "Gamma": Gamma}
+    )
+    (first,) = contin.trace(start, free=["kappa_n"], limits={"kappa_n": (3.2, 3.5)}).labelled("BP")
+    assert first["kappa_n"] == pytest.approx(threshold, abs=1e-10) and first.index_change == (0, 1)

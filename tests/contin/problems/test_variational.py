@@ -109,6 +109,44 @@ def test_a_hamiltonian_instead_of_the_energy():
     assert {point.index for point in bent} == {0}
 
 
+def legendre_transform(m):
+    """The maximum of m w - (w**2 + w**4 / 4) / 2 over w by Newton's method, and where it is: a loop, no formula."""
+    w = m.real
+    for _ in range(50):
+        w = w - (w + w**3 / 2 - m.real) / (1 + 1.5 * w**2)
+    w = w - (w + w**3 / 2 - m) / (1 + 1.5 * w**2)  # with the imaginary part of m: the derivative
+    return m * w - (w**2 + w**4 / 4) / 2, w
+
+
+def stiffening(m):
+    return legendre_transform(m)[0]
+
+
+stiffening.gradient = legendre_transform
+
+
+def test_a_function_that_states_its_gradient():
+    """A strip that stiffens as it bends, by its energy and by its Hamiltonian, which is a loop."""
+    one, other = (
+        VariationalProblem(energy, ["angle"], {"load": 2.0}, ends=lambda a, b, p: (a.angle,), hamiltonian=hamiltonian)
+        for energy, hamiltonian in (
+            (lambda t, x, w, p: (w.angle**2 + w.angle**4 / 4) / 2 + p.load * math.cos(x.angle), None),
+            (None, lambda t, x, lam, p: stiffening(lam.angle) - p.load * math.cos(x.angle)),
+        )
+    )
+    for problem in (one, other):
+        straight = contin.trace(contin.solve(problem, [0.0]), free=["load"], limits={"load": (2, 25)})
+        assert_special(straight, "load", [("BP", ((j + 0.5) * math.pi) ** 2, 1, (j, j + 1)) for j in range(2)])
+    bent = contin.trace(straight.labelled("BP")[0], branch=1, limits={"load": (1, 4)}).points[-1]
+    assert math.isclose(contin.solve(one, bent)["energy"], bent["energy"], rel_tol=1e-10)
+
+
+def test_a_stated_gradient_has_no_second_derivatives():
+    """An energy needs them, a Hamiltonian does not."""
+    with pytest.raises(contin.ProblemError, match="second derivatives are not known; use it in a hamiltonian"):
+        VariationalProblem(lambda t, x, w, p: stiffening(w.angle), ["angle"], {"load": 2.0}, ends=lambda a, b, p: (a.angle,))
+
+
 def test_units_change_nothing():
     """A steel strip 0.4 m long, bending stiffness 0.02 N m^2, the load in kilonewtons."""
     strip = VariationalProblem(

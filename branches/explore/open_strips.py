@@ -1,0 +1,82 @@
+"""Result files of open strips for the page: each stage is a branch, with its columns and a shape at every point."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from branches.draw_open import WORDS
+from branches.explore.packing import column, compressed
+from branches.explore.profiles import KINDS
+from branches.files import StoreError
+from branches.open_branch import OpenBranch
+from branches.read import read_branch
+
+#: Nodes of a shape. Twice as many make pages twice as large; a quarter of them shows corners where a strip bends most.
+_NODES = 97
+#: Columns that no map needs.
+_LEFT_OUT = ("point", "label", "stage", "iterations", "newton_error", "intervals", "kernel")
+
+
+def gathered(files: list[Path], title: str) -> dict:
+    """Return the data of a page; see `branches.explore.gather.gather`.
+
+    Raises
+    ------
+    StoreError
+        A point whose shape is not kept, or a file of a closed strip.
+    """
+    branches = [(path, read_branch(path)) for path in files]
+    first = branches[0][1]
+    for path, branch in branches:
+        if not isinstance(branch, OpenBranch):
+            raise StoreError(f"{str(path)!r} is of a closed strip, {str(files[0])!r} is not; a page shows one kind of result")
+    parameter = first.followed(int(first.points["stage"][-1]))
+    common = set.intersection(*(set(branch.points.dtype.names) for _, branch in branches))
+    columns = [name for name in first.points.dtype.names if name in common and name not in (*_LEFT_OUT, "arclength", "index")]
+    varying = [name for name in columns if any(np.ptp(branch.points[name]) > 0 for _, branch in branches)]
+    if parameter not in varying:
+        raise StoreError(f"the results have no column in common that is followed; that of the first one is {parameter!r}")
+    stages = [
+        _stage(path, branch, int(number), varying) for path, branch in branches for number in np.unique(branch.points["stage"])
+    ]
+    family = {"name": "stages", "parameter": parameter, "branches": stages, "circles": []}
+    return {
+        "title": title or first.config["title"] or first.scene.name, "kind": "open",
+        "axes": [(name, _words(name), name) for name in varying],
+        "shown": [parameter, first.conjugate(parameter)], "families": [family],
+    }  # fmt: skip
+
+
+def _words(name: str) -> str:
+    return f"{WORDS[name]} ({name})" if name in WORDS else name
+
+
+def _stage(path: Path, branch: OpenBranch, number: int, columns: list[str]) -> dict:
+    rows = np.flatnonzero(branch.points["stage"] == number)
+    values = np.array([_states(branch, int(row)) for row in rows])
+    labels = [branch.points["label"][row].decode() for row in rows]
+    names = {int(event["point"]): event["name"].decode() for event in branch.events}
+    marks = [
+        {"point": place, "kind": KINDS.get(label, "end"), "name": " ".join(filter(None, (label, names.get(int(row), ""))))}
+        for place, (row, label) in enumerate(zip(rows, labels))
+        if label
+    ]
+    kept, last = [*columns, "arclength", "index"], number == branch.points["stage"][-1]
+    return {
+        "profile": True, "domain": "open", "name": f"{path.stem}, stage {number}: {branch.followed(number)}",
+        "file": f"{path.stem}_{number}.h5", "stop": branch.stop if last else "", "marks": marks,
+        "labels": {place: label for place, label in enumerate(labels) if label},
+        "columns": {name: column(branch.points[name][rows]) for name in kept}, "components": [],
+        "shapes": compressed(values),
+    }  # fmt: skip
+
+
+def _states(branch: OpenBranch, row: int) -> np.ndarray:
+    """Return quaternion, eta and centreline (_NODES, 8) at equidistant places; the length is 2 pi, as that of closed strips."""
+    t, states = branch.states_at(row)
+    shape = branch.shape(row)
+    at = np.linspace(0, 1, _NODES)
+    table = np.column_stack([states[:, :4], shape.eta, 2 * np.pi * states[:, 4:7]])
+    return np.array([np.interp(at, t, column) for column in table.T]).T

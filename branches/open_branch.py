@@ -1,0 +1,205 @@
+"""A result file of an open strip in memory: stages with their pieces, shapes, and what snaps release."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import BarycentricInterpolator
+
+from branches.config import dump
+from branches.draw_strip import standing
+from branches.files import StoreError
+from branches.labels import SPECIAL
+from branches.open_config import OpenConfig
+from branches.read_closed import StoredBranch
+from ribbon_model.ends import DIRECTIONS
+from ribbon_model.open_strip import shape_of, strains_of
+from ribbon_model.shape import Shape
+
+#: What a person feels or sees where a number is followed: its conjugate, up to a sign. Others are shown with the energy.
+CONJUGATE = {
+    "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
+    "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
+    "weight": "rise",
+}  # fmt: skip
+#: Followed numbers that are dead loads, with the column whose product with them is the work to subtract from the energy.
+_WORK = {"force_tangent": "distance", "force_normal": "rise", "force_width": "shear"}
+#: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of a stage between special points: rows of the table of points, and whether it is stable (None: not known)."""
+
+    stage: int
+    rows: np.ndarray
+    stable: bool | None
+
+
+@dataclass(frozen=True)
+class Snap:
+    """A fold at which a stable piece ends: its row, the place (column, value) where it snaps to, and the energy released."""
+
+    row: int
+    column: str
+    value: float
+    to: dict[str, float]
+    released: float
+
+
+class OpenBranch(StoredBranch):
+    """The result file of an open strip; as `branches.read.StoredBranch`, with lengths over that of the strip."""
+
+    @property
+    def scene(self) -> OpenConfig:
+        """The scene."""
+        return OpenConfig.model_validate(self.config)
+
+    def states_at(self, point: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return places t (K,) and states (K, n) of a kept point."""
+        found = np.flatnonzero(self.index["point"] == point)
+        if not found.size:
+            raise StoreError(f"the solution of point {point} is not kept; a smaller stride keeps more")
+        row = self.index[found[0]]
+        here = slice(row["start"], row["start"] + row["count"])
+        return self.t[here], self.states[here]
+
+    def strains(self, point: int) -> np.ndarray:
+        """Return omega_1, omega_2, omega_3 (K, 3) at a kept point, over 1/L."""
+        t, states = self.states_at(point)
+        problem = self.scene.strip().problem
+        row, names = self.points[point], self.points.dtype.names
+        values = [float(row[name]) if name in names else 0.0 for name in problem.parameters]
+        return strains_of(states[:, :4], problem.batch("field").values(t, states, states[:0], np.array(values)))
+
+    def shape(self, point: int) -> Shape:
+        """Return the strip at a kept point, of length 1, on the axes of its first end."""
+        t, states = self.states_at(point)
+        ruled = self.scene.strip().material.ruled
+        return shape_of(t, states, self.strains(point) if ruled else np.zeros((len(t), 3)))
+
+    def solution(self, point: int):
+        """Open strips have no `ribbon_model.solution.Solution`; raise StoreError."""
+        raise StoreError(
+            "films and loops are of closed strips, and this result is of an open one (shape and strains give its states)"
+        )
+
+    def placed(self, point: int, length: float) -> tuple[Shape, np.ndarray]:
+        """Return the strip of this length, its middle at the origin, and its strains (K, 3) in radians per unit of length.
+
+        The axes are tangent, width and normal of its first end, or the weight points downwards.
+        """
+        shape = standing(self.shape(point), self.up)
+        middle = shape.centreline.mean(axis=0)
+        scaled = Shape(shape.arclength * length, (shape.centreline - middle) * length, shape.directors, shape.eta)
+        return scaled, self.strains(point) / length
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """The direction that is up in pictures: against the weight, if there is one, otherwise the normal of the first end."""
+        strip = self.scene.strip()
+        return tuple(-x for x in strip.weight_direction) if "weight" in strip.parameters else DIRECTIONS["normal"]
+
+    def plot(self, shapes: int = 6, width: float | None = None):
+        """Return the stages as a matplotlib figure; see `branches.draw_open.figure`."""
+        from branches.draw_open import figure
+
+        return figure(self, shapes, width)
+
+    @property
+    def about(self) -> str:
+        """The strip in words."""
+        return self.scene.title or self.scene.name
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Columns of labelled points that a notebook shows."""
+        followed = dict.fromkeys(stage["follow"] for stage in self.config["stages"])
+        return ("point", "label", "name", "stage", *followed, "energy", "index")
+
+    def scene_text(self) -> str:
+        """Return the scene as YAML."""
+        return dump(self.scene)
+
+    def place(self, row: int) -> str:
+        """Return where a labelled point is, in words; ``row`` counts labelled points from 0."""
+        event = self.events[row]
+        name = self.followed(int(event["stage"]))
+        return f"{name} = {event[name] * self.scene.factor(name):.4f} of stage {event['stage']}"
+
+    def followed(self, stage: int) -> str:
+        """Return the number that a stage follows."""
+        return self.config["stages"][stage - 1]["follow"]
+
+    def conjugate(self, name: str) -> str:
+        """Return the column that is shown where a number is followed."""
+        conjugate = CONJUGATE.get(name, "energy")
+        return conjugate if conjugate in self.points.dtype.names else "energy"
+
+    def pieces(self) -> list[Piece]:
+        """Return the parts of all stages between special points."""
+        found = []
+        special = {int(event["point"]) for event in self.events if event["label"].decode() in SPECIAL}
+        for stage in np.unique(self.points["stage"]):
+            rows = np.flatnonzero(self.points["stage"] == stage)
+            ends = sorted({rows[0], rows[-1], *(row for row in rows if row in special)})
+            for first, last in pairwise(ends):
+                index = self._index(np.arange(first, last + 1))
+                found.append(Piece(int(stage), np.arange(first, last + 1), None if index < 0 else index == 0))
+        return found
+
+    def _index(self, rows: np.ndarray) -> int:
+        """Return the index on a piece, that of its points which are not special; -1 if they differ or there are none."""
+        regular = [row for row in rows if self.points["label"][row] not in (b"LP", b"BP")]
+        values = set(self.points["index"][regular].tolist())
+        return int(values.pop()) if len(values) == 1 else -1
+
+    def potential(self, name: str) -> np.ndarray:
+        """Return the energy of all points with the work of the load that is followed."""
+        work = self.points[_WORK[name]] * self.points[name] if name in _WORK else 0.0
+        return self.points["energy"] - work
+
+    def snaps(self) -> list[Snap]:
+        """Return the folds at which a stable piece ends, with the stable state below that the file has, if any."""
+        pieces, found = self.pieces(), []
+        for event in self.events:
+            if event["label"] != b"LP" or 0 not in (event["index_before"], event["index_after"]):
+                continue
+            row, name = int(event["point"]), self.followed(int(event["stage"]))
+            energy, value = self.potential(name), float(event[name])
+            for piece in pieces:
+                state = self._below(piece, row, name, value) if piece.stable else None
+                if state is not None and energy[row] - state["potential"] > _SAME * (1 + abs(energy[row])):
+                    found.append(Snap(row, name, value, state, float(energy[row] - state["potential"])))
+        best: dict[int, Snap] = {}
+        for snap in found:
+            if snap.row not in best or snap.released > best[snap.row].released:
+                best[snap.row] = snap
+        return list(best.values())
+
+    def _below(self, piece: Piece, row: int, name: str, value: float) -> dict[str, float] | None:
+        """Return the columns of a stable piece where the followed number has a value, None if it does not get there."""
+        if self.followed(piece.stage) != name or not self._same_numbers(piece.rows[0], row, name):
+            return None
+        x, conjugate = self.points[name][piece.rows], self.conjugate(name)
+        for i in range(len(x) - 1):
+            if (x[i] - value) * (x[i + 1] - value) <= 0 and x[i] != x[i + 1] and row not in piece.rows[i : i + 2]:
+                columns = {conjugate: self.points[conjugate], "potential": self.potential(name)}
+                return {column: self._between(piece.rows, i, name, value, values) for column, values in columns.items()}
+        return None
+
+    def _between(self, rows: np.ndarray, i: int, name: str, value: float, column: np.ndarray) -> float:
+        """Return a column where a number has a value between points i and i + 1 of a piece, from the points around."""
+        near = rows[max(i - 1, 0) : i + 3]
+        return float(BarycentricInterpolator(self.points[name][near], column[near])(value))
+
+    def _same_numbers(self, first: int, second: int, name: str) -> bool:
+        """Return whether two points agree in all prescribed numbers but the followed one."""
+        for other in self.scene.strip().parameters:
+            a, b = (float(self.points[other][row]) for row in (first, second))
+            if other != name and abs(a - b) > _SAME * (1 + abs(a)):
+                return False
+        return True

@@ -1,0 +1,210 @@
+"""What is held at an end of an open strip, and the conditions that follow.
+
+At the first end the clamp is given: its frame is the lab axes, its place the origin. Directions are named after the strip
+there: ``width`` (d1), ``normal`` (d2), ``tangent`` (d3). At the last end the prescribed frame q1 comes from the first one by
+``swing`` about the normal, then ``bend`` about the width, then ``turn`` about the tangent, all axes fixed in space; the
+prescribed place is (``shear``, ``rise``, ``distance``) along width, normal and tangent.
+
+A frame is held by conditions on v = vec(conj(q1) q), which vanishes for q = q1 and q = -q1. The length of q is kept by the
+equations: a clamp has three conditions, at the first end four numbers are fixed instead. What is not held is free, and its
+moment or force vanishes there.
+
+| rotation                 | conditions |
+| clamped                  | v = 0 |
+| hinged about an axis a   | the two components of v perpendicular to a vanish |
+| joint of axes a and b    | director b stays perpendicular to a, fixed in space |
+| free                     | none |
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from ribbon_model.equilibrium import directors
+
+#: Directions by name, as unit vectors on the lab axes.
+DIRECTIONS = {"width": (1.0, 0.0, 0.0), "normal": (0.0, 1.0, 0.0), "tangent": (0.0, 0.0, 1.0)}
+#: The numbers that prescribe the place of the last end, in the order of `DIRECTIONS`, and its frame.
+PLACE, ANGLES = ("shear", "rise", "distance"), ("turn", "bend", "swing")
+#: Rotations of an end.
+CLAMPED, HINGED, JOINT, FREE = "clamped", "hinged", "joint", "free"
+#: A vector shorter than this has no direction.
+_SHORT = 1e-9
+
+Vector = tuple[float, float, float]
+
+
+def unit(what: str, vector) -> Vector:
+    """Return a vector of length one.
+
+    Raises
+    ------
+    ValueError
+        It is no vector of three numbers, or zero.
+    """
+    values = tuple(float(value) for value in vector)
+    length = math.sqrt(sum(value * value for value in values))
+    if len(values) != 3 or not _SHORT < length < math.inf:
+        raise ValueError(f"{what}: {list(vector)} must be three numbers, not all zero")
+    return tuple(value / length for value in values)  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class End:
+    """What is held at an end.
+
+    Attributes
+    ----------
+    rotation : str
+        'clamped', 'hinged', 'joint' or 'free'.
+    axis : tuple of float
+        Of a hinge, on the prescribed frame; of a joint, the axis that is fixed in space.
+    director : int
+        Of a joint: the number (0, 1, 2) of the director that stays perpendicular to the axis.
+    held : tuple of vectors
+        Directions along which the place is prescribed.
+
+    Raises
+    ------
+    ValueError
+        One sentence: directions that repeat each other, an unknown word.
+    """
+
+    rotation: str = CLAMPED
+    axis: Vector = DIRECTIONS["width"]
+    director: int = 0
+    held: tuple[Vector, ...] = tuple(DIRECTIONS.values())
+
+    def __post_init__(self) -> None:
+        import numpy as np
+
+        if self.rotation not in (CLAMPED, HINGED, JOINT, FREE):
+            raise ValueError(f"rotation: {self.rotation!r} must be clamped, hinged, joint or free")
+        object.__setattr__(self, "axis", unit("axis", self.axis))
+        object.__setattr__(self, "held", tuple(unit("held", vector) for vector in self.held))
+        if len(self.held) and np.linalg.matrix_rank(np.array(self.held), tol=1e-6) < len(self.held):
+            raise ValueError(f"held: the {len(self.held)} directions repeat each other; give independent ones, at most three")
+        if self.rotation == JOINT and abs(self.axis[self.director]) > 1 - 1e-6:
+            raise ValueError("joint: the director must not lie along the axis, to which it stays perpendicular")
+
+    @property
+    def words(self) -> str:
+        """What is held, in words, for titles and messages."""
+        place = {3: "", 2: ", slides along a line", 1: ", slides in a plane", 0: ""}[len(self.held)]
+        if not self.held:
+            return "free" if self.rotation == FREE else f"{self.rotation}, free to move"
+        return ("ball joint" if self.rotation == FREE else self.rotation) + place
+
+
+#: Ends by name.
+CLAMP = End()
+FREE_END = End(FREE, held=())
+BALL = End(FREE)
+
+
+def hinge(axis: str | Vector = "width", held=None) -> End:
+    """Return a hinge about an axis."""
+    vector = DIRECTIONS[axis] if isinstance(axis, str) else axis
+    return End(HINGED, vector, held=CLAMP.held if held is None else held)
+
+
+def perpendicular(axis: Vector) -> tuple[Vector, Vector]:
+    """Return two directions perpendicular to an axis and to each other; coordinate axes for coordinate axes."""
+    smallest = min(range(3), key=lambda i: abs(axis[i]))
+    first = unit("axis", [float(i == smallest) - axis[smallest] * axis[i] for i in range(3)])
+    return first, unit("axis", cross(axis, first))
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return the cross product of two vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def product(a, b):
+    """Return the product of two quaternions."""
+    a0, a1, a2, a3 = a
+    b0, b1, b2, b3 = b
+    return (
+        a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3, a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
+        a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1, a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
+    )  # fmt: skip
+
+
+def prescribed(turn, bend, swing):
+    """Return the quaternion of the prescribed frame of the last end."""
+    first = (math.cos(swing / 2), 0, math.sin(swing / 2), 0)
+    second = product((math.cos(bend / 2), math.sin(bend / 2), 0, 0), first)
+    return product((math.cos(turn / 2), 0, 0, math.sin(turn / 2)), second)
+
+
+def angles_of(q) -> tuple[float, float, float]:
+    """Return turn, bend and swing (the inverse of `prescribed`, turn and swing from -pi to pi) of a quaternion."""
+    d = directors(*q)
+    return math.atan2(-d[3], d[4]), math.asin(min(max(d[5], -1.0), 1.0)), math.atan2(-d[2], d[8])
+
+
+def relative(q, q1):
+    """Return conj(q1) q: the rotation from the prescribed frame to the frame, on the prescribed frame."""
+    return product((q1[0], -q1[1], -q1[2], -q1[3]), q)
+
+
+def rotation_conditions(end: End) -> Callable[..., tuple]:
+    """Return ``conditions(q, q1)``, what vanishes for the frame q of an end whose prescribed frame is q1."""
+    if end.rotation == FREE:
+        return lambda q, q1: ()
+    if end.rotation == CLAMPED:
+        return lambda q, q1: relative(q, q1)[1:]
+    if end.rotation == HINGED:
+        pair = perpendicular(end.axis)
+        return lambda q, q1: tuple(_along(vector, relative(q, q1)[1:]) for vector in pair)
+    axis, first = end.axis, 3 * end.director
+    return lambda q, q1: (_along(axis, directors(*relative(q, q1))[first : first + 3]),)
+
+
+def place_conditions(end: End) -> Callable[..., tuple]:
+    """Return ``conditions(r, r1)``, what vanishes for the place r of an end whose prescribed place is r1."""
+    held = end.held
+    return lambda r, r1: tuple(_along(vector, [a - b for a, b in zip(r, r1)]) for vector in held)
+
+
+def angle_of(end: End) -> Callable[..., float] | None:
+    """Return ``angle(q, q1)``: by how much an end has turned about the axis of its hinge or joint; None without one."""
+    axis = end.axis
+    if end.rotation == HINGED:
+
+        def hinged(q, q1):
+            scalar, *vector = relative(q, q1)
+            return 2 * math.atan2(_along(axis, vector), scalar)
+
+        return hinged
+    if end.rotation != JOINT:
+        return None
+    first = 3 * end.director
+    zero = unit("axis", [float(i == end.director) - axis[end.director] * axis[i] for i in range(3)])
+    side = cross(axis, zero)
+
+    def joint(q, q1):
+        director = directors(*relative(q, q1))[first : first + 3]
+        return math.atan2(_along(side, director), _along(zero, director))
+
+    return joint
+
+
+def _along(vector: Vector, components):
+    """Return a component of a vector, without terms that are zero: a condition that fixes one state stays one."""
+    return sum(a * x for a, x in zip(vector, components) if a != 0)
+
+
+def numbers_of(end: End) -> tuple[str, ...]:
+    """Return the names of the numbers that prescribe the last end: of place and frame, as far as they are held."""
+    place = [name for name, *parts in zip(PLACE, *end.held) if any(parts)] if end.held else []
+    return (*place, *(ANGLES if end.rotation != FREE else ()))
+
+
+def check_known(numbers: Mapping[str, float], known: tuple[str, ...]) -> None:
+    """Raise ValueError for a number that nothing uses."""
+    for name in numbers:
+        if name not in known:
+            raise ValueError(f"numbers: {name} is used by nothing here; there are {', '.join(known) or 'none'}")

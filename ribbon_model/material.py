@@ -1,0 +1,253 @@
+"""The material of an open strip: a law of the paper or a rod, with natural strains and data along the strip.
+
+Units: the length of the strip is 1, and so is a bending modulus: B of the law, or that unit in which B1, B2 and C of a rod are
+given. Curvatures and twist are those of a strip of length 1, and Gamma is w**2/(h L). (The laws hold in every unit of length;
+closed loops take L/2 pi.)
+
+The Hamiltonian of a strip is that of its section, H(M) = max over the strains of M.omega - U(omega). Natural strains omega_n of
+a rod add M.omega_n. A section whose modulus is f times that of the first one has f H(M/f).
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, LAWS, Law
+
+#: The general Kirchhoff rod, which is no law of the paper.
+ROD = "rod"
+#: Numbers of a rod: stiffnesses of bending about the width and about the normal, and of twisting.
+STIFFNESSES = ("B1", "B2", "C")
+#: Natural strains: curvature about the width, curvature about the normal, twist.
+NATURAL = ("kappa_n", "kappa_2", "tau_n")
+#: Laws that may have a natural twist: quadratic ones. For the others the energy with one is another function.
+_TWISTED = (ROD, FLAT_ROD.name, ISOTROPIC_ROD.name)
+#: Functions in expressions along the strip; all can be differentiated.
+_FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "sqrt", "sinh", "cosh", "tanh", "atan")
+#: Longest expression. A longer one is a table that should be shorter: each is compiled as one formula.
+_LONGEST = 2000
+
+#: A datum along the strip: ``f(t, p)``.
+Datum = Callable[..., float]
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a strip is made of.
+
+    Attributes
+    ----------
+    law : str
+        A law of the paper ('ribbon', 'flat rod', 'isotropic rod', 'finite width'), or 'rod'.
+    numbers : mapping of str to float
+        Values by name: ``nu``, ``Gamma``, or ``B1``, ``B2``, ``C``, natural strains ``kappa_n``, ``kappa_2``, ``tau_n``, and
+        further names that expressions use. An infinite ``B2`` is a strip that does not bend in its plane.
+    along : mapping of str to str
+        Expressions in s (from 0 to 1) and numbers, for a natural strain, ``width`` or ``thickness`` (relative to s = 0).
+
+    Notes
+    -----
+    ``softness`` is a number of the laws with omega_2 = 0: a compliance about the normal, to find a first state; 0 is the law.
+
+    Raises
+    ------
+    ValueError
+        A field that does not fit; one sentence.
+
+    Examples
+    --------
+    >>> Material("flat rod", {"nu": 0.3}).numbers
+    {'nu': 0.3, 'kappa_n': 0.0, 'tau_n': 0.0, 'softness': 0.0}
+    """
+
+    law: str = FLAT_ROD.name
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    along: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.law != ROD and self.law not in LAWS:
+            raise ValueError(f"law: {self.law!r} must be one of {', '.join([*LAWS, ROD])}")
+        numbers = {name: float(value) for name, value in self.numbers.items()}
+        for name in self.needed:
+            if name not in numbers:
+                raise ValueError(f"{name}: is missing; the law {self.law!r} needs {', '.join(self.needed)}")
+        self._check(numbers)
+        for name, text in self.along.items():
+            if name not in (*self.natural, "width", "thickness"):
+                allowed = ", ".join((*self.natural, "width", "thickness"))
+                raise ValueError(f"along: {name}: the law {self.law!r} has no such datum; it has {allowed}")
+            check_expression(f"along: {name}", text, set(numbers) | set(self.natural))
+        if self.law in (ROD, ISOTROPIC_ROD.name) and {"width", "thickness"} & set(self.along):
+            raise ValueError(f"along: width, thickness: are for flat strips, not for the law {self.law!r}")
+        rest = dict.fromkeys((*self.natural, *(["softness"] if self.constrained else [])), 0.0)
+        object.__setattr__(self, "numbers", {**numbers, **{name: 0.0 for name in rest if name not in numbers}})
+
+    def _check(self, numbers: Mapping[str, float]) -> None:
+        own = (*self.needed, *NATURAL, "softness", "Gamma", *STIFFNESSES)
+        for name, value in numbers.items():
+            infinite = name == "B2" and value == math.inf
+            if name in own and name not in (*self.needed, *self.natural, "softness"):
+                raise ValueError(f"{name}: is not a number of the law {self.law!r}")
+            if not (math.isfinite(value) or infinite):
+                raise ValueError(f"{name}: {value:g} must be finite")
+            if name in STIFFNESSES and not value > 0:
+                raise ValueError(f"{name}: {value:g} must be positive")
+            if name == "nu" and not -1 < value <= 0.5:
+                raise ValueError(f"nu: {value:g} must be greater than -1 and at most 0.5")
+            if name in ("Gamma", "softness") and not value >= 0:
+                raise ValueError(f"{name}: {value:g} must not be negative")
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Names of the numbers that must be given."""
+        return STIFFNESSES if self.law == ROD else LAWS[self.law].parameters
+
+    @property
+    def natural(self) -> tuple[str, ...]:
+        """Names of the natural strains that this law may have."""
+        names = ["kappa_n"]
+        if self.law in _TWISTED:
+            names.append("tau_n")
+        if not self.constrained:
+            names.append("kappa_2")
+        return tuple(names)
+
+    @property
+    def constrained(self) -> bool:
+        """True if omega_2 = 0: the strip does not bend in its plane."""
+        return self.numbers.get("B2") == math.inf if self.law == ROD else LAWS[self.law].constrained
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Names and values of the parameters of the problem."""
+        return {name: value for name, value in self.numbers.items() if math.isfinite(value)}
+
+    @property
+    def of_paper(self) -> Law | None:
+        """The law of the paper; None for a rod."""
+        return LAWS.get(self.law)
+
+    @property
+    def ruled(self) -> bool:
+        """True if the surface has generators."""
+        return self.of_paper is not None and self.of_paper.has_rulings
+
+    @property
+    def homogeneous(self) -> bool:
+        """True if nothing varies along the strip."""
+        return not self.along
+
+    def datum(self, name: str) -> Datum:
+        """Return a natural strain, or the relative width or thickness, as a function of (t, p)."""
+        if name in self.along:
+            return compiled(self.along[name], tuple(self.parameters))
+        if name in ("width", "thickness"):
+            return _one
+        return compiled(name, tuple(self.parameters)) if name in self.natural else _zero
+
+    def hamiltonian(self) -> Callable[..., float]:
+        """Return H(t, M1, M2, M3, p), zero without moments and natural strains: the energy of the natural state is zero."""
+        kappa_n, kappa_2, tau_n = (self.datum(name) for name in NATURAL)
+        section, factor, soft = self._section(), self._factor(), self.constrained
+
+        def hamiltonian(t, M1, M2, M3, p):
+            f = factor(t, p)
+            value = f * section(t, M1 / f, M2 / f, M3 / f, kappa_n(t, p), p) + M2 * kappa_2(t, p) + M3 * tau_n(t, p)
+            return value + p.softness * M2 * M2 / 2 if soft else value
+
+        return hamiltonian
+
+    def _factor(self) -> Datum:
+        """Return the modulus of the section relative to that at s = 0: w h**3."""
+        width, thickness = self.datum("width"), self.datum("thickness")
+        if not {"width", "thickness"} & set(self.along):
+            return _one
+        return lambda t, p: width(t, p) * thickness(t, p) ** 3
+
+    def _section(self) -> Callable[..., float]:
+        """Return H(t, M1, M2, M3, kappa_n, p) of a section of modulus one."""
+        law = self.of_paper
+        if law is None:
+            rigid = self.constrained
+
+            def rod(t, M1, M2, M3, kappa_n, p):
+                value = M1 * M1 / (2 * p.B1) + M3 * M3 / (2 * p.C) + M1 * kappa_n
+                return value if rigid else value + M2 * M2 / (2 * p.B2)
+
+            return rod
+        complementary, width, thickness = law.hamiltonian, self.datum("width"), self.datum("thickness")
+        if law.has_width:
+            return lambda t, M1, M2, M3, kappa_n, p: (
+                complementary(M1, M2, M3, kappa_n, p.nu, p.Gamma * width(t, p) ** 2 / thickness(t, p)) - kappa_n * kappa_n / 2
+            )
+        return lambda t, M1, M2, M3, kappa_n, p: complementary(M1, M2, M3, kappa_n, p.nu) - kappa_n * kappa_n / 2
+
+
+# --- expressions ------------------------------------------------------------------------------------------------------------
+
+
+def _one(t, p):
+    return 1.0
+
+
+def _zero(t, p):
+    return 0.0
+
+
+def compiled(text: str, names: tuple[str, ...]) -> Datum:
+    """Return an expression in s, pi, functions and these names as a function of (t, p), with the names as fields of p.
+
+    Raises
+    ------
+    ValueError
+        See `check_expression`.
+    """
+    tree = ast.parse(text, mode="eval")
+    check_expression("expression", text, set(names))
+    scope = {"math": math}
+    exec(compile(f"def datum(t, p):\n    return {ast.unparse(_Fields(names).visit(tree))}", "<along>", "exec"), scope)
+    return scope["datum"]
+
+
+class _Fields(ast.NodeTransformer):
+    """Names of an expression as a function of (t, p) reads them."""
+
+    def __init__(self, names: tuple[str, ...]):
+        self._names = names
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if node.id in self._names:
+            return ast.parse(f"p.{node.id}", mode="eval").body
+        return ast.parse({"s": "t"}.get(node.id, f"math.{node.id}"), mode="eval").body
+
+
+def check_expression(what: str, text: str, names: set[str]) -> None:
+    """Raise ValueError unless the text is an expression in s, pi, functions and names.
+
+    Raises
+    ------
+    ValueError
+        One sentence that says what is allowed.
+    """
+    allowed = f"arithmetic with s, pi, {', '.join(_FUNCTIONS)}" + "".join(f", {name}" for name in sorted(names))
+    if not isinstance(text, str) or len(text) > _LONGEST:
+        raise ValueError(f"{what}: must be an expression of at most {_LONGEST} letters ({allowed})")
+    try:
+        tree = ast.parse(text, mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError(f"{what}: {text!r} is not an expression ({allowed})") from None
+    called = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    kinds = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.operator, ast.unaryop, ast.Load, ast.Name, ast.Constant, ast.Call)
+    for node in ast.walk(tree):
+        good = isinstance(node, kinds) and not isinstance(node, (ast.Not, ast.FloorDiv, ast.Mod, ast.BitOr, ast.BitAnd))
+        if isinstance(node, ast.Name):
+            good = node.id in _FUNCTIONS if node in called else node.id in names | {"s", "pi"}
+        if isinstance(node, ast.Constant):
+            good = type(node.value) in (int, float) and abs(node.value) < 1e12
+        if isinstance(node, ast.Call):
+            good = isinstance(node.func, ast.Name) and len(node.args) == 1 and not node.keywords
+        if not good:
+            raise ValueError(f"{what}: {text!r}: {ast.unparse(node) or 'this'!r} is not allowed ({allowed})")

@@ -1,0 +1,549 @@
+"""An open strip (or a closed, twisted one) between two ends, under loads: a variational problem from what a person says of it.
+
+The state is the quaternion of the frame and the centreline; the length is 1, and so is B (`ribbon_model.material`). The
+Hamiltonian is that of the section, H(M), plus n.d3 for the growth of the centreline, minus the potential of distributed
+loads: the multipliers of the quaternion carry the moment, 2 M_i = lambda_q . (q e_i), those of the centreline are the force n.
+Conditions at the ends: `ribbon_model.ends`. The reactions are the force and the moment that the supports exert on the strip.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from contin import Collocation, ContinError, Point, ProblemError, TestFunction, Trial, VariationalProblem, solve
+from ribbon_model import ends
+from ribbon_model.ends import ANGLES, CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, PLACE, End
+from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, spin
+from ribbon_model.laws import FINITE_WIDTH, RIBBON
+from ribbon_model.material import Material
+from ribbon_model.shape import Shape, frames
+
+#: Numbers of loads: dead force at the last end along the three directions, dead moment about its hinge, weight per length
+#: (along ``weight_direction``), stiffness per length of a foundation.
+FORCES = ("force_width", "force_normal", "force_tangent")
+LOADS = (*FORCES, "moment", "weight", "foundation")
+#: A further displacement of the last end, along ``stroke_direction``.
+STROKE = "stroke"
+#: Conditions that fix what symmetry leaves open: the angle about the tangent (a homogeneous ring, an isotropic rod between ends
+#: on one line), the place along a closed strip that is twisted to the right or to the left. Each is an integral condition that
+#: holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and x2 sin(2 pi s), those with the factors -3 and 0
+#: lose their slope on the way to a Moebius band of a flat strip; with +3 they keep it.)
+PHASES = {
+    "spin": lambda t, x: x.x1,
+    "shift, right": lambda t, x: x.x1 + 3 * x.x2 * math.sin(2 * math.pi * t),
+    "shift, left": lambda t, x: x.x1 - 3 * x.x2 * math.sin(2 * math.pi * t),
+}
+#: Columns of the reactions.
+REACTIONS = tuple(
+    f"{end}{what}_{direction}" for end in ("", "start_") for what in ("F", "M") for direction in DIRECTIONS
+)  # fmt: skip
+#: An eigenvalue of the second variation below this part of the largest is zero: a motion that costs no energy. Round-off
+#: leaves 1e-14, and slow branches near their birth have eigenvalues above 1e-8.
+_ZERO = 1e-10
+#: A rigid motion that moves what is held by less than this, relative to its size, is not held.
+_LOOSE = 1e-9
+
+
+@dataclass(frozen=True)
+class OpenStrip:
+    """A strip between two ends.
+
+    Attributes
+    ----------
+    material : Material
+    start, finish : End
+        What is held. For a closed strip the last end is clamped to the first one, turned by ``turn``.
+    numbers : mapping of str to float
+        Values of what is prescribed (`ends.PLACE`, `ends.ANGLES`) and of loads (`LOADS`); a load that is not named is absent.
+        Others that are not named have the values of the natural state, or zero.
+    weight_direction, foundation_direction, stroke_direction : tuple of float
+        Where the weight pulls to; the direction in which the foundation holds; that of a further displacement of the last end,
+        whose number is ``stroke``.
+    phases : tuple of str
+        Names of `PHASES`, for strips that can shift along themselves or spin about their tangents.
+
+    Raises
+    ------
+    ValueError
+        One sentence.
+
+    Examples
+    --------
+    A column, clamped at one end and free at the other, buckles under a dead load of (pi/2)**2.
+
+    >>> import contin
+    >>> from ribbon_model.ends import FREE_END
+    >>> rod = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
+    >>> column = OpenStrip(rod, finish=FREE_END, numbers={"force_tangent": -1.0})
+    >>> branch = contin.trace(column.first_point(), free=["force_tangent"], direction=-1, limits={"force_tangent": (-5, 0)})
+    >>> [(round(-point["force_tangent"] / (math.pi / 2) ** 2, 9), point.index_change) for point in branch.labelled("BP")]
+    [(1.0, (0, 1))]
+    """
+
+    material: Material
+    start: End = CLAMP
+    finish: End = CLAMP
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    weight_direction: ends.Vector = (0.0, -1.0, 0.0)
+    foundation_direction: ends.Vector = DIRECTIONS["normal"]
+    stroke_direction: ends.Vector = DIRECTIONS["tangent"]
+    phases: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("weight_direction", "foundation_direction", "stroke_direction"):
+            object.__setattr__(self, name, ends.unit(name, getattr(self, name)))
+        ends.check_known(self.numbers, self.known)
+        for name, value in self.numbers.items():
+            if not math.isfinite(value):
+                raise ValueError(f"numbers: {name} = {value:g} must be finite")
+        if self.numbers.get("foundation", 0) < 0:
+            raise ValueError(f"numbers: foundation = {self.numbers['foundation']:g} must not be negative")
+        if "moment" in self.numbers and self.finish.rotation not in (HINGED, JOINT):
+            raise ValueError(
+                "numbers: moment needs a hinge or a joint at the last end, about whose axis it acts: elsewhere a dead moment "
+                "has no energy"
+            )
+        for name in self.phases:
+            if name not in PHASES:
+                raise ValueError(f"phases: {name!r} must be one of {', '.join(PHASES)}")
+
+    # --- names --------------------------------------------------------------------------------------------------------
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Names of the numbers that can be given here, besides those of the material."""
+        forces = tuple(
+            name for name, axis in zip(FORCES, DIRECTIONS.values()) if not _spanned(axis, self.finish.held)
+        )  # fmt: skip
+        along = np.array(self.finish.held).reshape(-1, 3) @ self.stroke_direction
+        stroke = (STROKE,) if np.any(abs(along) > _LOOSE) else ()
+        return (*ends.numbers_of(self.finish), *stroke, *forces, *(name for name in LOADS if name not in FORCES))
+
+    @functools.cached_property
+    def parameters(self) -> dict[str, float]:
+        """Names and values of all numbers that can be followed."""
+        natural = self._natural_numbers()
+        prescribed = {name: self.numbers.get(name, natural[name]) for name in ends.numbers_of(self.finish)}
+        loads = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
+        return {**prescribed, **loads, **self.material.parameters}
+
+    # --- the problem --------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def problem(self) -> VariationalProblem:
+        """The variational problem.
+
+        Raises
+        ------
+        ProblemError
+            Conditions that repeat or contradict each other.
+        """
+        states = (*FRAME, *CENTRELINE, *(f"phase{i}" for i in range(len(self.phases))))
+        return VariationalProblem(
+            None, states, self.parameters, hamiltonian=self._hamiltonian(), ends=self._conditions(),
+            end_energy=self._end_energy(), symmetries={"plane": _mirrored},
+            functionals={name: rate for name, rate in _PLACES.items() if name not in self.parameters},
+        )  # fmt: skip
+
+    def _hamiltonian(self) -> Callable:
+        section, potential = self.material.hamiltonian(), self._potential()
+        phases = _together(self.phases)
+
+        def hamiltonian(t, x, lam, p):
+            q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam[:7]
+            rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
+            M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
+            d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
+            return section(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + phases(t, x, lam[7:])
+
+        return hamiltonian
+
+    def _potential(self) -> Callable:
+        """Return the potential of distributed loads per length, as a function of (x, p)."""
+        weight = self.weight_direction if "weight" in self.numbers else None
+        foundation = self.foundation_direction if "foundation" in self.numbers else None
+
+        def potential(x, p):
+            value = 0.0
+            if weight is not None:
+                value = value - p.weight * (weight[0] * x.x1 + weight[1] * x.x2 + weight[2] * x.x3)
+            if foundation is not None:
+                offset = foundation[0] * x.x1 + foundation[1] * x.x2 + foundation[2] * x.x3
+                value = value + p.foundation * offset * offset / 2
+            return value
+
+        return potential
+
+    def _conditions(self) -> Callable:
+        clamped = self.start.rotation == CLAMPED
+        first, last = ends.rotation_conditions(self.start), ends.rotation_conditions(self.finish)
+        place, far = ends.place_conditions(self.start), ends.place_conditions(self.finish)
+        frame, count, prescribed = ends.prescribed, len(self.phases), self._prescribed()
+
+        def conditions(a, b, p):
+            turned, there = frame(*prescribed(p)[:3]), prescribed(p)[3:]
+            unit = a.q0 * a.q0 + a.q1 * a.q1 + a.q2 * a.q2 + a.q3 * a.q3 - 1
+            begin = (a.q0 - 1, a.q1, a.q2, a.q3) if clamped else (*first(a[:4], (1, 0, 0, 0)), unit)
+            held = (*begin, *place(a[4:7], (0, 0, 0)), *last(b[:4], turned), *far(b[4:7], there))
+            return (*held, *a[7 : 7 + count], *b[7 : 7 + count])
+
+        return conditions
+
+    def _prescribed(self) -> Callable:
+        """Return ``prescribed(p)``: turn, bend, swing, shear, rise and distance of the last end; zero where nothing is held."""
+        turned, placed = self.finish.rotation != FREE, ends.numbers_of(self.finish)
+        shear, rise, distance = (name in placed for name in PLACE)
+        moved, (x, y, z) = STROKE in self.numbers, self.stroke_direction
+
+        def prescribed(p):
+            stroke = p.stroke if moved else 0
+            return (
+                p.turn if turned else 0, p.bend if turned else 0, p.swing if turned else 0,
+                (p.shear if shear else 0) + stroke * x, (p.rise if rise else 0) + stroke * y,
+                (p.distance if distance else 0) + stroke * z,
+            )  # fmt: skip
+
+        return prescribed
+
+    def _end_energy(self) -> Callable | None:
+        """Return the potential of the loads at the last end."""
+        along = [name in self.numbers for name in FORCES]
+        moment, angle = "moment" in self.numbers, ends.angle_of(self.finish)
+        frame, prescribed = ends.prescribed, self._prescribed()
+        if not any(along) and not moment:
+            return None
+        width, normal, tangent = along
+
+        def potential(a, b, p):
+            value = 0.0
+            if width:
+                value = value - p.force_width * b.x1
+            if normal:
+                value = value - p.force_normal * b.x2
+            if tangent:
+                value = value - p.force_tangent * b.x3
+            if moment:
+                value = value - p.moment * angle(b[:4], frame(*prescribed(p)[:3]))
+            return value
+
+        return potential
+
+    # --- first states -------------------------------------------------------------------------------------------------
+
+    def natural_states(self, t) -> np.ndarray:
+        """Return quaternion and centreline (K, 7) of the natural state at places t (K,) in [0, 1], from the first frame."""
+        from scipy.integrate import solve_ivp
+
+        data = [self.material.datum(name) for name in ("kappa_n", "kappa_2", "tau_n")]
+        p = _Numbers(self.material.parameters)
+
+        def rates(s, x):
+            return [*spin(*x[:4], *(datum(s, p) for datum in data), 1), *directors(*x[:4])[6:]]
+
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        order = np.argsort(t)
+        found = solve_ivp(rates, (0, 1), [1.0, 0, 0, 0, 0, 0, 0], "DOP853", t[order], rtol=1e-12, atol=1e-12).y.T
+        states = np.empty_like(found)
+        states[order] = found
+        return states
+
+    def _natural_numbers(self) -> dict[str, float]:
+        """Return place and angles of the last end in the natural state."""
+        if all(self.material.parameters.get(name, 0) == 0 and name not in self.material.along for name in _STRAINS):
+            return {**dict.fromkeys(PLACE + ANGLES, 0.0), "distance": 1.0}
+        state = self.natural_states([1.0])[0]
+        planar = abs(directors(*state[:4])[0] - 1) < _LOOSE
+        angles = (0.0, _winding(self.material), 0.0) if planar else ends.angles_of(state[:4])  # in the plane, the whole angle
+        return dict(zip(PLACE + ANGLES, (*map(float, state[4:]), *angles)))
+
+    def arch(self, distance: float | None = None, side: float = 1.0) -> Callable[[float], list[float]]:
+        """Return a guess of a planar state whose ends are nearer than its length: an Euler mode of these ends.
+
+        Parameters
+        ----------
+        distance : float, optional
+            That of the ends; the number of this name by default, .9 where there is none.
+        side : float
+            +1 to the side of the normal, -1 to the other one.
+        """
+        from scipy.optimize import brentq
+
+        distance = self.parameters.get("distance", 0.9) if distance is None else distance
+        mode = _euler_mode(self.start, self.finish)
+        s = np.linspace(0, 1, 2001)
+        mode_values = mode(s) / np.abs(mode(s)).max()
+        amplitude = side * brentq(lambda a: np.mean(np.cos(a * mode_values)) - distance, 0, 2.4) if distance < 1 else 0.0
+        angle = amplitude * mode_values
+        steps = np.diff(s)[:, None] * (np.column_stack([np.sin(angle), np.cos(angle)])[1:] + 0)
+        place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+
+        def guess(t):
+            a, y, z = (np.interp(t, s, column) for column in (angle, *place.T))
+            return [math.cos(a / 2), -math.sin(a / 2), 0, 0, 0, y, z, *[0] * len(self.phases)]
+
+        return guess
+
+    def twisted(self, turn: float) -> Callable[[float], list[float]]:
+        """Return a guess of a straight strip that is evenly twisted."""
+        return lambda t: [math.cos(turn * t / 2), 0, 0, math.sin(turn * t / 2), 0, 0, t, *[0] * len(self.phases)]
+
+    def twisted_circle(self, half_twists: float = 0) -> Callable[[float], list[float]]:
+        """Return a guess of a closed strip: a circle that bends about d1 at the start, evenly twisted by half twists."""
+
+        def guess(t):
+            a, b, r = math.pi * t, math.pi * half_twists * t / 2, 1 / (2 * math.pi)
+            q = ends.product((math.cos(a), math.sin(a), 0, 0), (math.cos(b), 0, 0, math.sin(b)))
+            return [*q, 0, r * (math.cos(2 * a) - 1), r * math.sin(2 * a), *[0] * len(self.phases)]
+
+        return guess
+
+    def first_point(self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=6, **options) -> Point:
+        """Return the state near a guess (the natural state without one), as `contin.solve` does.
+
+        Raises
+        ------
+        ProblemError
+            Nothing determines the state, in one sentence; or no state was found.
+        """
+        if guess is None:
+            guess = self._natural_guess()
+        try:
+            point = solve(self.problem, guess, values, intervals=intervals, degree=degree, **options)
+        except ContinError as error:
+            raise ProblemError(self._reason(error)) from error
+        self.check_determined(point)
+        return point
+
+    def _natural_guess(self):
+        s = np.linspace(0, 1, 401)
+        return s, np.hstack([self.natural_states(s), np.zeros((len(s), len(self.phases)))])
+
+    def _reason(self, error: Exception) -> str:
+        text = str(error)
+        if "repeat or contradict" in text:
+            return UNDETERMINED
+        if "vanishes along a mode" in text:
+            return UNHELD
+        return text
+
+    def check_determined(self, point: Point) -> None:
+        """Raise ProblemError where something can move without a change of energy, or reactions are not determined."""
+        try:
+            found = point.second_variation()
+        except ProblemError as error:
+            raise ProblemError(self._reason(error)) from error
+        sizes = np.abs(found.eigenvalues)
+        if not sizes.size or sizes.min() > _ZERO * sizes.max():
+            return
+        if self._rigid_freedom(point):
+            raise ProblemError(
+                "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
+            )
+        raise ProblemError(UNHELD)
+
+    def _rigid_freedom(self, point: Point) -> bool:
+        """Return whether a rigid motion violates no condition at the ends."""
+        problem, states = self.problem, point.system.states(point.x)
+        n, batch = problem.dimension, problem.batch("boundary")
+        jacobian = batch.jacobian(
+            np.zeros(1), states[:1], states[-1:], point.system.all_parameters(point.x), batch.colouring([])
+        )[1][0]
+        count = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
+        by_ends = np.concatenate([jacobian[:count, :n], jacobian[:count, 2 * n : 3 * n]], axis=1)
+        motions = np.array([np.concatenate([_moved(states[i, :7], k, n) for i in (0, -1)]) for k in range(6)])
+        return int(np.linalg.matrix_rank(by_ends @ motions.T, tol=_LOOSE)) < 6
+
+    # --- where the law ends -------------------------------------------------------------------------------------------
+
+    def domain_tests(self) -> list[TestFunction]:
+        """Return the test function that ends a run where the law ends; none for a law that is regular everywhere."""
+        law = self.material.of_paper
+        margin = {RIBBON.name: self._ribbon_margin, FINITE_WIDTH.name: self._convexity}.get(law.name) if law else None
+        return [TestFunction("EP", LAW_ENDS[law.name], margin, terminal=True)] if margin else []
+
+    def explained(self, run) -> str:
+        """Return why a run failed: the end of the law where its state is near it, else the run's own reason."""
+        for test in self.domain_tests():
+            state = run.state
+            if test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
+                return test.name
+        return str(run.stop)
+
+    def _ribbon_margin(self, trial: Trial) -> float:
+        """Return the least M1 + (1 + nu) kappa_n at the nodes, over the largest: the law holds where it is positive.
+
+        With p and a of `ribbon_hamiltonian`, the two roots a belong to omega_1 of either sign, and their H differ by
+        sqrt(p**2 + M3**2) (p + 2 nu kappa_n)/2. Where that is negative, bending to the other side lowers the energy at this
+        moment: strips with an inflection of this kind need the width.
+        """
+        system, x = trial.system, trial.x
+        states, p = system.states(x), _Numbers(dict(zip(system.problem.parameters, system.all_parameters(x))))
+        natural, n = self.material.datum("kappa_n"), self.problem.dimension
+        kappa_n = np.array([natural(t, p) for t in system.nodes])
+        moments = _components(states.T[:4], states.T[n : n + 4])[0]
+        values = moments + (1 + p.nu) * kappa_n
+        return float(values.min() / max(abs(values).max(), _LOOSE))
+
+    def _convexity(self, trial: Trial) -> float:
+        """Return the least det D2U/(U_11 U_33) at the nodes and halfway between: positive where U is convex."""
+        system, x = trial.system, trial.x
+        p = _Numbers(dict(zip(system.problem.parameters, system.all_parameters(x))))
+        omega = self.strains(system, x)
+        if not np.all(np.isfinite(omega)):
+            return -1.0
+        places = np.concatenate([omega, (omega[1:] + omega[:-1]) / 2])
+        t = np.concatenate([system.nodes, (system.nodes[1:] + system.nodes[:-1]) / 2])
+        data = [self.material.datum(name) for name in ("kappa_n", "width", "thickness")]
+        least = math.inf
+        for s, (w1, _, w3) in zip(t, places):
+            kappa_n, width, thickness = (datum(s, p) for datum in data)
+            here = _Numbers({"kappa_n": kappa_n, "nu": p.nu, "Gamma": p.Gamma * width**2 / thickness})
+            U11, U13, U33 = FINITE_WIDTH.curvatures_at(w1, w3, here)
+            least = min(least, (U11 * U33 - U13**2) / (U11 * U33) if U11 > 0 and U33 > 0 else -1.0)
+        return least
+
+    # --- what a state is ----------------------------------------------------------------------------------------------
+
+    def reactions(self, point: Point) -> dict[str, float]:
+        """Return the force and the moment on the strip at the last end, then at the first one, on the lab axes."""
+        states = point.system.states(point.x)
+        n = self.problem.dimension
+        values = []
+        for row, sign in ((states[-1], 1.0), (states[0], -1.0)):
+            q, lam = row[:4], row[n : n + 7]
+            values += [*(sign * lam[4:7]), *(sign * _moment(q, lam[:4]))]
+        return dict(zip(REACTIONS, map(float, values)))
+
+    def strains(self, system: Collocation, x: np.ndarray) -> np.ndarray:
+        """Return omega_1, omega_2 and omega_3 (K, 3) at the nodes of a discretized state."""
+        u = system.states(x)
+        return strains_of(u[:, :4], self.problem.batch("field").values(system.nodes, u, u[:0], system.all_parameters(x)))
+
+    def shape(self, point: Point) -> Shape:
+        """Return the strip in space, of length 1."""
+        return shape_of(point.system.nodes, point.system.states(point.x), self.strains(point.system, point.x))
+
+
+#: Why a run ends where its law does.
+LAW_ENDS = {
+    RIBBON.name: "the end of the law 'ribbon', which has no value where the bending vanishes (omega_1 -> 0); the law "
+    "'finite width' goes on",
+    FINITE_WIDTH.name: "the end of the law 'finite width', whose energy is not convex at larger twist; the law 'flat rod' "
+    "goes on",
+}
+#: A run that fails with a smaller margin of its law has met the end of it. The margin falls like a square root there.
+_NEARLY_ENDED = 0.1
+#: Why a state is not determined.
+UNHELD = (
+    "ends: the strip can move, turn about itself or change its shape without a change of energy, so nothing determines its "
+    "state; hold more, or give one of the phases " + ", ".join(map(repr, PHASES))
+)
+#: Why reactions are not determined.
+UNDETERMINED = (
+    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip that does "
+    "not bend in its plane is held sideways at both ends); begin with an arch, a twist or a softness, or hold less"
+)
+#: Place of the last end from the first one, as integrals over the strip.
+_PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))
+_STRAINS = ("kappa_n", "kappa_2", "tau_n")
+
+
+def _together(names: tuple[str, ...]) -> Callable:
+    """Return the sum of these phases times their multipliers."""
+    if not names:
+        return lambda t, x, lam: 0
+    rest, last, place = _together(names[:-1]), PHASES[names[-1]], len(names) - 1
+    return lambda t, x, lam: rest(t, x, lam) + lam[place] * last(t, x)
+
+
+class _Numbers:
+    """Numbers by name as attributes, as users' functions read parameters."""
+
+    def __init__(self, values: Mapping[str, float]):
+        self.__dict__.update(values)
+
+
+def strains_of(q: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Return strains (K, 3) from quaternions (K, 4) and their rates: the inverse of `equilibrium.spin`."""
+    q0, q1, q2, q3 = q.T
+    r0, r1, r2, r3 = rates[:, :4].T
+    return 2 * np.array([
+        q0 * r1 - q1 * r0 - q2 * r3 + q3 * r2, q0 * r2 - q2 * r0 - q3 * r1 + q1 * r3, q0 * r3 - q3 * r0 - q1 * r2 + q2 * r1
+    ]).T  # fmt: skip
+
+
+def shape_of(t: np.ndarray, states: np.ndarray, omega: np.ndarray) -> Shape:
+    """Return the shape of states (K, >= 7) with strains (K, 3) at places t (K,)."""
+    eta = np.divide(omega[:, 2], omega[:, 0], out=np.zeros(len(t)), where=omega[:, 0] != 0)
+    return Shape(np.asarray(t), states[:, 4:7], frames(states), eta)
+
+
+def _components(q, lam) -> np.ndarray:
+    """Return the moment on the directors, shape (3, ...), from quaternions (4, ...) and their multipliers (4, ...)."""
+    rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)
+    return np.array([sum(a * b for a, b in zip(lam, rate)) for rate in rates])
+
+
+def _moment(q, lam) -> np.ndarray:
+    """Return the moment on the lab axes from the multipliers of the quaternion."""
+    result: np.ndarray = _components(q, lam) @ np.array(directors(*q)).reshape(3, 3)
+    return result
+
+
+def _mirrored(t, x):
+    """Return the image of states under the mirror normal to the width at the start."""
+    signs = np.ones(x.shape[1])
+    signs[[2, 3, 4]] = -1.0
+    return x * signs
+
+
+def _moved(state, k: int, n: int) -> np.ndarray:
+    """Return the change of a state by a rigid translation (k < 3) or rotation about the origin, padded to n."""
+    change, axis = np.zeros(n), np.eye(3)[k % 3]
+    if k < 3:
+        change[4:7] = axis
+    else:
+        change[:4] = ends.product((0, *axis / 2), state[:4])
+        change[4:7] = np.cross(axis, state[4:7])
+    return change
+
+
+def _spanned(axis, held) -> bool:
+    """Return whether a direction lies in the span of those that are held: a force along it would do nothing."""
+    if not held:
+        return False
+    rest = np.array(axis) - np.linalg.pinv(np.array(held)) @ np.array(held) @ np.array(axis)
+    return bool(np.linalg.norm(rest) < _LOOSE)
+
+
+def _winding(material: Material) -> float:
+    """Return the whole angle by which the natural state turns about the width: the integral of kappa_n."""
+    datum, p = material.datum("kappa_n"), _Numbers(material.parameters)
+    s, weights = np.polynomial.legendre.leggauss(60)
+    return float(sum(w / 2 * datum((x + 1) / 2, p) for x, w in zip(s, weights)))
+
+
+def _euler_mode(start: End, finish: End) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the angle along a column of these ends as it buckles, up to a factor."""
+    tangent = 4.493409457909064  # the first zero of tan x = x
+    turns_start, turns_finish = (_turns_about_width(end) for end in (start, finish))
+    if not finish.held and finish.rotation == FREE:
+        return lambda s: 1 - np.cos(math.pi * s / 2)
+    if turns_start and turns_finish:
+        return lambda s: np.cos(math.pi * s)
+    if turns_finish:
+        return lambda s: tangent * np.cos(tangent * (1 - s)) - math.sin(tangent)
+    if turns_start:
+        return lambda s: tangent * np.cos(tangent * s) - math.sin(tangent)
+    return lambda s: np.sin(2 * math.pi * s)
+
+
+def _turns_about_width(end: End) -> bool:
+    """Return whether an end can turn about the width."""
+    about = end.rotation == HINGED and abs(end.axis[0]) > 1 - _LOOSE
+    return about or end.rotation in (FREE, JOINT)
