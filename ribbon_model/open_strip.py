@@ -31,8 +31,9 @@ LOADS = (*FORCES, "moment", "weight", "foundation")
 STROKE = "stroke"
 #: Conditions that fix what symmetry leaves open: the angle about the tangent (a homogeneous ring, an isotropic rod between ends
 #: on one line), the place along a closed strip that is twisted to the right or to the left, and along a ring that buckles with
-#: two waves. Each is an integral condition that holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and x2 sin(2 pi s), those with the factors -3 and 0
-#: lose their slope on the way to a Moebius band of a flat strip; with +3 they keep it.)
+#: two waves. Each is an integral condition that holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and
+#: x2 sin(2 pi s), those with the factors -3 and 0 lose their slope on the way to a Moebius band of a flat strip; with +3 they
+#: keep it.)
 PHASES = {
     "spin": lambda t, x: x.x1,
     "shift, right": lambda t, x: x.x1 + 3 * x.x2 * math.sin(2 * math.pi * t),
