@@ -206,7 +206,7 @@ class OpenConfig(Strict):
     numbers: dict[str, float] = Field(default_factory=dict)
     directions: DirectionsConfig = DirectionsConfig()
     begin: Literal["natural", "arch", "arch, other side", "twisted", "circle"] = "natural"
-    phases: list[Literal["spin", "shift, right", "shift, left"]] = Field(default_factory=list, max_length=2)
+    phases: list[Literal["spin", "shift, right", "shift, left", "shift, two waves"]] = Field(default_factory=list, max_length=2)
     stages: list[StageConfig] = Field(min_length=1, max_length=50)
     mesh: OpenMesh = OpenMesh()
     steps: StepConfig = StepConfig()

@@ -144,8 +144,15 @@ def _followed(config, strip, start: Point, writer: BranchWriter, display) -> tup
     run = None
     with Interruption() as interruption:
         for number, stage in enumerate(config.stages, 1):
-            origin = start if number == 1 else _origin(stage, number, labelled)
-            run = _run(config, strip, stage, origin)
+            try:
+                following = _run(config, strip, stage, start if number == 1 else _origin(stage, labelled))
+            except ConfigError as error:
+                if run is None:
+                    raise
+                stop = Stop("scene", f"stage {number}: {error}")
+                writer.checkpoint(run.start, "lost", stop)
+                return "lost", stop
+            run = following
             labelled.append([])
             writer.kind.values.stage = number
             display.stage(config, number)
@@ -167,7 +174,7 @@ def _followed(config, strip, start: Point, writer: BranchWriter, display) -> tup
     return "complete", run.stop
 
 
-def _origin(stage: StageConfig, number: int, labelled: list[list[Point]]) -> Point:
+def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
     """Return the labelled point from which a stage starts.
 
     Raises
@@ -175,7 +182,7 @@ def _origin(stage: StageConfig, number: int, labelled: list[list[Point]]) -> Poi
     ConfigError
         There is none.
     """
-    source = stage.stage or number - 1
+    source = stage.stage or len(labelled)
     points = labelled[source - 1]
     if stage.start_at is None:
         return points[-1]
@@ -184,14 +191,20 @@ def _origin(stage: StageConfig, number: int, labelled: list[list[Point]]) -> Poi
     place = int(count or 1)
     if place > len(found):
         there = ", ".join(point.label for point in points)
-        raise ConfigError(f"stage {number}: start_at: {stage.start_at!r} is not among the points of stage {source}: {there}")
+        raise ConfigError(f"start_at: {stage.start_at!r} is not among the points of stage {source}: {there}")
     return found[place - 1]
 
 
 def _run(config: OpenConfig, strip: OpenStrip, stage: StageConfig, origin: Point) -> Continuation:
     """Return the run of a stage."""
     here, to = origin[stage.follow], stage.to / config.factor(stage.follow)
-    switched = isinstance(origin.details, BranchPoint) and stage.start_at is not None and stage.start_at.startswith("BP")
+    leaves = stage.start_at is not None and stage.start_at.startswith("BP")
+    switched = leaves and isinstance(origin.details, BranchPoint)
+    if leaves and not switched:
+        raise ConfigError(
+            f"start_at: {stage.start_at!r}: {origin.nullity} modes are neutral there, and no single branch leaves it; a phase "
+            "or an imperfection tells the modes apart"
+        )
     reach = abs(to - here) or 1.0
     limits = {stage.follow: (min(to, here - reach), max(to, here + reach))}
     limits |= {name: tuple(end / config.factor(name) for end in ends) for name, ends in stage.limits.items()}

@@ -30,13 +30,15 @@ LOADS = (*FORCES, "moment", "weight", "foundation")
 #: A further displacement of the last end, along ``stroke_direction``.
 STROKE = "stroke"
 #: Conditions that fix what symmetry leaves open: the angle about the tangent (a homogeneous ring, an isotropic rod between ends
-#: on one line), the place along a closed strip that is twisted to the right or to the left. Each is an integral condition that
-#: holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and x2 sin(2 pi s), those with the factors -3 and 0
-#: lose their slope on the way to a Moebius band of a flat strip; with +3 they keep it.)
+#: on one line), the place along a closed strip that is twisted to the right or to the left, and along a ring that buckles with
+#: two waves. Each is an integral condition that holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and
+#: x2 sin(2 pi s), those with the factors -3 and 0 lose their slope on the way to a Moebius band of a flat strip; with +3 they
+#: keep it.)
 PHASES = {
     "spin": lambda t, x: x.x1,
     "shift, right": lambda t, x: x.x1 + 3 * x.x2 * math.sin(2 * math.pi * t),
     "shift, left": lambda t, x: x.x1 - 3 * x.x2 * math.sin(2 * math.pi * t),
+    "shift, two waves": lambda t, x: x.x1 * math.sin(4 * math.pi * t),
 }
 #: Columns of the reactions.
 REACTIONS = tuple(

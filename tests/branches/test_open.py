@@ -169,6 +169,20 @@ def test_interrupted_and_run_again(root, tmp_path):
     assert len(read_branch(path).points) > 20
 
 
+def test_points_that_later_stages_miss(tmp_path):
+    """What was computed before is kept, and the reason is a sentence."""
+    ring = "material: {law: rod, B1: 1, B2: 1, C: 0.8}\nclosed: {half_twists: 0}\nnumbers: {turn: 13}\n"
+    ring += "begin: circle\nphases: [spin]\n"
+    stages = "stages: [{follow: turn, to: 14}, {follow: turn, to: 10, start_at: %s}]\n"
+    for start_at, sentence in (
+        ("BP 1", "stage 2: start_at: 'BP 1': 2 modes are neutral there"), ("LP 1", "stage 2: start_at: 'LP 1' is not among"),
+    ):  # fmt: skip
+        path = tmp_path / f"{start_at}.h5"
+        assert run_stages(parse(ring + stages % start_at, "scene"), path, Display(silent=True)) == "lost"
+        branch = read_branch(path)
+        assert sentence in branch.stop and set(branch.points["stage"]) == {1}
+
+
 def test_a_table_and_a_taper():
     """A table is the polynomial through its points; a strip with half the width at its tip buckles under less weight."""
     text = "material: {law: flat rod, nu: 0.3}\nfinish: free\ndirections: {weight: [-1, 0, 0]}\n"
