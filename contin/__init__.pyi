@@ -20,6 +20,7 @@ from .functions.pointwise import Pointwise
 from .names import exact_text
 from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
+from .problems.cycle import CycleProblem
 from .problems.variational import VariationalProblem
 from .results.branch import Branch
 from .results.columns import StoredColumns, read_columns
@@ -32,7 +33,7 @@ from .stepping.trial import Monitor, TestFunction, Trial
 
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
-    "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise",
+    "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise",
     "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis",
     "cache_directory", "correct", "curve", "diagram", "exact_text", "follow", "gradient", "interpolation", "load",
     "locate_branch_point", "point_of", "read_columns", "save", "sensitivities", "solve", "temporary_name", "trace",

@@ -123,16 +123,19 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
     def real_part(s: float) -> float:
         return _nearest(first + (last - first) * (s - a) / (b - a)).function(segment.at(s))
 
+    lost = ""
     try:
         at = find_zero(real_part, (a, first.real), (b, last.real), segment.precision)
-        there, name = segment.at(at), "Hopf"
+        there = segment.at(at)
     except ConvergenceError:
-        at, there, name = *right, "possible Hopf"
+        (at, there), lost = right, "possible "
     values = _upper(there)
     here = first + (last - first) * (at - a) / (b - a)
     frequency = float(values[np.argmin(np.abs(values - here))].imag)
+    system: Any = there.system
+    label, name = system.crossing(frequency)
     test = _nearest(1j * frequency)
-    return SpecialPoint(at, test.label, name, there, None, {"frequency": frequency, "pairs": 1}, test)
+    return SpecialPoint(at, label, lost + name, there, None, {"frequency": frequency, "pairs": 1}, test)
 
 
 def _pairs_at(point: SpecialPoint) -> int:

@@ -9,6 +9,7 @@ from contin.detection.hopf import hopf
 from contin.detection.second_variation import legendre
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
+from contin.discretization.cycles import CycleCollocation
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
 from contin.problems.variational import VariationalProblem
@@ -58,6 +59,11 @@ def own_test_functions(system: Discretization) -> list[TestFunction]:
 @own_test_functions.register
 def _of_boundary_value(system: Collocation) -> list[TestFunction]:
     return [legendre()] if isinstance(system.problem, VariationalProblem) else []
+
+
+@own_test_functions.register
+def _of_cycles(system: CycleCollocation) -> list[TestFunction]:
+    return [hopf()]
 
 
 @own_test_functions.register

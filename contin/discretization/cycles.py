@@ -1,0 +1,206 @@
+"""Collocation of periodic orbits: a phase condition with a moving reference, and Floquet multipliers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.discretization.collocation import Collocation
+from contin.discretization.mesh import MeshControl, adapted_mesh
+from contin.discretization.protocol import Carrier
+from contin.discretization.scales import Scales
+from contin.errors import ProblemError
+from contin.linalg.condensation import Factorization
+from contin.linalg.factors import Factors
+from contin.linalg.periodic import log_eigenvalues
+from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.cycle import CycleProblem
+
+#: A multiplier on the unit circle that is this near to -1, as an angle, is -1: round-off of a double one is its square root.
+_OPPOSITE = 1e-6
+#: The reference is renewed where an orbit differs from it by more than this part of its size.
+_MOVED = 1e-6
+
+
+class CycleCollocation(Collocation):
+    """A `CycleProblem` on a mesh.
+
+    The phase condition, the integral of u . v' over that of v' . v', is linear: one row beside the collocation equations,
+
+        [ collocation   ]        the integral is taken at the Gauss points, with v' of the piecewise polynomial v, the reference
+        [ u(0) - u(1)   ]
+        [ phase row . x ]
+
+    Parameters
+    ----------
+    reference : ndarray, shape (K, n)
+        The states of v at the nodes, in the user's units.
+    Others as in `Collocation`.
+
+    Raises
+    ------
+    ProblemError
+        The reference is constant.
+    """
+
+    problem: CycleProblem
+
+    def __init__(
+        self, problem: CycleProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        parameters: Mapping[str, float], scales: Scales | None = None, reference: Array | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, mesh, degree, free, parameters, scales)
+        self._base_equations = self.equations
+        self.equations += 1
+        self._known: dict[bytes, ComplexArray] = {}
+        if reference is None:
+            reference = np.zeros((self.nodes.size, self._n))
+        self._set_reference(reference)
+
+    def _set_reference(self, reference: Array) -> None:
+        """Take the phase row from an orbit, states at the nodes."""
+        self.reference = reference
+        states = reference if self.scales is None else reference / self.scales.states
+        rates = np.einsum("qm,jma->jqa", self.basis.slope, self._local(states))  # h v' at the Gauss points
+        size = float(np.sum(self.basis.weights[:, None] * rates**2 / self._h[:, None, None]))
+        shares = np.einsum("q,qm,jqa->jma", self.basis.weights, self.basis.value, rates)
+        row = np.zeros((self.nodes.size, self._n))
+        np.add.at(row, self._by_interval, shares)
+        self._phase = np.zeros(self.size)
+        self._phase[: self.state_size] = row.ravel() / (size or 1.0)
+
+    # --- the discrete equations ----------------------------------------------------------------------------------
+
+    def residual(self, x: Array) -> Array:
+        """Return the residual of the discrete equations at x, the phase condition last."""
+        return np.append(super().residual(x), self._phase @ x)
+
+    def _residual(self, x: Array, field: Array, boundary: Array) -> Array:
+        self.equations, whole = self._base_equations, self.equations
+        try:
+            return super()._residual(x, field, boundary)
+        finally:
+            self.equations = whole
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        phase = np.concatenate([self._phase, columns[:, -1]])
+        residual, blocks = self._blocks(x, np.vstack([phase, rows]), np.ascontiguousarray(columns[:, :-1]))
+        return np.append(residual, self._phase @ x), Factorization(self._layout, blocks)
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of the residual by any parameters, shape (equations, len(names))."""
+        columns = super().parameter_columns(x, names)
+        return np.vstack([columns, np.zeros(columns.shape[1])])
+
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,)."""
+        return super().transposed_product(x, w[:-1]) + w[-1] * self._phase
+
+    # --- columns -------------------------------------------------------------------------------------------------
+
+    def functionals(self, x: Array) -> Array:
+        """Return the largest and smallest values of each state, then the means of the user's functionals."""
+        states = self._dense(x)
+        extremes = np.stack([states.max(axis=0), states.min(axis=0)], axis=1).ravel()
+        if not self.problem.means:
+            return extremes
+        batch = self.problem.batch("functionals")
+        points = self.states_at_gauss_points(x)
+        values = batch.values(self._times, points, np.empty((0, self._n)), self.all_parameters(x))
+        return np.concatenate([extremes, self._quadrature @ values])
+
+    def _dense(self, x: Array) -> Array:
+        """Return the states at places close to each other."""
+        parts = 4 * self.degree
+        t = (self.mesh[:-1, None] + self._h[:, None] * np.linspace(0, 1, parts, endpoint=False)).ravel()
+        return self.evaluate(x, t)
+
+    # --- stability -----------------------------------------------------------------------------------------------
+
+    def transitions(self, x: Array) -> Array:
+        """Return the matrix that takes a perturbation over each interval, shape (N, n, n), states divided by their sizes."""
+        n, d, N = self._n, self._d, self.intervals
+        p, points = self._scaled_parameters(x), self.at_gauss_points(x)
+        field = self.problem.batch("field") if self.scales is None else self._field
+        colours = self.problem.batch("field").colouring([])
+        jacobian = field.jacobian(self._times, points, np.empty((0, n)), p, colours)[1][:, :n, :n].reshape(N, d, n, n)
+        matrix = np.einsum("qm,ab->qamb", self.basis.slope, np.eye(n))[None] - np.einsum(
+            "j,qm,jqab->jqamb", self._h, self.basis.value, jacobian
+        )
+        matrix = matrix.reshape(N, d * n, (d + 1) * n)
+        result: Array = np.linalg.solve(matrix[:, :, n:], -matrix[:, :, :n])[:, -n:]
+        return result
+
+    def eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable."""
+        key = x.tobytes()
+        if key not in self._known:
+            if len(self._known) > 50:
+                self._known.clear()
+            self._known[key] = log_eigenvalues(self.transitions(x))
+        return self._known[key]
+
+    def crossing(self, frequency: float) -> tuple[str, str]:
+        """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle."""
+        return ("PD", "period doubling") if abs(frequency - math.pi) < _OPPOSITE else ("TR", "torus")
+
+    # --- meshes and references -----------------------------------------------------------------------------------
+
+    def _with(self, **changes: Any) -> CycleCollocation:
+        values = dict(zip(self.problem.parameters, self.parameters))
+        kept = {"mesh": self.mesh, "free": self.free, "parameters": values, "scales": self.scales}
+        other = CycleCollocation(self.problem, degree=self.degree, **{**kept, **changes})
+        reference = self.reference
+        if other.mesh is not self.mesh and not np.array_equal(other.mesh, self.mesh):
+            reference = self._between(reference, other.nodes)
+        other._set_reference(reference)
+        return other
+
+    def _between(self, states: Array, times: Array) -> Array:
+        """Return states at the nodes, in the user's units, carried to other times."""
+        x = np.concatenate([(states if self.scales is None else states / self.scales.states).ravel(), np.zeros(len(self.free))])
+        return self.evaluate(x, times)
+
+    def with_reference(self, x: Array) -> CycleCollocation:
+        """Return the same with the orbit x as the reference.
+
+        Raises
+        ------
+        ProblemError
+            It is constant.
+        """
+        states = self.states(x)
+        if not np.ptp(states, axis=0).any():
+            raise ProblemError("guess: it is constant; a cycle needs a guess that goes round")
+        other = self._with()
+        other._set_reference(states)
+        return other
+
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
+        """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
+        mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control) if control.every else None
+        if mesh is None:
+            states = self.states(x)
+            if np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():
+                return None
+        other = self._with(mesh=self.mesh if mesh is None else mesh)
+        other._set_reference(self._between(self.states(x), other.nodes))
+        return other, self.carrier(other)
+
+
+def discretized(
+    problem: BoundaryValueProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+    parameters: Mapping[str, float], scales: Scales | None = None,
+) -> Collocation:  # fmt: skip
+    """Return a boundary value problem on a mesh: the system of its kind."""
+    kind = CycleCollocation if isinstance(problem, CycleProblem) else Collocation
+    return kind(problem, mesh, degree, free, parameters, scales)

@@ -1,0 +1,71 @@
+"""Eigenvalues of a product of matrices that is never formed: Floquet multipliers of any size, each to relative accuracy.
+
+The product P = F_N ... F_1 of transition matrices may have eigenvalues of 1e8 and 1e-16, or far beyond what numbers hold. With
+orthogonal Q_j and upper triangular R_j, F_j Q_{j-1} = Q_j R_j, so
+
+    Q_0^T P Q_0 = (Q_0^T Q_N) (R_N ... R_1).
+
+Repeated with Q_N as the next Q_0 (orthogonal iteration; Lust 2001 begins in the same way), Q_0^T Q_N becomes block diagonal,
+with a block for each group of eigenvalues of similar size. The product of the triangular matrices is taken block by block, its
+size kept as a logarithm, so that groups of very different size do not meet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+
+#: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the eigenvalues of
+#: a block with such a spread are accurate.
+_APART = 1e4
+#: Below this the coupling of two groups is round-off; at most so many rounds.
+_COUPLED, _ROUNDS = 1e-14, 60
+
+
+def log_eigenvalues(factors: Array) -> ComplexArray:
+    """Return the logarithms of the eigenvalues of F_N ... F_1, shape (n,), largest first; ``factors`` is (N, n, n), F_1 first.
+
+    The imaginary part is in (-pi, pi]; a zero eigenvalue gives -inf.
+
+    Examples
+    --------
+    >>> print(log_eigenvalues(np.array([np.diag([1e200, 1e-200]), np.diag([1e200, -1e-200])])).round(3))
+    [ 921.034+0.j    -921.034+3.142j]
+    """
+    n = factors.shape[-1]
+    start = np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0]
+    for _ in range(_ROUNDS):
+        end, triangles = _round(factors, start)
+        sizes = np.log(np.maximum(np.abs(triangles[:, range(n), range(n)]), np.finfo(float).tiny)).sum(axis=0)
+        coupling = start.T @ end
+        apart = [i for i in range(1, n) if sizes[i - 1] - sizes[i] > np.log(_APART)]
+        if all(np.abs(coupling[i:, :i]).max() < _COUPLED for i in apart):
+            break
+        start = end
+    found = [_of_block(coupling[a:b, a:b], triangles[:, a:b, a:b]) for a, b in zip([0, *apart], [*apart, n])]
+    values = np.concatenate(found)
+    return values[np.argsort(-values.real, kind="stable")]
+
+
+def _round(factors: Array, start: Array) -> tuple[Array, Array]:
+    """Return Q_N and all R_j (N, n, n)."""
+    q, triangles = start, np.empty(factors.shape)
+    for j, factor in enumerate(factors):
+        q, triangles[j] = np.linalg.qr(factor @ q)
+    return q, triangles
+
+
+def _of_block(coupling: Array, triangles: Array) -> ComplexArray:
+    """Return the logarithms of the eigenvalues of a block of ``coupling`` times the product of ``triangles``."""
+    product, size = np.eye(len(coupling)), 0.0
+    for triangle in triangles:
+        product = triangle @ product
+        largest = np.abs(product).max()
+        if largest == 0:
+            return np.full(len(coupling), -np.inf + 0j)
+        product /= largest
+        size += np.log(largest)
+    with np.errstate(divide="ignore"):
+        logs: ComplexArray = np.log(np.linalg.eigvals(coupling @ product).astype(complex)) + size
+    return logs
