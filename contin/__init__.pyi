@@ -1,4 +1,5 @@
 # The public names, and where they come from. `import contin` loads none of them: each is imported when it is first used.
+from .analysis.cycles import cycle
 from .analysis.diagram import Diagram, diagram
 from .analysis.sensitivity import sensitivities
 from .analysis.solving import solve
@@ -35,7 +36,7 @@ __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
     "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise",
     "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis",
-    "cache_directory", "correct", "curve", "diagram", "exact_text", "follow", "gradient", "interpolation", "load",
+    "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow", "gradient", "interpolation", "load",
     "locate_branch_point", "point_of", "read_columns", "save", "sensitivities", "solve", "temporary_name", "trace",
     "write_whole",
 ]  # fmt: skip

@@ -19,6 +19,8 @@ from contin.arrays import Array, ComplexArray
 #: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the eigenvalues of
 #: a block with such a spread are accurate.
 _APART = 1e4
+#: Matrices of a smaller condition number are multiplied with each other as they are.
+_WELL = 30.0
 #: Below this the coupling of two groups is round-off; at most so many rounds.
 _COUPLED, _ROUNDS = 1e-14, 60
 
@@ -33,7 +35,7 @@ def log_eigenvalues(factors: Array) -> ComplexArray:
     >>> print(log_eigenvalues(np.array([np.diag([1e200, 1e-200]), np.diag([1e200, -1e-200])])).round(3))
     [ 921.034+0.j    -921.034+3.142j]
     """
-    n = factors.shape[-1]
+    n, factors = factors.shape[-1], _joined(factors)
     start = np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0]
     for _ in range(_ROUNDS):
         end, triangles = _round(factors, start)
@@ -46,6 +48,14 @@ def log_eigenvalues(factors: Array) -> ComplexArray:
     found = [_of_block(coupling[a:b, a:b], triangles[:, a:b, a:b]) for a, b in zip([0, *apart], [*apart, n])]
     values = np.concatenate(found)
     return values[np.argsort(-values.real, kind="stable")]
+
+
+def _joined(factors: Array) -> Array:
+    """Return fewer matrices with the same product: neighbours are multiplied while no digits are lost."""
+    while len(factors) > 1 and np.linalg.cond(factors).max() < _WELL:
+        pairs = factors[1::2] @ factors[: len(factors) // 2 * 2 : 2]
+        factors = np.concatenate([pairs, factors[-1:]]) if len(factors) % 2 else pairs
+    return factors
 
 
 def _round(factors: Array, start: Array) -> tuple[Array, Array]:
