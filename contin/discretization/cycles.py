@@ -22,6 +22,8 @@ from contin.problems.cycle import CycleProblem
 
 #: A multiplier on the unit circle that is this near to -1, as an angle, is -1: round-off of a double one is its square root.
 _OPPOSITE = 1e-6
+#: Logarithms of multipliers that differ by less are those of a pair; multipliers of so many orbits are kept.
+_EQUAL, _KEPT = 1e-9, 50
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
 _MOVED = 1e-6
 
@@ -126,13 +128,17 @@ class CycleCollocation(Collocation):
 
     # --- stability -----------------------------------------------------------------------------------------------
 
-    def transitions(self, x: Array) -> Array:
-        """Return the matrix that takes a perturbation over each interval, shape (N, n, n), states divided by their sizes."""
-        n, d, N = self._n, self._d, self.intervals
+    def _jacobian_of_field(self, x: Array) -> Array:
+        """Return the derivatives of T F by the states at the Gauss points, shape (N, d, n, n); states divided by their sizes."""
+        n = self._n
         p, points = self._scaled_parameters(x), self.at_gauss_points(x)
-        field = self.problem.batch("field") if self.scales is None else self._field
         colours = self.problem.batch("field").colouring([])
-        jacobian = field.jacobian(self._times, points, np.empty((0, n)), p, colours)[1][:, :n, :n].reshape(N, d, n, n)
+        jacobian: Array = self._field.jacobian(self._times, points, np.empty((0, n)), p, colours)[1][:, :n, :n]
+        return jacobian.reshape(self.intervals, self._d, n, n)
+
+    def _transitions(self, jacobian: Array) -> Array:
+        """Return the matrix that takes a perturbation over each interval, shape (N, n, n), from `_jacobian_of_field`."""
+        n, d, N = self._n, self._d, self.intervals
         matrix = np.einsum("qm,ab->qamb", self.basis.slope, np.eye(n))[None] - np.einsum(
             "j,qm,jqab->jqamb", self._h, self.basis.value, jacobian
         )
@@ -144,9 +150,15 @@ class CycleCollocation(Collocation):
         """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable."""
         key = x.tobytes()
         if key not in self._known:
-            if len(self._known) > 50:
+            if len(self._known) > _KEPT:
                 self._known.clear()
-            self._known[key] = log_eigenvalues(self.transitions(x))
+            jacobian = self._jacobian_of_field(x)
+            values = log_eigenvalues(self._transitions(jacobian))
+            total = float(self._quadrature @ np.trace(jacobian, axis1=2, axis2=3).ravel())
+            least = values.real <= values.real.min() + _EQUAL
+            # the smallest by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
+            values[least] += (total - values.real.sum()) / np.count_nonzero(least)
+            self._known[key] = values
         return self._known[key]
 
     def crossing(self, frequency: float) -> tuple[str, str]:

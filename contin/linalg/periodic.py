@@ -12,12 +12,16 @@ size kept as a logarithm, so that groups of very different size do not meet.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix, Stack, Vector
 
-#: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the eigenvalues of
-#: a block with such a spread are accurate.
+#: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the
+#: eigenvalues of a block with such a spread are accurate.
 _APART = 1e4
 #: Matrices of a smaller condition number are multiplied with each other as they are.
 _WELL = 30.0
@@ -60,22 +64,70 @@ def _joined(factors: Array) -> Array:
 
 def _round(factors: Array, start: Array) -> tuple[Array, Array]:
     """Return Q_N and all R_j (N, n, n)."""
-    q, triangles = start, np.empty(factors.shape)
-    for j, factor in enumerate(factors):
-        q, triangles[j] = np.linalg.qr(factor @ q)
+    q, triangles = start.copy(), np.zeros(factors.shape)
+    triangularize(np.ascontiguousarray(factors), q, triangles, np.empty(q.shape))
     return q, triangles
+
+
+@kernel(reorder=False)
+def triangularize(factors: Stack, q: Matrix, triangles: Stack, work: Matrix) -> None:
+    """Overwrite Q_0 by Q_N, and fill all R_j, by Gram and Schmidt's method, each vector orthogonalized twice."""
+    n = q.shape[0]
+    for j in range(factors.shape[0]):
+        for a in range(n):
+            for b in range(n):
+                work[a, b] = 0.0
+                for c in range(n):
+                    work[a, b] += factors[j, a, c] * q[c, b]
+        for b in range(n):
+            for _ in range(2):
+                for c in range(b):
+                    part = 0.0
+                    for a in range(n):
+                        part += q[a, c] * work[a, b]
+                    triangles[j, c, b] += part
+                    for a in range(n):
+                        work[a, b] -= part * q[a, c]
+            largest = 0.0  # the sum of squares may overflow
+            for a in range(n):
+                largest = max(largest, abs(work[a, b]))
+            length = 0.0
+            for a in range(n):
+                length += (work[a, b] / largest) ** 2 if largest > 0 else 0.0
+            length = largest * math.sqrt(length)
+            triangles[j, b, b] = length
+            for a in range(n):
+                q[a, b] = work[a, b] / length if length > 0 else 0.0
 
 
 def _of_block(coupling: Array, triangles: Array) -> ComplexArray:
     """Return the logarithms of the eigenvalues of a block of ``coupling`` times the product of ``triangles``."""
-    product, size = np.eye(len(coupling)), 0.0
-    for triangle in triangles:
-        product = triangle @ product
-        largest = np.abs(product).max()
-        if largest == 0:
-            return np.full(len(coupling), -np.inf + 0j)
-        product /= largest
-        size += np.log(largest)
+    product, size = np.eye(len(coupling)), np.zeros(1)
+    multiply(np.ascontiguousarray(triangles), product, size)
+    if not np.isfinite(size[0]):
+        return np.full(len(coupling), -np.inf + 0j)
     with np.errstate(divide="ignore"):
-        logs: ComplexArray = np.log(np.linalg.eigvals(coupling @ product).astype(complex)) + size
+        logs: ComplexArray = np.log(np.linalg.eigvals(coupling @ product).astype(complex)) + size[0]
     return logs
+
+
+@kernel(reorder=False)
+def multiply(triangles: Stack, product: Matrix, size: Vector) -> None:
+    """Multiply ``product`` by all upper triangular matrices, from the left; its size is kept as a logarithm in ``size``."""
+    n = product.shape[0]
+    for j in range(triangles.shape[0]):
+        largest = 0.0
+        for b in range(n):
+            for a in range(n):  # row a needs the rows below it as they were
+                value = 0.0
+                for c in range(a, n):
+                    value += triangles[j, a, c] * product[c, b]
+                product[a, b] = value
+                largest = max(largest, abs(value))
+        if largest == 0:
+            size[0] = -math.inf
+            return
+        for a in range(n):
+            for b in range(n):
+                product[a, b] /= largest
+        size[0] += math.log(largest)
