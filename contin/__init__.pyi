@@ -34,9 +34,9 @@ from .stepping.trial import Monitor, TestFunction, Trial
 
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
-    "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise",
-    "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis",
-    "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow", "gradient", "interpolation", "load",
-    "locate_branch_point", "point_of", "read_columns", "save", "sensitivities", "solve", "temporary_name", "trace",
-    "write_whole",
+    "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton",
+    "Point", "Pointwise", "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial",
+    "VariationalProblem", "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow",
+    "gradient", "interpolation", "load", "locate_branch_point", "point_of", "read_columns", "save", "sensitivities",
+    "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from contin import checks
-from contin.analysis.cycles import doubled, from_hopf
+from contin.continuation.cycle_starts import doubled, from_hopf
 from contin.continuation.run import follow
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint

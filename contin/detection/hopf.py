@@ -103,7 +103,8 @@ def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[Sp
     if not (np.any(one) or np.any(other)):
         return []
     if np.all(one == other):
-        found = [_located(segment, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
+        located = [_located(segment, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
+        found = [point for point in located if point is not None]
         if all(_pairs_at(point) >= _count_at(point, found, segment) for point in found):
             return found
     if depth == _CUTS:
@@ -113,10 +114,10 @@ def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[Sp
     return _between(segment, left, there, depth + 1) + _between(segment, there, right, depth + 1)
 
 
-def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint:
+def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint | None:
     """Return the place where the real part of an eigenvalue vanishes that has these values at two places.
 
-    The second place, named "possible", where that fails.
+    The second place, named "possible", where that fails; None where the pair turns out to be real.
     """
     (a, b), (first, last) = (left[0], right[0]), pair
 
@@ -133,7 +134,10 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
     here = first + (last - first) * (at - a) / (b - a)
     frequency = float(values[np.argmin(np.abs(values - here))].imag)
     system: Any = there.system
-    label, name = system.crossing(frequency)
+    crossing = system.crossing(there.x, frequency)
+    if crossing is None:
+        return None
+    label, name = crossing
     test = _nearest(1j * frequency)
     return SpecialPoint(at, label, lost + name, there, None, {"frequency": frequency, "pairs": 1}, test)
 

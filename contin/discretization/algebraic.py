@@ -107,7 +107,7 @@ class Algebraic(System):
         """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
         return np.linalg.eigvals(self.jacobian(x)).astype(complex, copy=False)
 
-    def crossing(self, frequency: float) -> tuple[str, str]:
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a point where a pair of eigenvalues with this frequency crosses the imaginary axis."""
         return "HB", "Hopf"
 

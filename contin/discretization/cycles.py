@@ -22,6 +22,8 @@ from contin.problems.cycle import CycleProblem
 
 #: A multiplier on the unit circle that is this near to -1, as an angle, is -1: round-off of a double one is its square root.
 _OPPOSITE = 1e-6
+#: A pair at an angle whose square is below so many times the error of the multiplier 1 may be a double one.
+_SPLIT = 100.0
 #: Logarithms of multipliers that differ by less are those of a pair; multipliers of so many orbits are kept.
 _EQUAL, _KEPT = 1e-9, 50
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
@@ -105,7 +107,8 @@ class CycleCollocation(Collocation):
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,)."""
-        return super().transposed_product(x, w[:-1]) + w[-1] * self._phase
+        product: Array = super().transposed_product(x, w[:-1]) + w[-1] * self._phase
+        return product
 
     # --- columns -------------------------------------------------------------------------------------------------
 
@@ -129,7 +132,7 @@ class CycleCollocation(Collocation):
     # --- stability -----------------------------------------------------------------------------------------------
 
     def _jacobian_of_field(self, x: Array) -> Array:
-        """Return the derivatives of T F by the states at the Gauss points, shape (N, d, n, n); states divided by their sizes."""
+        """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N, d, n, n)."""
         n = self._n
         p, points = self._scaled_parameters(x), self.at_gauss_points(x)
         colours = self.problem.batch("field").colouring([])
@@ -161,8 +164,14 @@ class CycleCollocation(Collocation):
             self._known[key] = values
         return self._known[key]
 
-    def crossing(self, frequency: float) -> tuple[str, str]:
-        """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle."""
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle.
+
+        None where the pair may be a double multiplier 1 (at a fold): an error e of the one that is 1 splits it by sqrt(e).
+        """
+        trivial = float(np.abs(np.expm1(self.eigenvalues(x))).min())
+        if frequency**2 < _SPLIT * trivial:
+            return None
         return ("PD", "period doubling") if abs(frequency - math.pi) < _OPPOSITE else ("TR", "torus")
 
     # --- meshes and references -----------------------------------------------------------------------------------
@@ -214,5 +223,6 @@ def discretized(
     parameters: Mapping[str, float], scales: Scales | None = None,
 ) -> Collocation:  # fmt: skip
     """Return a boundary value problem on a mesh: the system of its kind."""
-    kind = CycleCollocation if isinstance(problem, CycleProblem) else Collocation
-    return kind(problem, mesh, degree, free, parameters, scales)
+    if isinstance(problem, CycleProblem):
+        return CycleCollocation(problem, mesh, degree, free, parameters, scales)
+    return Collocation(problem, mesh, degree, free, parameters, scales)

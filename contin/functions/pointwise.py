@@ -47,8 +47,8 @@ class Pointwise:
     ...     return (w[0] - (w[0] + w[0] ** 3 - u.u) / (1 + 3 * w[0] * w[0]),)
     >>> batch = Batch([Pointwise(rate, solve)], [1], ["u"], [])
     >>> values, jacobian = batch.jacobian(np.zeros(1), np.array([[10.0]]), np.empty((0, 1)), np.empty(0), batch.colouring([]))
-    >>> values[0, 0], 1 / jacobian[0, 0, 0]  # 2 + 2**3 = 10, and 1 + 3 * 2**2
-    (2.0, 13.0)
+    >>> print(values[0, 0], 1 / jacobian[0, 0, 0])  # 2 + 2**3 = 10, and 1 + 3 * 2**2
+    2.0 13.0
     """
 
     function: Function

@@ -49,7 +49,9 @@ class CycleProblem(BoundaryValueProblem):
     ...     square = u.x**2 + u.y**2
     ...     return p.mu * u.x - u.y - u.x * square, u.x + p.mu * u.y - u.y * square
     >>> problem = CycleProblem(field, ["x", "y"], {"mu": 0.25})
-    >>> orbit = contin.solve(problem, lambda t: (0.6 * math.cos(2 * math.pi * t), 0.6 * math.sin(2 * math.pi * t)), {"period": 6})
+    >>> def guess(t):
+    ...     return 0.6 * math.cos(2 * math.pi * t), 0.6 * math.sin(2 * math.pi * t)
+    >>> orbit = contin.solve(problem, guess, {"period": 6})
     >>> print(round(orbit["period"] / math.pi, 10), round(orbit["max_x"], 10))
     2.0 0.5
     """
