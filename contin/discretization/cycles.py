@@ -26,6 +26,8 @@ _OPPOSITE = 1e-6
 _SPLIT = 100.0
 #: Logarithms of multipliers that differ by less are those of a pair; multipliers of so many orbits are kept.
 _EQUAL, _KEPT = 1e-9, 50
+#: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
+_SHRUNK = 1e-7
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
 _MOVED = 1e-6
 
@@ -173,6 +175,11 @@ class CycleCollocation(Collocation):
         if frequency**2 < _SPLIT * trivial:
             return None
         return ("PD", "period doubling") if abs(frequency - math.pi) < _OPPOSITE else ("TR", "torus")
+
+    def has_shrunk(self, x: Array) -> bool:
+        """Return whether an orbit is an equilibrium, up to the square root of round-off."""
+        states = self._scaled_states(x)
+        return bool(np.all(np.ptp(states, axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
 
     # --- meshes and references -----------------------------------------------------------------------------------
 

@@ -132,3 +132,40 @@ def test_doublings_of_roessler():
 def test_what_is_refused(statement, words):
     with pytest.raises(ProblemError, match=words):
         statement()
+
+
+def test_a_branch_between_two_hopf_points_ends_at_the_second():
+    """Growth mu (1 - mu) - r**2: Hopf points at 0 and 1. The first and the last point have no size and the period 2 pi."""
+
+    def field(u, p):
+        growth = p.mu * (1 - p.mu) - u.x**2 - u.y**2
+        return growth * u.x - u.y - 0.3 * u.x * u.y, u.x + growth * u.y
+
+    line = contin.solve(AlgebraicProblem(field, ["x", "y"], {"mu": -0.5}), [0, 0])
+    first = contin.trace(line, free=["mu"], limits={"mu": (-0.5, 2)}).labelled("HB")[0]
+    cycles = contin.trace(first, branch=1, limits={"mu": (-1, 2)})
+    assert [point.label for point in cycles if point.label] == ["HB", "HB"] and cycles.stop.reason == "Hopf"
+    end = cycles.points[-1]
+    assert end["mu"] == pytest.approx(1, abs=1e-10) and end["period"] == pytest.approx(2 * math.pi, abs=1e-9)
+    assert end["max_x"] - end["min_x"] < 1e-9
+
+
+def test_a_torus_bifurcation():
+    """The cycle r = 1 of r' = r - r**3 in a plane, and beside it w' = (mu + i a) w: multipliers exp(2 pi (mu +- i a))."""
+
+    def field(u, p):
+        square = u.x**2 + u.y**2
+        damping = u.a**2 + u.b**2
+        return (
+            u.x - u.y - u.x * square, u.x + u.y - u.y * square,
+            p.mu * u.a - 0.3 * u.b - u.a * damping, 0.3 * u.a + p.mu * u.b - u.b * damping,
+        )  # fmt: skip
+
+    problem = CycleProblem(field, ["x", "y", "a", "b"], {"mu": -0.2})
+    orbit = contin.solve(
+        problem, lambda t: (math.cos(2 * math.pi * t), math.sin(2 * math.pi * t), 0, 0), {"period": 6.0}, degree=6
+    )
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (-0.2, 0.2)})
+    (torus,) = branch.labelled("TR")
+    assert torus["mu"] == pytest.approx(0, abs=1e-10)
+    assert torus.details["frequency"] == pytest.approx(2 * math.pi * 0.3, abs=1e-8)
