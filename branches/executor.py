@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import concurrent.futures as futures
 import contextlib
+import functools
 import math
 import multiprocessing
 import multiprocessing.connection
@@ -61,7 +62,7 @@ def executor(
     except (OSError, ValueError) as error:
         raise ExecutorError(f"--scheduler {scheduler!r}: no Dask scheduler answers there") from error
     with client:
-        yield client.get_executor().submit, first_done, max(1, sum(client.nthreads().values()))
+        yield functools.partial(client.get_executor().submit, _alone), first_done, max(1, sum(client.nthreads().values()))
 
 
 def first_done(running: Iterable[futures.Future]) -> set[futures.Future]:
@@ -171,7 +172,7 @@ def _work(pipe) -> None:
     while True:
         function, job = pipe.recv()
         try:
-            answer = pickle.dumps((True, function(job)))
+            answer = pickle.dumps((True, _alone(function, job)))
         except Exception as error:
             answer = pickle.dumps((False, _sendable(error)))
         pipe.send_bytes(answer)
@@ -200,6 +201,12 @@ def cores() -> int:
 def _start_method() -> str:
     """Return how processes start: forks have the compiled kernels; outside Linux they are not safe or not available."""
     return "fork" if sys.platform.startswith("linux") else "spawn"
+
+
+def _alone(function: Callable[[Any], Any], job: Any) -> Any:
+    """Return ``function(job)``, computed by one thread: other cores have jobs of their own."""
+    os.environ["CONTIN_THREADS"] = "1"
+    return function(job)
 
 
 def _begin_worker():

@@ -1,6 +1,6 @@
 """Time contin and other tools on your machine: pictures, a table of ratios, and every number as JSON.
 
-    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [stress] [--quick] [--out DIR]
+    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [stress] [cores] [--quick] [--out DIR]
 
 Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A tool
 that is not installed is left out, and the output names it. See docs/performance.md.
@@ -22,7 +22,7 @@ from benchmarks.measure import ONE_THREAD  # noqa: E402  (it imports nothing tha
 
 os.environ.update(ONE_THREAD)
 
-PARTS = ("like-for-like", "fold", "cost", "startup", "stress")
+PARTS = ("like-for-like", "fold", "cost", "startup", "stress", "cores")
 
 
 def arguments(argv=None) -> argparse.Namespace:
@@ -52,7 +52,7 @@ def arguments(argv=None) -> argparse.Namespace:
 
 def measure(part: str, quick: bool, bifpy_python: str) -> dict:
     """Run one part."""
-    from benchmarks import cost, fold, like_for_like, startup, stress
+    from benchmarks import cores, cost, fold, like_for_like, startup, stress
 
     from ribbon_model import exact
 
@@ -63,6 +63,8 @@ def measure(part: str, quick: bool, bifpy_python: str) -> dict:
     if part == "stress":
         return stress.run(quick)
     exact_fold = exact.folds(1, 2)[0].kappa_n
+    if part == "cores":
+        return cores.run(quick, exact_fold)
     if part == "fold":
         return fold.run(quick, bifpy_python, exact_fold, budget=30 if quick else 150)
     return like_for_like.run(quick, bifpy_python, exact_fold)
@@ -71,7 +73,7 @@ def measure(part: str, quick: bool, bifpy_python: str) -> dict:
 def main(argv=None) -> int:
     """Run the requested parts, and write the results."""
     options = arguments(argv)
-    from benchmarks import like_for_like, report
+    from benchmarks import cores, like_for_like, report
     from benchmarks.measure import machine
 
     results, out = {"machine": machine()}, Path(options.out)
@@ -90,6 +92,8 @@ def main(argv=None) -> int:
     if "like-for-like" in results:
         ratio = like_for_like.ratio(results["like-for-like"])
         print(f"ratio per point, AUTO-07p / contin: {'AUTO-07p is not installed' if ratio is None else f'{ratio:.2f}'}")
+    if "cores" in results:
+        print(f"ratio for the long branch, one thread / two: {cores.ratio(results['cores']):.2f}")
     return 0
 
 

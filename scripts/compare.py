@@ -43,7 +43,14 @@ EXCLUDED_ATTRIBUTES = ("versions", "platform")
 CLOCK = re.compile(r"\bin \d+\.\d+ s$", re.MULTILINE)
 #: Fields of a point's discretization that are recorded.
 OF_SYSTEM = ("mesh", "degree")
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+ONE_THREAD = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "CONTIN_THREADS",
+)
 #: Number of processes, and largest number of lines that a comparison prints.
 PROCESSES, MOST_LINES = 2, 40
 USAGE = "usage: compare.py record OUT.npz, or compare.py A.npz B.npz"

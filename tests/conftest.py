@@ -7,7 +7,7 @@ import pytest
 
 # Set before numpy is imported, and for the processes that tests start: there is a test for every core, and where threads of
 # linear algebra wait for a busy one, matrices as small as these take thirty times as long.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "CONTIN_THREADS"):
     os.environ.setdefault(_name, "1")
 
 ROOT = Path(__file__).parent.parent

@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from contin import threads
 from contin.arrays import Array
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.inspection import Inspection, Start
@@ -128,6 +129,7 @@ class Continuation:
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
     def _check(self, system: Discretization) -> None:
+        threads.count()  # refuses a wrong number, also where the problem is too small to use it
         if len(system.free) != system.problem.free_size:
             raise ProblemError(
                 f"free parameters: {len(system.free)} given ({', '.join(system.free)}), a curve of this problem needs "

@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Stack, Vector, helper
+from contin.linalg.elimination import Range
 from contin.linalg.layout import Blocks, Layout
+from contin.linalg.segments import Share
 from contin.linalg.vector import scale_into
 
 
@@ -58,13 +60,22 @@ class Tables(NamedTuple):
     weights: Vector
 
 
+class Bordering(NamedTuple):
+    """What stands around the derivatives: ``columns`` (c, equations) and ``rows`` (r, unknowns + c)."""
+
+    columns: Matrix
+    rows: Matrix
+
+
 @helper(inline=True)
-def _fill_collocation(layout: Layout, tables: Tables, h: Vector, jacobian: Stack, columns: Matrix, local: Stack) -> None:
-    """Fill the collocation rows of all intervals."""
+def _fill_collocation(
+    layout: Layout, tables: Tables, h: Vector, part: Range, jacobian: Stack, columns: Matrix, local: Stack
+) -> None:
+    """Fill the collocation rows of some intervals."""
     offsets, follows, starts, value, slope = layout.offsets, layout.follows, layout.starts, tables.value, tables.slope
     d, n, groups, c = tables.weights.size, layout.order.size, layout.offsets.size - 1, columns.shape[0]
     inner, rest, k = n * (d - 1), n * (d + 1), jacobian.shape[2] - n
-    for j in range(h.size):
+    for j in range(part.first, part.last):
         for g in range(groups):
             first, last = offsets[g], offsets[g + 1]
             for place in range(d * first, d * last):
@@ -112,11 +123,11 @@ def _fill_corner(boundary_end: int, columns: Matrix, rows: Matrix, corner: Matri
 
 
 @helper(inline=True)
-def _fill_integrals(layout: Layout, tables: Tables, h: Vector, jacobian: Stack, border: Stack, corner: Matrix) -> None:
-    """Fill each interval's share of the integral conditions, and add up their derivatives by the parameters."""
+def _fill_integrals(layout: Layout, tables: Tables, h: Vector, part: Range, jacobian: Stack, border: Stack) -> None:
+    """Fill the share of some intervals in the integral conditions."""
     offsets, groups, value, weights = layout.offsets, layout.offsets.size - 1, tables.value, tables.weights
     n, d, starts = layout.order.size, weights.size, layout.starts
-    for j in range(h.size):
+    for j in range(part.first, part.last):
         for q in range(jacobian.shape[1] - n):
             for b in range(border.shape[2]):
                 border[j, q, b] = 0.0
@@ -127,17 +138,26 @@ def _fill_integrals(layout: Layout, tables: Tables, h: Vector, jacobian: Stack, 
                         first = starts[g, node]
                         for b in range(offsets[g + 1] - offsets[g]):
                             border[j, q, first + b] += share * value[i, node] * point[offsets[g] + b]
-                for b in range(jacobian.shape[2] - n):
-                    corner[q, b] += share * point[n + b]
 
 
 @helper(inline=True)
-def _fill_rows(layout: Layout, rows: Matrix, border: Stack) -> None:
-    """Fill each interval's share of the extra rows: its nodes without the right end, which only the last interval has."""
+def _add_integrals(n: int, weights: Vector, h: Vector, jacobian: Stack, corner: Matrix) -> None:
+    """Add up the derivatives of the integral conditions by the parameters."""
+    d = weights.size
+    for j in range(h.size):
+        for q in range(jacobian.shape[1] - n):
+            for i in range(d):
+                for b in range(jacobian.shape[2] - n):
+                    corner[q, b] += weights[i] * h[j] * jacobian[j * d + i, n + q, n + b]
+
+
+@helper(inline=True)
+def _fill_rows(layout: Layout, rows: Matrix, part: Range, border: Stack) -> None:
+    """Fill the share of some intervals in the extra rows: nodes without the right end, which only the last interval has."""
     n, inner, intervals = layout.order.size, layout.inside.size, border.shape[0]
     d = inner // n + 1
     integrals = border.shape[1] - rows.shape[0]
-    for j in range(intervals):
+    for j in range(part.first, part.last):
         for q in range(rows.shape[0]):
             target, source = border[j, integrals + q], rows[q, j * d * n :]
             for b in range(inner):
@@ -165,7 +185,7 @@ def _fill_boundary(boundary_start: int, derivatives: Matrix, columns: Matrix, fi
 
 @kernel(reorder=False)
 def assemble(
-    layout: Layout, tables: Tables, h: Vector, jacobian: Stack, at_ends: Stack, columns: Matrix, rows: Matrix, blocks: Blocks
+    layout: Layout, tables: Tables, h: Vector, jacobian: Stack, at_ends: Stack, around: Bordering, blocks: Blocks, share: Share
 ) -> None:
     """Fill the blocks of the matrix [[F_x, columns^T], [rows]], with the differential equations scaled by h.
 
@@ -194,13 +214,19 @@ def assemble(
         Derivatives of rhs and integrands at the Gauss points, by the states in the layout's order and the free parameters.
     at_ends : ndarray, shape (1, n_bc, 2 n + k)
         Derivatives of the boundary conditions by the states, in their own order, at both ends and the free parameters.
-    columns, rows : ndarray, shapes (c, equations) and (r, unknowns + c)
+    around : Bordering
     blocks : Blocks
         Filled.
+    share : Share
+        The first stage fills the rows of intervals, the second one all other parts.
     """
-    collocation = h.size * layout.rows.size
-    _fill_collocation(layout, tables, h, jacobian, columns, blocks.local)
-    _fill_corner(collocation + blocks.first.shape[0], columns, rows, blocks.corner)
-    _fill_integrals(layout, tables, h, jacobian, blocks.border, blocks.corner)
-    _fill_rows(layout, rows, blocks.border)
-    _fill_boundary(collocation, at_ends[0], columns, blocks.first, blocks.last)
+    collocation, columns = h.size * layout.rows.size, around.columns
+    if share.stage != 1:
+        part = Range(share.starts[share.first], share.starts[share.last])
+        _fill_collocation(layout, tables, h, part, jacobian, columns, blocks.local)
+        _fill_integrals(layout, tables, h, part, jacobian, blocks.border)
+        _fill_rows(layout, around.rows, part, blocks.border)
+    if share.stage != 0:
+        _fill_corner(collocation + blocks.first.shape[0], columns, around.rows, blocks.corner)
+        _add_integrals(layout.order.size, tables.weights, h, jacobian, blocks.corner)
+        _fill_boundary(collocation, at_ends[0], columns, blocks.first, blocks.last)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.discretization.assembly import Tables, assemble, at_points, collocate
+from contin.discretization.assembly import Bordering, Tables, assemble, at_points, collocate
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier, Discretization
@@ -25,6 +25,7 @@ from contin.functions.colouring import Colouring
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks, Layout, layout
+from contin.linalg.segments import run, share
 from contin.problems.boundary_value import BoundaryValueProblem
 
 
@@ -192,7 +193,8 @@ class Collocation(System):
             np.empty((conditions, n)), np.empty((conditions, n + k + c)),
         )  # fmt: skip
         tables = Tables(self.basis.value, self.basis.slope, self.basis.weights)
-        assemble(self._layout, tables, self._h, jacobian, ends, columns, rows, blocks)
+        given = self._layout, tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
+        run(assemble, given, share(self.intervals, blocks.local.size), (True, False))
         return self._residual(x, field, boundary), blocks
 
     def linearize(

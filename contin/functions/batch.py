@@ -8,13 +8,16 @@ edit of a constant or of a helper in another file compiles anew.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import time
 from collections import namedtuple
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from contin import threads
 from contin.arrays import Array, Function, Indices, Pattern
 from contin.errors import ProblemError
 from contin.functions.colouring import Colouring, colouring
@@ -34,6 +37,7 @@ def evaluate(
     for i in range(u.shape[0]):
 {real}
 {between}
+        jac[i] = 0.0
         for colour in range(owner.shape[0]):
             for s in range(inputs[colour], inputs[colour + 1]):
                 work[inputs[s]] = STEP
@@ -106,22 +110,30 @@ class Batch:
             rewriter.function(solve)
         source = _source(self.signature, functions, counts)
         rewriter.note(source, self.signature.states, self.signature.parameters)
+        self._seconds: dict[int, float] = {}  # a place takes, by the number of colours
         self._evaluate = _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
         out = np.empty((len(u), self.count))
         try:
-            self._evaluate(t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN)
+            if len(u) < _MANY:
+                self._evaluate(t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN)
+            else:
+                self._evaluate_many((t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN))
         except Raised as error:
             raise error.exception() from None
         return out
 
     def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
         """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
-        out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, colours.width))
+        out, jac = np.empty((len(u), self.count)), np.empty((len(u), self.count, colours.width))
+        work = np.zeros(self.signature.inputs + self.count)
         try:
-            self._evaluate(t, u, v, p, colours.inputs, colours.owner, np.zeros(self.signature.inputs + self.count), out, jac)
+            if len(u) < _MANY:
+                self._evaluate(t, u, v, p, colours.inputs, colours.owner, work, out, jac)
+            else:
+                self._evaluate_many((t, u, v, p, colours.inputs, colours.owner, work, out, jac))
         except Raised as error:
             exception = error.exception()
             if not isinstance(exception, ZeroDivisionError):
@@ -129,6 +141,23 @@ class Batch:
             out.fill(np.nan)  # the quotient of real numbers is infinite there, that of complex ones an error
             jac.fill(np.nan)
         return out, jac
+
+    def _evaluate_many(self, given: _Arguments) -> None:
+        """Call the kernel for many places, in several threads where one took long before.
+
+        Raises
+        ------
+        Raised
+            What one call for all places raises: the same for any number of threads.
+        """
+        count, kind = len(given[1]), len(given[5])
+        if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
+            with contextlib.suppress(Raised):  # parts are not in the order of one call
+                threads.each(lambda part: self._evaluate(*part), _divided(given))
+                return
+        began = time.perf_counter()
+        self._evaluate(*given)
+        self._seconds[kind] = (time.perf_counter() - began) / count
 
     def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:
         """Return the colouring for derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters."""
@@ -147,6 +176,21 @@ class Batch:
 #: Stand for a colouring and a Jacobian that are not asked for.
 _NO_INPUTS, _NO_OWNER, _NO_WORK = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0)
 _NO_JACOBIAN = np.empty((0, 0, 0))
+#: Fewer places are evaluated by one thread, and not timed. Ten times fewer would hardly ever take long.
+_MANY = 256
+#: So are those that take fewer seconds. Ten times fewer would be the time that it takes to wake another thread.
+_LONG = 0.5e-3
+#: Parts that several threads share: more than cores usually, so that a core that is busy with something else gets fewer.
+_PARTS = 16
+#: The arguments of the generated kernel.
+_Arguments = tuple[Array, Array, Array, Array, Indices, Indices, Array, Array, Array]
+
+
+def _divided(given: _Arguments) -> list[_Arguments]:
+    """Return the kernel's arguments for all places in `_PARTS` parts, each with work space of its own."""
+    t, u, v, p, inputs, owner, work, out, jac = given
+    ends = [len(u) * i // _PARTS for i in range(_PARTS + 1)]
+    return [(t[a:b], u[a:b], v[a:b], p, inputs, owner, work.copy(), out[a:b], jac[a:b]) for a, b in zip(ends, ends[1:])]
 
 
 def _source(signature: Signature, functions: Sequence[Function], counts: Sequence[int]) -> str:

@@ -1,10 +1,13 @@
 """Factorization of the matrix of a collocation step by condensation, with partial pivoting throughout.
 
-The matrix is drawn in `contin.linalg.layout.Blocks`. It is eliminated in three stages:
+The matrix is drawn in `contin.linalg.layout.Blocks`. It is eliminated in four stages:
 
 1. in each interval, the interior unknowns, group by group (`Layout`); the border rows are reduced along with it;
-2. the mesh points 1 ... N - 1, one after the other, each from the 2 n rows that contain it; border rows as before;
-3. the dense rest: first and last mesh point and the parameters.
+2. in each segment, the mesh points inside, one after the other, each from the 2 n rows that contain it; border rows as before;
+3. the mesh points between segments, likewise: n rows are left of each segment;
+4. the dense rest: first and last mesh point and the parameters.
+
+A matrix that is not large is one segment (`contin.linalg.segments`): the third stage is empty.
 
 This is the scheme of de Boor & Weiss (1980) in the order that AUTO uses. It takes N (n d)^3 operations and N (n d)^2 numbers;
 solves with the matrix and with its transpose only substitute, in `contin.linalg.substitution`.
@@ -12,6 +15,7 @@ solves with the matrix and with its transpose only substitute, in `contin.linalg
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -19,6 +23,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.linalg.elimination import Eliminated, factorize
 from contin.linalg.layout import Blocks, Layout
+from contin.linalg.segments import Share, run, share
 from contin.linalg.substitution import solve, solve_transposed, work_size
 from contin.linalg.vector import LANES
 
@@ -49,14 +54,23 @@ class Factorization:
         size = 2 * n + k
         if n + conditions + r != size:
             raise ValueError(f"{conditions} boundary conditions and {r} border rows for {n} states and {k} parameters")
-        self._layout = layout
+        self._layout, self._whole = layout, share(intervals, local.size)
         self._factors = Eliminated(
             local, border, np.empty((max(intervals - 1, 0), 2 * n + r, n + size)), np.empty((size, size)),
             np.empty((intervals, rows), np.int64), np.empty(size, np.int64),
         )  # fmt: skip
-        self._unknowns, self._work_size = intervals * rows + n + k, work_size(intervals, rows, n, r, size)
+        segments = self._whole.last
+        self._unknowns = intervals * rows + n + k
+        self._work = np.empty((work_size(segments, intervals, rows, n, r, size), LANES))  # of solves, one at a time
+        carried = np.empty((segments, n + r, size))
         #: Sign of the determinant up to a factor that depends on the shape only.
-        self.sign = factorize(layout, self._factors, corner, first, last, np.empty((n + r, 2 * n + k)))
+        self.sign: float
+        if segments == 1:
+            self.sign = factorize(layout, self._factors, corner[None], first, last, carried, self._whole)
+        else:
+            corners = np.concatenate([corner[None], np.zeros((segments - 1, r, k))])
+            given = layout, self._factors, corners, first, last, carried
+            self.sign = math.prod(run(factorize, given, self._whole, (True, False)))
 
     def solve(self, b: Array) -> Array:
         """Return the x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""
@@ -66,10 +80,20 @@ class Factorization:
         """Return the y (equations,) with J^T y = c (unknowns,); for several, rows of y and c (m, ...)."""
         return self._solved(solve_transposed, c)
 
-    def _solved(self, kernel: Callable[[Layout, Eliminated, Array, Array, Array], None], given: Array) -> Array:
+    def _solved(self, kernel: Callable[[Layout, Eliminated, Array, Array, Array, Share], None], given: Array) -> Array:
         """Return the solutions that a kernel finds for one or several right-hand sides."""
         given = np.ascontiguousarray(given, dtype=float)
         rows = given.reshape(-1, self._unknowns)
         result = np.empty(rows.shape)
-        kernel(self._layout, self._factors, rows, result, np.empty((self._work_size, LANES)))
+        if self._whole.last == 1:
+            kernel(self._layout, self._factors, rows, result, self._work, self._whole)
+        else:
+            for first in range(0, len(rows), LANES):
+                these = slice(first, first + LANES)
+                run(
+                    kernel,
+                    (self._layout, self._factors, rows[these], result[these], self._work),
+                    self._whole,
+                    (True, False, True),
+                )
         return result.reshape(given.shape)

@@ -13,6 +13,7 @@ import numpy as np
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, helper
 from contin.linalg.layout import Layout
+from contin.linalg.segments import Share
 from contin.linalg.vector import (
     PANEL,
     Rows,
@@ -215,12 +216,12 @@ def _subtract_panel(rows, count, pivots, start, size, finish, tail, width):
         subtract_products(target, factors, source, width - tail, count, size)
 
 
-# --- the three stages ------------------------------------------------------------------------------------------------
+# --- the four stages -------------------------------------------------------------------------------------------------
 
 
 @helper(inline=True)
-def _eliminate_interiors(layout, work, corner):
-    """Eliminate the interior unknowns of each interval (stage 1); return the sign of the product of pivots.
+def _eliminate_interiors(layout, work, part, corner):
+    """Eliminate the interior unknowns of the intervals of a segment (stage 1); return the sign of the product of pivots.
 
     An interval's block and its border rows, before and after, for one group of states::
 
@@ -235,11 +236,11 @@ def _eliminate_interiors(layout, work, corner):
     contain its states, and from the border. The last columns of the border are the sum over the intervals so far.
     """
     local, border, offsets, follows = work.local, work.border, layout.offsets, layout.follows
-    intervals, rows, width = local.shape
+    _, rows, width = local.shape
     r, k = corner.shape
     degree, groups = rows // offsets[offsets.size - 1], offsets.size - 1
     sign = 1.0
-    for j in range(intervals):
+    for j in range(part.first, part.last):
         block, edge = local[j], border[j]
         copy_rows(at(edge, 0, width - k), at(corner, 0, 0), k, r)
         for g in range(groups):
@@ -278,50 +279,84 @@ def _place_interval(target, block, border, offsets, ends, right):
             target[top + i, target.shape[1] - k + b] = source[inner + 2 * n + b]
 
 
-@helper(inline=True)
-def _condense_points(layout, work, corner, carried):
-    """Eliminate the mesh points 1 ... N - 1 (stage 2); return the sign of the product of pivots.
+@helper
+def _eliminate_point(block, carried, pivots):
+    """Eliminate a mesh point from the rows that contain it; return the sign of the product of pivots.
 
-    The rows that contain point j are those that remain of interval j, those ``carried`` over from the points before, and the
-    border (the sum of what is carried and of the interval's share), before and after::
+    These rows are the ``carried`` ones, those of what follows (an interval or a segment), which stand in the last n + r rows of
+    the ``block``, and the border, where both are added; before and after::
 
-                       point j  first  next  parameters         point j  first  next  parameters
-        carried     [  x  x     x  x   0  0  x  ]            [  U  U     x  x   x  x  x  ]
-                    [  x  x     x  x   0  0  x  ]            [  M  U     x  x   x  x  x  ]
-        interval j  [  x  x     0  0   x  x  x  ]     ->     [  M  M     x  x   x  x  x  ]   n rows, carried on
-                    [  x  x     0  0   x  x  x  ]            [  M  M     x  x   x  x  x  ]
-        border      [  x  x     x  x   x  x  x  ]            [  M  M     x  x   x  x  x  ]   r rows, carried on
+                       this point  first  next  parameters         this point  first  next  parameters
+        carried     [  x  x        x  x   0  0  x  ]            [  U  U        x  x   x  x  x  ]
+                    [  x  x        x  x   0  0  x  ]            [  M  U        x  x   x  x  x  ]
+        following   [  x  x        0  0   x  x  x  ]     ->     [  M  M        x  x   x  x  x  ]   n rows, carried on
+                    [  x  x        0  0   x  x  x  ]            [  M  M        x  x   x  x  x  ]
+        border      [  x  x        x  x   x  x  x  ]            [  M  M        x  x   x  x  x  ]   r rows, carried on
 
-    Pivots are chosen among the first 2 n rows. ``carried`` (n + r, 2 n + k) holds [first | this point | parameters].
+    Pivots are chosen among the first 2 n rows. ``carried`` (n + r, 2 n + k) holds [first | this point | parameters]. The border
+    by the parameters is carried only: the sum so far.
     """
-    n, (r, k), (intervals, rows, _) = layout.order.size, corner.shape, work.local.shape
-    _place_interval(carried, work.local[0], work.border[0], layout.offsets, layout.ends, n)
+    n = block.shape[1] - carried.shape[1]
+    k, r = carried.shape[1] - 2 * n, carried.shape[0] - n
+    for i in range(n):
+        for b in range(n):
+            block[i, 2 * n + b] = block[n + i, n + b] = 0.0
+    copy_rows(at(block, 0, 0), at(carried, 0, n), n, n)
+    copy_rows(at(block, 0, n), at(carried, 0, 0), n, n)
+    copy_rows(at(block, 0, 3 * n), at(carried, 0, 2 * n), k, n)
+    for i in range(r):
+        for b in range(n):
+            block[2 * n + i, b] += carried[n + i, n + b]
+    copy_rows(at(block, 2 * n, n), at(carried, n, 0), n, r)
+    copy_rows(at(block, 2 * n, 3 * n), at(carried, n, 2 * n), k, r)
+    step = point_step(n, block.shape[1])
+    sign = _eliminate(block, step, pivots)
+    _reduce(block, Range(2 * n, 2 * n + r), block, step)
+    copy_rows(at(carried, 0, 0), at(block, n, n), 2 * n + k, n + r)
+    return sign
+
+
+@helper(inline=True)
+def _condense_points(layout, work, part, corner, carried):
+    """Eliminate the mesh points inside a segment (stage 2); return the sign of the product of pivots.
+
+    Each is eliminated from the rows that remain of the interval on its right, and those carried over from the points before.
+    ``carried`` takes what is left: n rows and the border, by [first | last point of the segment | parameters].
+    """
+    n, (r, k), rows = layout.order.size, corner.shape, work.local.shape[1]
+    _place_interval(carried, work.local[part.first], work.border[part.first], layout.offsets, layout.ends, n)
     copy_rows(at(carried, n, 2 * n), at(corner, 0, 0), k, r)  # the border by the parameters: the sum over all intervals
     sign = 1.0
-    for j in range(1, intervals):
+    for j in range(part.first + 1, part.last):
         block = work.chain[j - 1]
         _place_interval(block, work.local[j], work.border[j], layout.offsets, layout.ends, 2 * n)
-        for i in range(n):
-            for b in range(n):
-                block[i, 2 * n + b] = block[n + i, n + b] = 0.0
-        copy_rows(at(block, 0, 0), at(carried, 0, n), n, n)
-        copy_rows(at(block, 0, n), at(carried, 0, 0), n, n)
-        copy_rows(at(block, 0, 3 * n), at(carried, 0, 2 * n), k, n)
-        for i in range(r):
-            for b in range(n):
-                block[2 * n + i, b] += carried[n + i, n + b]
-        copy_rows(at(block, 2 * n, n), at(carried, n, 0), n, r)
-        copy_rows(at(block, 2 * n, 3 * n), at(carried, n, 2 * n), k, r)
-        step = point_step(n, block.shape[1])
-        sign *= _eliminate(block, step, work.pivots[j, rows - n :])
-        _reduce(block, Range(2 * n, 2 * n + r), block, step)
-        copy_rows(at(carried, 0, 0), at(block, n, n), 2 * n + k, n + r)
+        sign *= _eliminate_point(block, carried, work.pivots[j, rows - n :])
+    return sign
+
+
+@helper(inline=True)
+def _join_segments(work, starts, n, carried):
+    """Eliminate the mesh points between segments (stage 3); return the sign of the product of pivots.
+
+    The rows of a segment are those that it has ``carried`` (S, n + r, 2 n + k). The first of them takes what is left.
+    """
+    rows, (segments, height, width) = work.local.shape[1], carried.shape
+    sign = 1.0
+    for s in range(1, segments):
+        j, these, total = starts[s], carried[s], carried[0]
+        block = work.chain[j - 1]
+        copy_rows(at(block, n, 0), at(these, 0, 0), n, height)
+        copy_rows(at(block, n, 2 * n), at(these, 0, n), width - n, height)
+        for i in range(n, height):
+            for b in range(2 * n, width):
+                total[i, b] += these[i, b]
+        sign *= _eliminate_point(block, total, work.pivots[j, rows - n :])
     return sign
 
 
 @helper
 def _eliminate_dense(carried, first, last, dense, pivots):
-    """Eliminate the rest of the matrix (stage 3); return the sign of the product of pivots.
+    """Eliminate the rest of the matrix (stage 4); return the sign of the product of pivots.
 
     Its rows, square together::
 
@@ -339,13 +374,23 @@ def _eliminate_dense(carried, first, last, dense, pivots):
 
 
 @kernel
-def factorize(layout: Layout, work: Eliminated, corner: Matrix, first: Matrix, last: Matrix, carried: Matrix) -> float:
+def factorize(
+    layout: Layout, work: Eliminated, corners: Stack, first: Matrix, last: Matrix, carried: Stack, share: Share
+) -> float:
     """Factor a matrix and return the sign of its determinant, up to a factor that depends on the shape only.
 
-    ``work`` holds the local and the border blocks and takes the result; ``carried`` (n + r, 2 n + k) is scratch space, the
-    others are those of the `Blocks`.
+    ``work`` holds the local and the border blocks and takes the result; ``first`` and ``last`` are those of the `Blocks`.
+    ``corners`` (S, r, k) are the corner of the `Blocks` for the first segment, zero for the others; they are overwritten.
+    ``carried`` (S, n + r, 2 n + k) is scratch space. The first stage of a `Share` condenses segments, the second joins them.
+    The sign is that of the share; the product of all is the sign of the determinant.
     """
-    sign: float = _eliminate_interiors(layout, work, corner)
-    sign *= _condense_points(layout, work, corner, carried)
-    sign *= _eliminate_dense(carried, first, last, work.dense, work.pivots_dense)
+    sign = 1.0
+    if share.stage != 1:
+        for s in range(share.first, share.last):
+            part = Range(share.starts[s], share.starts[s + 1])
+            sign *= _eliminate_interiors(layout, work, part, corners[s])
+            sign *= _condense_points(layout, work, part, corners[s], carried[s])
+    if share.stage != 0:
+        sign *= _join_segments(work, share.starts, layout.order.size, carried)
+        sign *= _eliminate_dense(carried[0], first, last, work.dense, work.pivots_dense)
     return sign

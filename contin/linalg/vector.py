@@ -332,6 +332,18 @@ def move(builder: Any, target: int, source: int) -> None:
 
 
 @instruction
+def add(builder: Any, target: int, source: int) -> None:
+    """Add one entry at an address to that at another."""
+    _store(builder, builder.fadd(_load(builder, target, LANES), _load(builder, source, LANES)), target)
+
+
+@instruction
+def clear(builder: Any, target: int) -> None:
+    """Make one entry zero."""
+    _store(builder, ir.Constant(ir.VectorType(_DOUBLE, LANES), [0.0] * LANES), target)
+
+
+@instruction
 def side_by_side(builder: Any, target: int, source: Rows, length: int, rows: int) -> None:
     """target[i] = source[:LANES, i] for i < ``length``; where there are fewer ``rows``, the last of them again."""
     places = [source.address]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cost, fold, like_for_like, startup, stress
+from benchmarks import cores, cost, fold, like_for_like, startup, stress
 
 TITLES = {
     "like-for-like": "Like for like",
@@ -15,6 +15,7 @@ TITLES = {
     "cost": "Cost laws",
     "startup": "Start-up",
     "stress": "Numerical stability",
+    "cores": "Two cores",
 }
 TABLES = {
     "like-for-like": like_for_like.table,
@@ -22,6 +23,7 @@ TABLES = {
     "cost": cost.table,
     "startup": startup.table,
     "stress": stress.table,
+    "cores": cores.table,
 }
 
 

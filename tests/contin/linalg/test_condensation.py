@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from contin.linalg import segments
 from contin.linalg.condensation import Factorization
 from contin.linalg.layout import Blocks, layout
 
@@ -112,3 +113,59 @@ def test_the_count_must_be_square():
     places, blocks, _ = random_blocks(2, 3, 4, 2, 1)
     with pytest.raises(ValueError, match="2 states and 2 parameters"):
         Factorization(places, blocks._replace(first=blocks.first[:-1], last=blocks.last[:-1]))
+
+
+# --- segments: large matrices, here any size ---------------------------------------------------------------------------
+
+#: Numbers of intervals: two of them are one segment, 40 are 16 of two or three.
+SIZES = [(1, 2, 2, 1, 1), (2, 4, 7, 1, 1), (3, 3, 33, 4, 2), (4, 7, 12, 0, 0), (5, 2, 40, 2, 2), (13, 4, 21, 4, 1)]
+
+
+@pytest.mark.parametrize("sparse", [False, True])
+@pytest.mark.parametrize("sizes", SIZES)
+def test_segments_agree_with_dense_and_have_the_same_bits_for_all_threads(sizes, sparse, monkeypatch):
+    monkeypatch.setattr(segments, "_LARGE", 0)
+    n = sizes[0]
+    depends = np.random.default_rng(n).random((n, n)) < 0.3 if sparse else None
+    known = None
+    for count in (1, 2, 3, 5):
+        monkeypatch.setenv("CONTIN_THREADS", str(count))
+        places, blocks, dense = random_blocks(*sizes, seed=7, depends=depends)
+        factors = Factorization(places, blocks)
+        b = np.random.default_rng(1).standard_normal((6, len(dense)))
+        found = factors.solve(b), factors.solve_transposed(b), factors.sign
+        known = found if known is None else known
+        assert [np.array_equal(one, other) for one, other in zip(found, known)] == [True] * 3
+        assert np.array_equal(factors.solve(b[4]), found[0][4])
+    tolerance = 1e-14 * np.linalg.cond(dense)
+    assert np.allclose(known[0], np.linalg.solve(dense, b.T).T, atol=tolerance, rtol=tolerance)
+    assert np.allclose(known[1], np.linalg.solve(dense.T, b.T).T, atol=tolerance, rtol=tolerance)
+
+
+def test_the_determinant_of_segments_changes_sign_with_the_dense_one(monkeypatch):
+    monkeypatch.setattr(segments, "_LARGE", 0)
+    monkeypatch.setenv("CONTIN_THREADS", "2")
+    signs = []
+    for seed in range(20):
+        places, blocks, dense = random_blocks(2, 3, 9, 2, 1, seed)
+        signs.append(Factorization(places, blocks).sign * np.sign(np.linalg.det(dense)))
+    assert len(set(signs)) == 1
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_singular_matrix_of_segments_gives_no_finite_solution(count, monkeypatch):
+    monkeypatch.setattr(segments, "_LARGE", 0)
+    monkeypatch.setenv("CONTIN_THREADS", str(count))
+    places, blocks, dense = random_blocks(2, 3, 20, 2, 1)
+    blocks.local[7, :, :2] = 0.0
+    factors = Factorization(places, blocks)
+    assert np.isnan(factors.sign) or factors.sign == 0 or not np.all(np.isfinite(factors.solve(np.ones(len(dense)))))
+
+
+def test_the_segments_depend_on_the_size_only(monkeypatch):
+    for count in ("1", "5"):
+        monkeypatch.setenv("CONTIN_THREADS", count)
+        assert segments.share(1000, 2**20 - 1).last == 1
+        assert segments.share(1000, 2**20).starts.tolist() == [1000 * s // 16 for s in range(17)]
+        assert segments.share(5, 2**20).starts.tolist() == [0, 2, 5]
+        assert segments.share(1, 2**20).last == 1

@@ -233,6 +233,25 @@ def test_move():
 
 
 @kernel
+def add(target: Matrix, source: Matrix, i: int, j: int) -> None:
+    vector.add(at(target, i, 0).address, at(source, j, 0).address)
+
+
+@kernel
+def clear(target: Matrix, i: int) -> None:
+    vector.clear(at(target, i, 0).address)
+
+
+def test_add_and_clear():
+    target, source = numbers(5, LANES), numbers(6, LANES, seed=1)
+    found, known = target.copy(), target.copy()
+    add(found, source, 2, 4)
+    clear(found, 3)
+    known[2], known[3] = target[2] + source[4], 0.0
+    assert np.array_equal(found, known)
+
+
+@kernel
 def side_by_side(target: Matrix, source: Matrix, length: int, rows: int) -> None:
     vector.side_by_side(at(target, 1, 0).address, at(source, 1, 2), length, rows)
 
@@ -261,5 +280,5 @@ def test_every_instruction_has_a_kernel_here():
     """Of the same name; one kernel applies all four triangles."""
     decorated = {name for name, value in vars(vector).items() if hasattr(value, "__wrapped__")}
     instructions = {name for name in decorated if getattr(vector, name).__module__ == vector.__name__}
-    assert len(instructions) == 17
+    assert len(instructions) == 19
     assert {re.sub("apply_.*", "apply_triangle", name) for name in instructions} <= globals().keys()
