@@ -169,3 +169,31 @@ def test_a_torus_bifurcation():
     (torus,) = branch.labelled("TR")
     assert torus["mu"] == pytest.approx(0, abs=1e-10)
     assert torus.details["frequency"] == pytest.approx(2 * math.pi * 0.3, abs=1e-8)
+
+
+def test_a_stored_branch_goes_on(tmp_path):
+    problem = CycleProblem(bautin, ["x", "y"], {"mu": 1.0})
+    orbit = contin.solve(problem, round_and_round(1.2), {"period": 6.0}, degree=6)
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (0.5, 1.5)})
+    contin.save(branch, tmp_path / "cycles.npz")
+    last = contin.load(problem, tmp_path / "cycles.npz").points[-1]
+    assert last["mu"] == branch.points[-1]["mu"] and last["max_x"] == branch.points[-1]["max_x"]
+    further = contin.trace(last, limits={"mu": (0.5, 2)})
+    assert further.points[-1]["period"] == pytest.approx(2 * math.pi, abs=1e-10)
+
+
+def test_folds_of_cycles_in_two_parameters():
+    """r' = mu r + a r**3 - r**5: the fold lies at mu = -a**2 / 4, and dmu/da there is -a / 2."""
+
+    def field(u, p):
+        s = u.x**2 + u.y**2
+        growth = p.mu + p.a * s - s * s
+        return growth * u.x - u.y, u.x + growth * u.y
+
+    orbit = contin.solve(
+        CycleProblem(field, ["x", "y"], {"mu": 0.5, "a": 1.0}), round_and_round(1.2), {"period": 6.0}, degree=6
+    )
+    (fold,) = contin.trace(orbit, free=["mu"], limits={"mu": (-1, 0.6), "max_x": (0.5, 2)}, direction=-1).labelled("LP")
+    assert contin.sensitivities(fold)["a"]["mu"] == pytest.approx(-0.5, abs=1e-9)
+    for point in contin.curve(fold, "a", limits={"a": (0.5, 2)}):
+        assert point["mu"] == pytest.approx(-(point["a"] ** 2) / 4, abs=1e-9)
