@@ -1,4 +1,5 @@
 # The public names, and where they come from. `import contin` loads none of them: each is imported when it is first used.
+from .analysis.cycles import cycle
 from .analysis.diagram import Diagram, diagram
 from .analysis.sensitivity import sensitivities
 from .analysis.solving import solve
@@ -20,6 +21,7 @@ from .functions.pointwise import Pointwise
 from .names import exact_text
 from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
+from .problems.cycle import CycleProblem
 from .problems.variational import VariationalProblem
 from .results.branch import Branch
 from .results.columns import StoredColumns, read_columns
@@ -32,9 +34,9 @@ from .stepping.trial import Monitor, TestFunction, Trial
 
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
-    "Continuation", "ConvergenceError", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise",
-    "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis",
-    "cache_directory", "correct", "curve", "diagram", "exact_text", "follow", "gradient", "interpolation", "load",
-    "locate_branch_point", "point_of", "read_columns", "save", "sensitivities", "solve", "temporary_name", "trace",
-    "write_whole",
+    "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton",
+    "Point", "Pointwise", "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial",
+    "VariationalProblem", "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow",
+    "gradient", "interpolation", "load", "locate_branch_point", "point_of", "read_columns", "save", "sensitivities",
+    "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

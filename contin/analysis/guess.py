@@ -14,6 +14,7 @@ from contin.analysis.multipliers import with_guessed_multipliers
 from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
+from contin.discretization.cycles import CycleCollocation, discretized
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.names import exact_text
@@ -65,11 +66,12 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
         given = _numbers(guess[0])
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a or not given[-1] >= b:
             raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
-    system = Collocation(problem, mesh, degree, options.free, options.parameters)
+    system = discretized(problem, mesh, degree, options.free, options.parameters)
     if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
         return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
     states = _sampled(guess, system.nodes, len(problem.state_names))
-    return system, system.pack(states, {**problem.parameters, **options.parameters})
+    x = system.pack(states, {**problem.parameters, **options.parameters})
+    return (system.with_reference(x) if isinstance(system, CycleCollocation) else system), x
 
 
 def _sampled(guess: Guess, nodes: Array, count: int) -> Array:

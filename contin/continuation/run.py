@@ -25,7 +25,7 @@ from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint
-from contin.detection.test_functions import fold, limits, own_test_functions, user_zeros
+from contin.detection.test_functions import fold, limits, own_end, own_test_functions, user_zeros
 from contin.detection.trivial import crossed, jumped
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
@@ -196,7 +196,8 @@ class Continuation:
     def __iter__(self) -> Iterator[Point]:
         if not self._resumed:
             trial = self._state_trial()
-            yield self._point(SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial), self.state)
+            first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
+            yield self._point(dataclasses.replace(first, label=own_end(trial.system, first).label), self.state)
             if (stop := self._out_of_limits(trial) or self._out_of_domain(trial)) is not None:
                 self.stop = stop
                 return
@@ -234,7 +235,7 @@ class Continuation:
             self.stop = self._failure(error)
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
-        special = inspection.special_points(self._tests)
+        special = [own_end(segment.trial.system, point) for point in inspection.special_points(self._tests)]
         changes = self._index_changes(segment, special)
         for point, change in zip(special, changes):
             self.stop = point.stop

@@ -103,7 +103,8 @@ def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[Sp
     if not (np.any(one) or np.any(other)):
         return []
     if np.all(one == other):
-        found = [_located(segment, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
+        located = [_located(segment, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
+        found = [point for point in located if point is not None]
         if all(_pairs_at(point) >= _count_at(point, found, segment) for point in found):
             return found
     if depth == _CUTS:
@@ -113,26 +114,32 @@ def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[Sp
     return _between(segment, left, there, depth + 1) + _between(segment, there, right, depth + 1)
 
 
-def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint:
+def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint | None:
     """Return the place where the real part of an eigenvalue vanishes that has these values at two places.
 
-    The second place, named "possible", where that fails.
+    The second place, named "possible", where that fails; None where the pair turns out to be real.
     """
     (a, b), (first, last) = (left[0], right[0]), pair
 
     def real_part(s: float) -> float:
         return _nearest(first + (last - first) * (s - a) / (b - a)).function(segment.at(s))
 
+    lost = ""
     try:
         at = find_zero(real_part, (a, first.real), (b, last.real), segment.precision)
-        there, name = segment.at(at), "Hopf"
+        there = segment.at(at)
     except ConvergenceError:
-        at, there, name = *right, "possible Hopf"
+        (at, there), lost = right, "possible "
     values = _upper(there)
     here = first + (last - first) * (at - a) / (b - a)
     frequency = float(values[np.argmin(np.abs(values - here))].imag)
+    system: Any = there.system
+    crossing = system.crossing(there.x, frequency)
+    if crossing is None:
+        return None
+    label, name = crossing
     test = _nearest(1j * frequency)
-    return SpecialPoint(at, test.label, name, there, None, {"frequency": frequency, "pairs": 1}, test)
+    return SpecialPoint(at, label, lost + name, there, None, {"frequency": frequency, "pairs": 1}, test)
 
 
 def _pairs_at(point: SpecialPoint) -> int:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 
 from contin.detection.hopf import hopf
 from contin.detection.second_variation import legendre
+from contin.detection.segment import SpecialPoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
+from contin.discretization.cycles import CycleCollocation
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
 from contin.problems.variational import VariationalProblem
+from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction
 
 
@@ -61,5 +65,25 @@ def _of_boundary_value(system: Collocation) -> list[TestFunction]:
 
 
 @own_test_functions.register
+def _of_cycles(system: CycleCollocation) -> list[TestFunction]:
+    return [hopf()]
+
+
+@own_test_functions.register
 def _of_equilibria(system: Algebraic) -> list[TestFunction]:
     return [hopf()] if system.problem.dynamics else []
+
+
+@functools.singledispatch
+def own_end(system: Discretization, point: SpecialPoint) -> SpecialPoint:
+    """Return a special point, as the end of the branch where a kind of problem knows it as one. Each kind registers its own."""
+    return point
+
+
+@own_end.register
+def _of_shrunk_cycles(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
+    """Where cycles shrink onto an equilibrium the branch ends: beyond the Hopf point it is itself, half a period later."""
+    if not system.has_shrunk(point.trial.x):
+        return point
+    stop = Stop("Hopf", "the cycles shrink onto an equilibrium, a Hopf point")
+    return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)

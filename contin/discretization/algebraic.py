@@ -96,12 +96,20 @@ class Algebraic(System):
         product: Array = self._jacobian(x)[1].T @ w
         return product
 
-    def eigenvalues(self, x: Array) -> ComplexArray:
-        """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
+    def jacobian(self, x: Array) -> Array:
+        """Return F_u in the user's units, shape (equations, n)."""
         jacobian = self._jacobian(x)[1][:, : self.state_size]
         if self.scales is not None:
             jacobian = jacobian * self.scales.rows["residual"][:, None] / self.scales.states
-        return np.linalg.eigvals(jacobian).astype(complex, copy=False)
+        return jacobian
+
+    def eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
+        return np.linalg.eigvals(self.jacobian(x)).astype(complex, copy=False)
+
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a point where a pair of eigenvalues with this frequency crosses the imaginary axis."""
+        return "HB", "Hopf"
 
     def functionals(self, x: Array) -> Array:
         """Return the values of the problem's functionals, in their order."""

@@ -1,0 +1,108 @@
+"""A cycle from a time integration that has settled on it."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.analysis.solving import solve
+from contin.arrays import Array
+from contin.errors import ProblemError
+from contin.problems.cycle import PERIOD, CycleProblem
+from contin.results.point import Point
+
+#: Tolerance of the integration; the motion is at rest below this part of 1 + its size, and back within this part of its size.
+_ACCURATE, _RESTS, _BACK = 1e-9, 1e-6, 1e-2
+#: Places of the round that is the guess.
+_SAMPLES = 1000
+
+
+def cycle(
+    problem: CycleProblem, start: Any, parameters: Any = None, *, settle: float = 100.0, intervals: int = 40, degree: int = 4,
+) -> Point:  # fmt: skip
+    """Return the stable cycle that a time integration from ``start`` settles on.
+
+    Parameters
+    ----------
+    problem : CycleProblem
+    start : sequence of float
+        Initial states.
+    parameters : mapping of str to float, optional
+        Values that differ from the defaults.
+    settle : float
+        Time after which the motion is taken to be periodic.
+    intervals, degree : int
+        First mesh and degree of the collocation.
+
+    Raises
+    ------
+    ProblemError
+        The motion does not come back: it rests, goes to infinity, or has not settled.
+    ConvergenceError
+        No cycle is found near the motion.
+    """
+    checks.instance("problem", problem, CycleProblem, "a CycleProblem")
+    checks.number("settle", settle, 0)
+    values = {**problem.parameters, **checks.mapping("parameters", parameters or {}, "numbers")}
+    first = _numbers(start, len(problem.state_names))
+    field = _vector_field(problem, values)
+    settled = _integrated(field, first, settle).y[:, -1]
+    times, states = _one_round(field, settled, settle)
+    guess = times / times[-1], states
+    return solve(problem, guess, {**values, PERIOD: float(times[-1])}, intervals=intervals, degree=degree)
+
+
+def _numbers(start: Any, count: int) -> Array:
+    array = np.asarray(start, dtype=float).ravel()
+    if array.size != count or not np.all(np.isfinite(array)):
+        raise ProblemError(f"start: {checks.shown(start)} must be {count} finite numbers, the states")
+    return array
+
+
+def _vector_field(problem: CycleProblem, values: Any) -> Any:
+    """Return the field as an integrator of SciPy calls it."""
+    of_state: Any = namedtuple("U", problem.state_names)  # type: ignore[misc]  # noqa: PYI024
+    of_parameters: Any = namedtuple("P", tuple(values))  # type: ignore[misc]  # noqa: PYI024
+    p, field = of_parameters(**values), problem.field
+    return lambda t, u: field(of_state(*u), p)
+
+
+def _integrated(field: Any, start: Array, time: float, **options: Any) -> Any:
+    from scipy.integrate import solve_ivp  # type: ignore[import-untyped]  # .3 s; only this needs it
+
+    done = solve_ivp(field, (0.0, time), start, method="LSODA", rtol=_ACCURATE, atol=_ACCURATE, **options)
+    if not done.success or not np.all(np.isfinite(done.y)):
+        raise ProblemError(f"start: the motion from there has no finite value after t = {done.t[-1]:.6g}")
+    return done
+
+
+def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
+    """Return times (K,), from 0, and states (K, n) of one round of a motion that has settled.
+
+    A round ends where the motion comes back through the plane normal to it at its start, close to the start.
+
+    Raises
+    ------
+    ProblemError
+    """
+    across = np.asarray(field(0.0, start), dtype=float)
+
+    def plane(t: float, u: Array) -> float:
+        return float(across @ (u - start))
+
+    plane.direction = 1.0  # type: ignore[attr-defined]
+    done = _integrated(field, start, longest, events=plane, dense_output=True)
+    size = float(np.ptp(done.y, axis=1).max())
+    if size <= _RESTS * (1 + np.abs(start).max()):
+        raise ProblemError(f"start: the motion from there comes to rest near {', '.join(f'{value:.6g}' for value in start)}")
+    for t in done.t_events[0]:
+        if t > 0 and np.abs(done.sol(t) - start).max() <= _BACK * size:
+            times = np.linspace(0.0, t, _SAMPLES)
+            return times, done.sol(times).T
+    raise ProblemError(
+        f"start: the motion does not come back to where it was within t = {longest:g}; give a larger settle, or a start nearer "
+        "to the cycle (it may be unstable, or the motion not periodic)"
+    )

@@ -1,0 +1,199 @@
+"""Periodic orbits: their periods, multipliers, doublings and ends against closed forms and published values."""
+
+import math
+
+import numpy as np
+import pytest
+
+import contin
+from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
+
+
+def circle(u, p):
+    square = u.x**2 + u.y**2
+    return p.mu * u.x - u.y - u.x * square, u.x + p.mu * u.y - u.y * square
+
+
+def bautin(u, p):
+    s = u.x**2 + u.y**2
+    growth = p.mu + s - s * s
+    return growth * u.x - u.y, u.x + growth * u.y
+
+
+def van_der_pol(u, p):
+    return u.v, p.mu * (1 - u.x**2) * u.v - u.x
+
+
+def lorenz(u, p):
+    return 10 * (u.y - u.x), p.r * u.x - u.y - u.x * u.z, u.x * u.y - 8 / 3 * u.z
+
+
+def roessler(u, p):
+    return -u.y - u.z, u.x + 0.2 * u.y, 0.2 + u.z * (u.x - p.c)
+
+
+def brusselator(u, p):
+    return p.a - (p.b + 1) * u.x + u.x**2 * u.y, p.b * u.x - u.x**2 * u.y
+
+
+def round_and_round(radius):
+    return lambda t: (radius * math.cos(2 * math.pi * t), radius * math.sin(2 * math.pi * t))
+
+
+def test_the_circle_of_the_normal_form():
+    """Radius sqrt(mu), period 2 pi, multipliers 1 and exp(-4 pi mu): the Hopf normal form in polar coordinates."""
+    orbit = contin.solve(CycleProblem(circle, ["x", "y"], {"mu": 0.25}), round_and_round(0.6), {"period": 6}, degree=7)
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (0.01, 1)})
+    for point in branch:
+        assert point["period"] == pytest.approx(2 * math.pi, abs=1e-11)
+        assert point["max_x"] == pytest.approx(math.sqrt(point["mu"]), abs=1e-10)
+        exponents = point.system.eigenvalues(point.x)
+        assert np.abs(exponents - [0, -4 * math.pi * point["mu"]]).max() < 1e-9
+
+
+def test_a_fold_of_cycles():
+    """r' = mu r + r**3 - r**5: both cycles meet at mu = -1/4, r**2 = 1/2; multiplier exp(2 pi r d(growth)/dr)."""
+    problem = CycleProblem(bautin, ["x", "y"], {"mu": 1.0})
+    orbit = contin.solve(problem, round_and_round(1.2), {"period": 6.0}, degree=6)
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (-1, 1.1), "max_x": (0.3, 2)}, direction=-1)
+    (fold,) = branch.labelled("LP")
+    assert fold["mu"] == pytest.approx(-0.25, abs=1e-10) and fold["max_x"] ** 2 == pytest.approx(0.5, abs=1e-6)
+    for point in (branch.points[0], branch.points[-1]):
+        s = point["max_x"] ** 2
+        values = np.sort(point.system.eigenvalues(point.x).real)
+        assert np.abs(values - np.sort([0, 4 * math.pi * (s - 2 * s * s)])).max() < 1e-8
+
+
+def test_van_der_pol_to_a_multiplier_that_no_number_holds():
+    """Periods: published, 6.6632868593 at mu = 1 and 19.0783695 at mu = 10. Liouville gives their product."""
+    orbit = contin.cycle(CycleProblem(van_der_pol, ["x", "v"], {"mu": 1.0}), [0.1, 0.0])
+    assert orbit["period"] == pytest.approx(6.6632868593, abs=1e-10)
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (0.5, 10)}, mesh=MeshControl(max_intervals=1000))
+    end = branch.points[-1]
+    assert end["period"] == pytest.approx(19.0783695, abs=1e-7)
+    trivial, small = end.system.eigenvalues(end.x)
+    assert abs(trivial) < 1e-9 and small.real < -240
+
+
+def test_from_a_hopf_point():
+    """Brusselator, a = 1: the Hopf point at b = 1 + a**2 with frequency a. Its cycles are stable, and small near it."""
+    equilibria = AlgebraicProblem(brusselator, ["x", "y"], {"a": 1.0, "b": 1.0})
+    line = contin.trace(contin.solve(equilibria, [1, 1]), free=["b"], limits={"b": (0.5, 3)})
+    (hopf,) = line.labelled("HB")
+    cycles = contin.trace(hopf, branch=1, limits={"b": (1, 3)})
+    first, last = cycles.points[0], cycles.points[-1]
+    assert first["period"] == pytest.approx(2 * math.pi, abs=1e-9) and first["max_x"] == pytest.approx(
+        first["min_x"], abs=1e-12
+    )
+    assert last["b"] == pytest.approx(3, abs=1e-12) and last["max_x"] > 3
+    assert all(point.system.eigenvalues(point.x).real.max() < 1e-7 for point in cycles.points[1:])
+
+
+@pytest.mark.full
+def test_lorenz_from_its_hopf_point_to_its_homoclinic_orbit():
+    """HB at r = 470/19 (closed form); the period runs away at r = 13.926557 (published)."""
+    equilibria = AlgebraicProblem(lorenz, ["x", "y", "z"], {"r": 20.0})
+    start = [math.sqrt(8 / 3 * 19), math.sqrt(8 / 3 * 19), 19.0]
+    line = contin.trace(contin.solve(equilibria, start), free=["r"], limits={"r": (15, 30)})
+    (hopf,) = line.labelled("HB")
+    assert hopf["r"] == pytest.approx(470 / 19, abs=1e-10)
+    cycles = contin.trace(hopf, branch=1, limits={"period": (0, 10), "r": (10, 30)})
+    assert cycles.points[-1]["period"] == pytest.approx(10, abs=1e-9)
+    assert cycles.points[-1]["r"] == pytest.approx(13.926557, abs=1e-6)
+
+
+@pytest.mark.full
+def test_doublings_of_roessler():
+    """Published: c = 2.832445 and 3.837358. The next two by their distance: Feigenbaum's ratio 4.669 is approached."""
+    orbit = contin.cycle(CycleProblem(roessler, ["x", "y", "z"], {"c": 2.0}), [1.0, 1.0, 0.0])
+    found, point = [], None
+    branch = contin.trace(orbit, free=["c"], limits={"c": (1.5, 6)})
+    for _ in range(4):
+        point = next(p for p in branch.labelled("PD") if not found or p["c"] > found[-1] + 1e-6)
+        found.append(point["c"])
+        branch = contin.trace(point, branch=1, limits={"c": (1.5, 6)})
+    assert found[:2] == pytest.approx([2.832445, 3.837358], abs=5e-7)
+    ratio = (found[2] - found[1]) / (found[3] - found[2])
+    assert 4.4 < ratio < 4.7
+
+
+@pytest.mark.parametrize(
+    ("statement", "words"),
+    [
+        (lambda: CycleProblem(lambda u, p: (u.x,), ["x", "y"], {}), "field returns 1 values for the 2 states x, y"),
+        (lambda: CycleProblem(circle, ["x", "y"], {"mu": 0.1, "period": 1.0}), "period is a column of every cycle by itself"),
+        (lambda: CycleProblem(lambda t, u, p: (u.x,), ["x"], {}), r"field: must be a function of \(u, p\)"),
+        (lambda: contin.cycle(CycleProblem(circle, ["x", "y"], {"mu": -0.5}), [0.1, 0.0]), "comes to rest near"),
+        (lambda: contin.cycle(CycleProblem(circle, ["x", "y"], {"mu": 0.5}), [0.1]), "must be 2 finite numbers"),
+        (lambda: contin.cycle(CycleProblem(lambda u, p: (1.0 + 0 * u.x,), ["x"], {}), [0.0]), "does not come back"),
+        (lambda: contin.solve(CycleProblem(circle, ["x", "y"], {"mu": 0.5}), [0.1, 0.0]), "goes round"),
+    ],
+)
+def test_what_is_refused(statement, words):
+    with pytest.raises(ProblemError, match=words):
+        statement()
+
+
+def test_a_branch_between_two_hopf_points_ends_at_the_second():
+    """Growth mu (1 - mu) - r**2: Hopf points at 0 and 1. The first and the last point have no size and the period 2 pi."""
+
+    def field(u, p):
+        growth = p.mu * (1 - p.mu) - u.x**2 - u.y**2
+        return growth * u.x - u.y - 0.3 * u.x * u.y, u.x + growth * u.y
+
+    line = contin.solve(AlgebraicProblem(field, ["x", "y"], {"mu": -0.5}), [0, 0])
+    first = contin.trace(line, free=["mu"], limits={"mu": (-0.5, 2)}).labelled("HB")[0]
+    cycles = contin.trace(first, branch=1, limits={"mu": (-1, 2)})
+    assert [point.label for point in cycles if point.label] == ["HB", "HB"] and cycles.stop.reason == "Hopf"
+    end = cycles.points[-1]
+    assert end["mu"] == pytest.approx(1, abs=1e-10) and end["period"] == pytest.approx(2 * math.pi, abs=1e-9)
+    assert end["max_x"] - end["min_x"] < 1e-9
+
+
+def test_a_torus_bifurcation():
+    """The cycle r = 1 of r' = r - r**3 in a plane, and beside it w' = (mu + i a) w: multipliers exp(2 pi (mu +- i a))."""
+
+    def field(u, p):
+        square = u.x**2 + u.y**2
+        damping = u.a**2 + u.b**2
+        return (
+            u.x - u.y - u.x * square, u.x + u.y - u.y * square,
+            p.mu * u.a - 0.3 * u.b - u.a * damping, 0.3 * u.a + p.mu * u.b - u.b * damping,
+        )  # fmt: skip
+
+    problem = CycleProblem(field, ["x", "y", "a", "b"], {"mu": -0.2})
+    orbit = contin.solve(
+        problem, lambda t: (math.cos(2 * math.pi * t), math.sin(2 * math.pi * t), 0, 0), {"period": 6.0}, degree=6
+    )
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (-0.2, 0.2)})
+    (torus,) = branch.labelled("TR")
+    assert torus["mu"] == pytest.approx(0, abs=1e-10)
+    assert torus.details["frequency"] == pytest.approx(2 * math.pi * 0.3, abs=1e-8)
+
+
+def test_a_stored_branch_goes_on(tmp_path):
+    problem = CycleProblem(bautin, ["x", "y"], {"mu": 1.0})
+    orbit = contin.solve(problem, round_and_round(1.2), {"period": 6.0}, degree=6)
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (0.5, 1.5)})
+    contin.save(branch, tmp_path / "cycles.npz")
+    last = contin.load(problem, tmp_path / "cycles.npz").points[-1]
+    assert last["mu"] == branch.points[-1]["mu"] and last["max_x"] == branch.points[-1]["max_x"]
+    further = contin.trace(last, limits={"mu": (0.5, 2)})
+    assert further.points[-1]["period"] == pytest.approx(2 * math.pi, abs=1e-10)
+
+
+def test_folds_of_cycles_in_two_parameters():
+    """r' = mu r + a r**3 - r**5: the fold lies at mu = -a**2 / 4, and dmu/da there is -a / 2."""
+
+    def field(u, p):
+        s = u.x**2 + u.y**2
+        growth = p.mu + p.a * s - s * s
+        return growth * u.x - u.y, u.x + growth * u.y
+
+    orbit = contin.solve(
+        CycleProblem(field, ["x", "y"], {"mu": 0.5, "a": 1.0}), round_and_round(1.2), {"period": 6.0}, degree=6
+    )
+    (fold,) = contin.trace(orbit, free=["mu"], limits={"mu": (-1, 0.6), "max_x": (0.5, 2)}, direction=-1).labelled("LP")
+    assert contin.sensitivities(fold)["a"]["mu"] == pytest.approx(-0.5, abs=1e-9)
+    for point in contin.curve(fold, "a", limits={"a": (0.5, 2)}):
+        assert point["mu"] == pytest.approx(-(point["a"] ** 2) / 4, abs=1e-9)
