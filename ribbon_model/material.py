@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import ast
 import math
+import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -29,6 +30,9 @@ _TWISTED = (ROD, FLAT_ROD.name, ISOTROPIC_ROD.name)
 _FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "sqrt", "sinh", "cosh", "tanh", "atan")
 #: Longest expression. A longer one is a table that should be shorter: each is compiled as one formula.
 _LONGEST = 2000
+
+#: Places at which data along the strip are checked, less one.
+_STEPS = 40
 
 #: A datum along the strip: ``f(t, p)``.
 Datum = Callable[..., float]
@@ -84,6 +88,20 @@ class Material:
             raise ValueError(f"along: width, thickness: are for flat strips, not for the law {self.law!r}")
         rest = dict.fromkeys((*self.natural, *(["softness"] if self.constrained else [])), 0.0)
         object.__setattr__(self, "numbers", {**numbers, **{name: 0.0 for name in rest if name not in numbers}})
+        for name in self.along:
+            self._check_datum(name)
+
+    def _check_datum(self, name: str) -> None:
+        """Raise ValueError for an expression without a finite value along the strip, or a width or thickness that vanishes."""
+        datum, p = self.datum(name), types.SimpleNamespace(**self.parameters)
+        for step in range(_STEPS + 1):
+            try:
+                value = float(datum(step / _STEPS, p))
+            except (ArithmeticError, ValueError, TypeError):
+                value = math.nan
+            if not math.isfinite(value) or (name in ("width", "thickness") and not value > 0):
+                allowed = "positive and finite" if name in ("width", "thickness") else "finite"
+                raise ValueError(f"along: {name}: its value at s = {step / _STEPS:g} must be {allowed}")
 
     def _check(self, numbers: Mapping[str, float]) -> None:
         own = (*self.needed, *NATURAL, "softness", "Gamma", *STIFFNESSES)

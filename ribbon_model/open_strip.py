@@ -44,6 +44,8 @@ PHASES = {
 REACTIONS = tuple(
     f"{end}{what}_{direction}" for end in ("", "start_") for what in ("F", "M") for direction in DIRECTIONS
 )  # fmt: skip
+#: Largest angle of an arch that is a first guess: beyond it the strip passes through itself.
+_STEEPEST = 2.4
 #: An eigenvalue of the second variation below this part of the largest is zero: a motion that costs no energy. Round-off
 #: leaves 1e-14, and slow branches near their birth have eigenvalues above 1e-8.
 _ZERO = 1e-10
@@ -110,6 +112,8 @@ class OpenStrip:
                 "numbers: moment needs a hinge or a joint at the last end, about whose axis it acts: elsewhere a dead moment "
                 "has no energy"
             )
+        if len(set(self.phases)) < len(self.phases):
+            raise ValueError("phases: one of them is given twice")
         for name in self.phases:
             if name not in PHASES:
                 raise ValueError(f"phases: {name!r} must be one of {', '.join(PHASES)}")
@@ -279,7 +283,10 @@ class OpenStrip:
         mode = _euler_mode(self.start, self.finish)
         s = np.linspace(0, 1, 2001)
         mode_values = mode(s) / np.abs(mode(s)).max()
-        amplitude = side * brentq(lambda a: np.mean(np.cos(a * mode_values)) - distance, 0, 2.4) if distance < 1 else 0.0
+        least = float(np.mean(np.cos(_STEEPEST * mode_values)))
+        if not least < distance <= 1:
+            raise ValueError(f"distance = {distance:g} must be above {least:.3g}, and at most 1")
+        amplitude = side * brentq(lambda a: np.mean(np.cos(a * mode_values)) - distance, 0, _STEEPEST) if distance < 1 else 0.0
         angle = amplitude * mode_values
         steps = np.diff(s)[:, None] * (np.column_stack([np.sin(angle), np.cos(angle)])[1:] + 0)
         place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
