@@ -34,6 +34,7 @@ from typing import Any
 import h5py
 import numpy as np
 import yaml
+from benchmarks.measure import ONE_THREAD
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("contin", "ribbon_model", "branches")
@@ -43,14 +44,6 @@ EXCLUDED_ATTRIBUTES = ("versions", "platform")
 CLOCK = re.compile(r"\bin \d+\.\d+ s$", re.MULTILINE)
 #: Fields of a point's discretization that are recorded.
 OF_SYSTEM = ("mesh", "degree")
-ONE_THREAD = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "CONTIN_THREADS",
-)
 #: Number of processes, and largest number of lines that a comparison prints.
 PROCESSES, MOST_LINES = 2, 40
 USAGE = "usage: compare.py record OUT.npz, or compare.py A.npz B.npz"
@@ -139,7 +132,7 @@ def environment(folder: Path) -> dict[str, str]:
     paths = filter(None, [str(ROOT), str(bank_folder().parent), os.environ.get("PYTHONPATH", "")])
     caches = {"CONTIN_CACHE_DIR": str(folder / "contin")}
     changes = {"PYTHONPATH": os.pathsep.join(paths), "PYTHONIOENCODING": "utf-8", "COLUMNS": "80"}
-    return os.environ | dict.fromkeys(ONE_THREAD, "1") | caches | changes
+    return os.environ | ONE_THREAD | caches | changes
 
 
 def run(words: list[str], env: dict[str, str]) -> subprocess.CompletedProcess:
