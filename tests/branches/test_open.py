@@ -99,6 +99,7 @@ def test_picture_and_page(tip, tmp_path):
     assert (tmp_path / "tip.csv").read_text().startswith("s,x,y,z")
 
 
+@pytest.mark.full
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
 def test_the_page_in_a_browser(tip, tmp_path):
     pytest.importorskip("websocket", reason="the package websocket-client drives the browser")
@@ -112,6 +113,7 @@ def test_the_page_in_a_browser(tip, tmp_path):
         browser.close()
 
 
+@pytest.mark.full
 def test_dimensions_scale_the_numbers(tmp_path):
     """A strip in SI units is the dimensionless one with Gamma = w**2/(h L); forces are in B/L**2."""
     sizes = "{width: 0.02, thickness: 0.0005, length: 0.3, poisson_ratio: 0.3, youngs_modulus: 200.0e9}"
@@ -128,6 +130,7 @@ def test_dimensions_scale_the_numbers(tmp_path):
     assert math.isclose(real.factor("M_width"), B / 0.3) and real.unit("energy") == "J"
 
 
+@pytest.mark.full
 def test_the_ribbon_ends_where_its_bending_vanishes(tmp_path):
     """Twisted back to straight, the arc passes a place without bending: the run says so, and names the law that goes on."""
     text = "material: {law: ribbon, nu: 0.3, kappa_n: 3}\nstages: [{follow: swing, to: 1.5}]\n"
@@ -183,6 +186,7 @@ def test_points_that_later_stages_miss(tmp_path):
         assert sentence in branch.stop and set(branch.points["stage"]) == {1}
 
 
+@pytest.mark.full
 def test_a_table_and_a_taper():
     """A table is the polynomial through its points; a strip with half the width at its tip buckles under less weight."""
     text = "material: {law: flat rod, nu: 0.3}\nfinish: free\ndirections: {weight: [-1, 0, 0]}\n"

@@ -161,6 +161,7 @@ def slopes(function, start):
     return np.array([(function(start + d) - function(start - d)) / (2 * step) for d in step * np.eye(len(start))]).T
 
 
+@pytest.mark.full
 def test_states_against_shooting(scene):
     """The conditions hold to 1e-8 for the file's own start values, at the last point of each stage: measured 1e-9 at most."""
     name, branch = scene
@@ -186,6 +187,7 @@ def special_point(branch, column, stage, number):
     return found[number], numbers(branch, int(found[number]["point"]))
 
 
+@pytest.mark.full
 def test_branch_points_against_shooting(scene):
     """The determinant of the slopes of the conditions vanishes there: to 1e-7, measured 1e-8 at most."""
     name, branch = scene
@@ -211,6 +213,7 @@ def test_branch_points_against_shooting(scene):
     assert math.isclose(zero, at, abs_tol=1e-7 * (1 + abs(at)))
 
 
+@pytest.mark.full
 def test_the_twist_threshold_under_tension(scene):
     """A straight strip with twist w under tension T, perturbed: eight linear equations with constant coefficients.
 
@@ -239,6 +242,7 @@ def test_the_twist_threshold_under_tension(scene):
         assert math.isclose(brentq(determinant, at - 0.01, at + 0.01, xtol=1e-13), at, abs_tol=1e-8)
 
 
+@pytest.mark.full
 def test_the_snap_of_the_clamped_strip(scene):
     """At the fold the stable branch ends; it snaps to the one that was left, whose energy at this turn is interpolated."""
     name, branch = scene

@@ -160,6 +160,7 @@ def shown_on_a_terminal(command, *arguments, program, **more):
     return lines(shown.decode())
 
 
+@pytest.mark.full
 def test_a_strip_on_a_terminal(command):
     shown = shown_on_a_terminal(command, *TAPE.split(), program=("-m", "branches.strip"))
     assert any("branches done" in line and "to go: (1, 3)" in line for line in shown)

@@ -30,6 +30,7 @@ def spun(q, moment):
     ]).T  # fmt: skip
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("law", PAPER_LAWS.values(), ids=list(PAPER_LAWS))
 @pytest.mark.parametrize("domain", [HALF_LOOP, HALF_LOOP_BETWEEN_AXES], ids=str)
 def test_the_energy_alone_gives_states_and_index(law, domain):

@@ -212,6 +212,7 @@ def test_a_flat_rod_of_no_width():
     assert not found.labelled("LP")
 
 
+@pytest.mark.full
 def test_the_fold_of_1_2_is_born_at_the_pitchfork():
     """Gamma is a parameter like any other: the curve of folds runs down to where it meets the branch point of the circle."""
     fold = branch(1, 2, 10.0).labelled("LP")[0]

@@ -13,6 +13,7 @@ from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD
 KAPPA, NU, GAMMA = 3.3, 0.3, 0.1
 
 
+@pytest.mark.full
 def test_the_path_ends_on_the_primary_branch():
     """The first state without couples is the one on (1, 2) at this kappa_n, by the quadrature of that branch."""
     path = folding(FINITE_WIDTH, 1, KAPPA, NU, GAMMA)
@@ -21,6 +22,7 @@ def test_the_path_ends_on_the_primary_branch():
     assert path.couples[-1] == pytest.approx(0, abs=1e-9) and path.couples[0] == 0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("law", "m", "Gamma"), [(FINITE_WIDTH, 1, GAMMA), (FLAT_ROD, 3, None)])
 def test_the_couple_is_the_slope_of_the_energy(law, m, Gamma):
     """Work: 2 pi dE = C d(angle). The energy at every point against the integral of a spline through the couples."""

@@ -40,7 +40,9 @@ def assert_bifurcations(branch, name, values, change=1):
     assert not branch.notes
 
 
-@pytest.mark.parametrize("ends", COLUMNS)
+@pytest.mark.parametrize(
+    "ends", ["pinned-pinned", *(pytest.param(name, marks=pytest.mark.full) for name in COLUMNS if name != "pinned-pinned")]
+)
 def test_a_column_buckles_at_eulers_loads(ends):
     start, finish, loads = COLUMNS[ends]
     column = OpenStrip(ROD, start, finish, {"force_tangent": -1.0})
@@ -78,6 +80,7 @@ def test_greenhill():
     assert math.isclose(twisted.reactions(branch.points[-1])["M_tangent"], 0.8 * 12, rel_tol=1e-10)
 
 
+@pytest.mark.full
 def test_a_twisted_column_under_thrust():
     """Clamped and twisted, M = C turn: u'''' - i M u''' - T u'' = 0, u = u' = 0 at the ends (Love, sect. 272)."""
     rod, moment = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8}), 0.8
@@ -94,6 +97,7 @@ def test_a_twisted_column_under_thrust():
     assert_bifurcations(follow(start, "force_tangent", -40, 0, direction=-1), "force_tangent", [critical], change=2)
 
 
+@pytest.mark.full
 def test_michell_and_zajac():
     """A ring of a straight isotropic rod buckles at a twist of 2 pi sqrt(3) B/C (Michell 1889, Zajac 1962)."""
     rod = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})
@@ -109,6 +113,7 @@ LATERAL = {
 }  # fmt: skip
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("law", LATERAL)
 def test_a_cantilever_buckles_sideways(law):
     """A dead load at the tip in the stiff plane, P L**2 = 4.0126 sqrt(B1 C): with z = P s**2/2 sqrt(1/B1 C), the twist is
@@ -127,6 +132,7 @@ def own_weight() -> float:
     return 6 * brentq(lambda z: jv(-1 / 6, z), 1.5, 3, xtol=1e-15)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_a_strip_buckles_under_its_weight(nu):
     """18.178/sqrt(1 + nu), the same for the flat rod and for finite width (Audoly & Neukirch 2021, sect. 3)."""
@@ -136,6 +142,7 @@ def test_a_strip_buckles_under_its_weight(nu):
     assert_bifurcations(follow(strip.first_point(), "weight", -1, 25), "weight", [critical])
 
 
+@pytest.mark.full
 def test_a_strip_of_finite_width_buckles_under_its_weight():
     """The same weight, where B is the plate's: 1 - nu**2 times the value with that of the beam."""
     material = Material("finite width", {"nu": 0.3, "Gamma": 0.5})
@@ -145,6 +152,7 @@ def test_a_strip_of_finite_width_buckles_under_its_weight():
     assert_bifurcations(follow(strip.first_point(), "weight", -1, 25), "weight", [critical])
 
 
+@pytest.mark.full
 def test_pure_bending_in_the_stiff_plane():
     """Ends held against twist, moment M: M L = pi sqrt(B1 C) (Prandtl 1899; Timoshenko & Gere, sect. 6.2)."""
     strip = OpenStrip(LATERAL["rod"][0], hinge("width"), End("joint", axis=NORMAL, director=0, held=(NORMAL,)), {"moment": 0.0})
@@ -157,6 +165,7 @@ HELICES = {
 }  # fmt: skip
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("law", HELICES)
 def test_a_helix_under_a_wrench(law):
     """Constant strains w: M = dU/dw; M' = 0 on the directors gives w x M + d3 x n = 0 (Love, sect. 271), n along the axis w."""

@@ -170,6 +170,7 @@ CONTROLS = contin.VariationalProblem(
 )  # fmt: skip
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("problem, count, largest", [(RATES, 8, 80), (CONTROLS, 2, 5)], ids=["rates", "controls"])
 def test_index_against_finite_elements(problem, count, largest):
     """Random states: integral conditions, coupled and nonlinear end conditions, end energies, fewer controls than states."""

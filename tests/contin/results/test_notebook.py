@@ -33,6 +33,7 @@ def test_norm_is_the_root_mean_square_of_the_states(branch):
     assert branch.to_pandas().norm[3] == pytest.approx(math.sqrt((states[:, 0] ** 2 + states[:, 1] ** 2).mean()))
 
 
+@pytest.mark.full
 def test_stable_parts_are_solid_and_unstable_ones_dashed():
     """A soap film between two rings: a minimum of the area up to the fold, not one beyond it."""
     from matplotlib.figure import Figure
