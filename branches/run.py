@@ -61,7 +61,7 @@ def main(argv=None) -> int:
 
 
 def _run(options) -> int:
-    from branches.config import ConfigError, DiagramConfig, load
+    from branches.config import Config, ConfigError, DiagramConfig, load
 
     try:
         config = load(options.config, options.set)
@@ -74,13 +74,12 @@ def _run(options) -> int:
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
     from branches.files import StoreError
-    from branches.open_config import OpenConfig
     from contin import ContinError
 
-    if isinstance(config, OpenConfig):
-        from branches.open_job import run_stages as run
-    else:
+    if isinstance(config, Config):
         from branches.job import run_branch as run
+    else:
+        from branches.open_job import run_stages as run
 
     try:
         outcome = run(config, path, display, resume=options.resume, overwrite=options.overwrite)

@@ -31,7 +31,19 @@ def project(tmp_path, monkeypatch):
 
 
 #: Pages that take ten seconds or more each, most of it compiling their problems.
-LONG = {"architecture", "cycles", "explore", "finite-width", "how-to", "open-strips", "strips", "tutorial", "variational"}
+LONG = {
+    "architecture",
+    "contin",
+    "cycles",
+    "equations",
+    "explore",
+    "finite-width",
+    "how-to",
+    "open-strips",
+    "strips",
+    "tutorial",
+    "variational",
+}
 
 
 @pytest.mark.parametrize(

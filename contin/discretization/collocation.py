@@ -80,7 +80,8 @@ class Collocation(System):
         self._by_interval = degree * np.arange(self.intervals)[:, None] + np.arange(degree + 1)
         self.state_size = (self.intervals * degree + 1) * self._n
         self.size = self.state_size + len(self.free)
-        self.equations = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
+        self._conditions = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
+        self.equations = self._conditions
         node_weights = np.zeros(self.intervals * degree + 1)
         shares = (self._h[:, None] * self.basis.node_weights) / (b - a)
         for node in range(degree + 1):
@@ -165,7 +166,7 @@ class Collocation(System):
     # --- the discrete equations ----------------------------------------------------------------------------------
 
     def _residual(self, x: Array, field: Array, boundary: Array) -> Array:
-        residual = np.empty(self.equations)
+        residual = np.empty(self._conditions)
         collocate(self._n, self.basis.slope, self.basis.weights, self._h, x, field, boundary, residual)
         return residual
 

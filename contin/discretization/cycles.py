@@ -46,11 +46,6 @@ class CycleCollocation(Collocation):
     reference : ndarray, shape (K, n)
         The states of v at the nodes, in the user's units.
     Others as in `Collocation`.
-
-    Raises
-    ------
-    ProblemError
-        The reference is constant.
     """
 
     problem: CycleProblem
@@ -60,8 +55,7 @@ class CycleCollocation(Collocation):
         parameters: Mapping[str, float], scales: Scales | None = None, reference: Array | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
-        self._base_equations = self.equations
-        self.equations += 1
+        self.equations = self._conditions + 1
         self._known: dict[bytes, ComplexArray] = {}
         if reference is None:
             reference = np.zeros((self.nodes.size, self._n))
@@ -84,13 +78,6 @@ class CycleCollocation(Collocation):
     def residual(self, x: Array) -> Array:
         """Return the residual of the discrete equations at x, the phase condition last."""
         return np.append(super().residual(x), self._phase @ x)
-
-    def _residual(self, x: Array, field: Array, boundary: Array) -> Array:
-        self.equations, whole = self._base_equations, self.equations
-        try:
-            return super()._residual(x, field, boundary)
-        finally:
-            self.equations = whole
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
@@ -161,8 +148,9 @@ class CycleCollocation(Collocation):
             values = log_eigenvalues(self._transitions(jacobian))
             total = float(self._quadrature @ np.trace(jacobian, axis1=2, axis2=3).ravel())
             least = values.real <= values.real.min() + _EQUAL
-            # the smallest by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
-            values[least] += (total - values.real.sum()) / np.count_nonzero(least)
+            if not least[np.abs(values).argmin()]:  # where the smallest is 1, its error shall show
+                # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
+                values[least] += (total - values.real.sum()) / np.count_nonzero(least)
             self._known[key] = values
         return self._known[key]
 

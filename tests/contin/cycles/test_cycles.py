@@ -150,6 +150,7 @@ def test_a_branch_between_two_hopf_points_ends_at_the_second():
     assert end["max_x"] - end["min_x"] < 1e-9
 
 
+@pytest.mark.full
 def test_a_torus_bifurcation():
     """The cycle r = 1 of r' = r - r**3 in a plane, and beside it w' = (mu + i a) w: multipliers exp(2 pi (mu +- i a))."""
 
@@ -182,6 +183,7 @@ def test_a_stored_branch_goes_on(tmp_path):
     assert further.points[-1]["period"] == pytest.approx(2 * math.pi, abs=1e-10)
 
 
+@pytest.mark.full
 def test_folds_of_cycles_in_two_parameters():
     """r' = mu r + a r**3 - r**5: the fold lies at mu = -a**2 / 4, and dmu/da there is -a / 2."""
 

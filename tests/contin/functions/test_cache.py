@@ -208,6 +208,7 @@ print(batch.values(np.zeros(1), np.array([[2.0, 3.0]]), np.empty((0, 2)), np.arr
 """
 
 
+@pytest.mark.full
 def test_processes_that_compile_the_same_problem_at_once(tmp_path):
     environment = {**os.environ, "CONTIN_CACHE_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
     started = [
