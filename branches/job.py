@@ -73,13 +73,26 @@ def whole_branch(config: Config, path: Path, display) -> None:
         raise KeyboardInterrupt
 
 
+def is_done(path: Path, config: Config, display, resume: bool, overwrite: bool) -> bool:
+    """Return whether the file is complete already, and say so; if not, prepare it.
+
+    Raises
+    ------
+    StoreError, ConfigError
+        It may not be replaced or resumed.
+    """
+    done = _look_at(path, config, resume, overwrite)
+    if done is None:
+        prepare(path)
+        return False
+    display.note(f"{path} is complete already ({done}); nothing to do")
+    return True
+
+
 def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bool) -> str:
     began = time.perf_counter()
-    done = look_at(path, config, resume, overwrite)
-    if done is not None:
-        display.note(f"{path} is complete already ({done}); nothing to do")
+    if is_done(path, config, display, resume, overwrite):
         return "complete"
-    prepare(path)
     (run, watch), image = _resumed(config, path) if resume else (begun(config), None)
     with contextlib.closing(_writer(path, config, run, watch, image)) as writer:
         display.begin(config, writer.count, len(writer.events()))
@@ -190,7 +203,7 @@ def _follow(config: Config, run: Continuation, writer: BranchWriter, display, in
     return outcome
 
 
-def look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str | None:
+def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str | None:
     """Raise unless the file at ``path`` may be replaced or resumed; return its reason to stop if it is complete."""
     if not path.exists() or (overwrite and not resume):
         return None

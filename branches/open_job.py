@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from branches.config import ConfigError, dump
-from branches.files import prepare
-from branches.job import Interruption, look_at, writing
+from branches.job import Interruption, is_done, writing
 from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
 from branches.store import BranchWriter, Kind
@@ -72,11 +71,8 @@ def run_stages(config: OpenConfig, path: Path, display, *, resume: bool = False,
 
 def _run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite: bool) -> str:
     began = time.perf_counter()
-    done = look_at(path, config, resume, overwrite)
-    if done is not None:
-        display.note(f"{path} is complete already ({done}); nothing to do")
+    if is_done(path, config, display, resume, overwrite):
         return "complete"
-    prepare(path)
     strip = config.strip()
     start = first_state(config)
     with contextlib.closing(writer_of(config, strip, path)) as writer:

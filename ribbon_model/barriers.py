@@ -23,8 +23,10 @@ from ribbon_model.segments import Strip, discretized
 SEGMENTS, _MOST = 96, 400
 #: The kick: root mean square change of the strains, over 2 pi/L.
 _KICK = 0.02
-#: Difference of the strains from those of a circle, and of energies of the same state on the same segments.
+#: Difference of the strains from those of a circle, and of energies of the same state on the same segments, at rest.
 _PLANAR, _SAME = 1e-6, 1e-6
+#: The same where one of the two is the continuous state cut into segments, which are not quite at rest.
+_CUT = 1e-4
 
 Name = TypeVar("Name")
 
@@ -69,7 +71,7 @@ def covering_index(strip: Strip) -> int | None:
 def is_at(strip: Strip, state: Equilibrium) -> bool:
     """Return whether a strip at rest is a buckled state, by their energies on the same segments."""
     energy = discretized(state, len(strip.strains)).energy
-    return abs(strip.energy - energy) < 100 * _SAME * (1 + abs(energy))
+    return abs(strip.energy - energy) < _CUT * (1 + abs(energy))
 
 
 def barriers(

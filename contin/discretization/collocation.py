@@ -301,7 +301,7 @@ class Collocation(System):
         """Return the same with other mesh, free parameters, parameters or scales."""
         values = dict(zip(self.problem.parameters, self.parameters))
         kept = {"mesh": self.mesh, "free": self.free, "parameters": values, "scales": self.scales}
-        return Collocation(self.problem, degree=self.degree, **{**kept, **changes})
+        return type(self)(self.problem, degree=self.degree, **{**kept, **changes})
 
     def on_mesh(self, mesh: Array) -> tuple[Collocation, Carrier]:
         """Return the same problem on another mesh, and the function that carries vectors of unknowns over to it."""

@@ -41,25 +41,22 @@ class CycleCollocation(Collocation):
         [ u(0) - u(1)   ]
         [ phase row . x ]
 
-    Parameters
+    Attributes
     ----------
     reference : ndarray, shape (K, n)
-        The states of v at the nodes, in the user's units.
-    Others as in `Collocation`.
+        The states of v at the nodes, in the user's units; zero where `with_reference` has not set it.
     """
 
     problem: CycleProblem
 
     def __init__(
         self, problem: CycleProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
-        parameters: Mapping[str, float], scales: Scales | None = None, reference: Array | None = None,
+        parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         self.equations = self._conditions + 1
         self._known: dict[bytes, ComplexArray] = {}
-        if reference is None:
-            reference = np.zeros((self.nodes.size, self._n))
-        self._set_reference(reference)
+        self._set_reference(np.zeros((self.nodes.size, self._n)))
 
     def _set_reference(self, reference: Array) -> None:
         """Take the phase row from an orbit, states at the nodes."""
@@ -105,12 +102,7 @@ class CycleCollocation(Collocation):
         """Return the largest and smallest values of each state, then the means of the user's functionals."""
         states = self._dense(x)
         extremes = np.stack([states.max(axis=0), states.min(axis=0)], axis=1).ravel()
-        if not self.problem.means:
-            return extremes
-        batch = self.problem.batch("functionals")
-        points = self.states_at_gauss_points(x)
-        values = batch.values(self._times, points, np.empty((0, self._n)), self.all_parameters(x))
-        return np.concatenate([extremes, self._quadrature @ values])
+        return np.concatenate([extremes, super().functionals(x)]) if self.problem.means else extremes
 
     def _dense(self, x: Array) -> Array:
         """Return the states at places close to each other."""
@@ -172,14 +164,11 @@ class CycleCollocation(Collocation):
     # --- meshes and references -----------------------------------------------------------------------------------
 
     def _with(self, **changes: Any) -> CycleCollocation:
-        values = dict(zip(self.problem.parameters, self.parameters))
-        kept = {"mesh": self.mesh, "free": self.free, "parameters": values, "scales": self.scales}
-        other = CycleCollocation(self.problem, degree=self.degree, **{**kept, **changes})
-        reference = self.reference
-        if other.mesh is not self.mesh and not np.array_equal(other.mesh, self.mesh):
-            reference = self._between(reference, other.nodes)
-        other._set_reference(reference)
-        return other
+        other: Any = super()._with(**changes)
+        same = np.array_equal(other.mesh, self.mesh)
+        other._set_reference(self.reference if same else self._between(self.reference, other.nodes))
+        found: CycleCollocation = other
+        return found
 
     def _between(self, states: Array, times: Array) -> Array:
         """Return states at the nodes, in the user's units, carried to other times."""

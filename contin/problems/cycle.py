@@ -1,4 +1,4 @@
-"""Periodic orbits as the user states them: a vector field, autonomous or forced."""
+"""Periodic orbits as the user states them: an autonomous vector field."""
 
 from __future__ import annotations
 
