@@ -74,6 +74,13 @@ def test_exponent_of_a_power_law():
     assert cost.slope(x, 3.0 * x**2.5) == pytest.approx(2.5)
 
 
+def test_errors_fall_with_the_intervals():
+    """Degree 4 converges with the power 8; the truth is the exact quadrature."""
+    rows = cost._errors(*cost.CASES[0], counts=(5, 10), degrees=(4,))["rows"]
+    for coarse, fine in zip(rows[:2], rows[2:]):  # uniform, adapted
+        assert fine["error"] < coarse["error"] / 30
+
+
 def test_flops_of_one_interval_of_one_state():
     """degree 1, n = 1: nothing inside; one link of two rows and four columns, one elimination in one row and one border row."""
     assert cost.flops(1, 1, 1) == 2 * 2 * 3

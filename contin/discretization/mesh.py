@@ -88,17 +88,32 @@ def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl)
     bound) over as many intervals as ``control.tolerance`` takes, by the interpolation error of degree d.
     """
     h, d = np.diff(mesh), basis.degree
-    phi = density(basis, mesh, states)
-    padded = np.pad(phi, 1, mode="edge")
-    phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
-    phi = np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
+    phi = _raised(density(basis, mesh, states), h)
     total = phi @ h
     allowed = (_BETWEEN * control.tolerance ** ((d + 1) / (2 * d)) / basis.constant) ** (1 / (d + 1))
     wanted = int(np.clip(np.ceil(total / allowed), control.min_intervals, control.max_intervals))
     enough = wanted <= h.size <= max(_TOO_MANY * wanted, control.min_intervals)
     if enough and (phi * h).max() <= _TOO_LARGE * max(total / h.size, allowed * wanted / h.size):
         return None
-    intervals = h.size if enough else wanted
+    return _equidistributed(mesh, phi, h.size if enough else wanted)
+
+
+def equidistributed(basis: Basis, mesh: Array, states: Array, intervals: int) -> Array:
+    """Return a mesh of so many intervals for a solution that is given on another mesh."""
+    return _equidistributed(mesh, _raised(density(basis, mesh, states), np.diff(mesh)), intervals)
+
+
+def _raised(phi: Array, h: Array) -> Array:
+    """Return the density, smoothed and not far below its mean."""
+    padded = np.pad(phi, 1, mode="edge")
+    phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
+    return np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
+
+
+def _equidistributed(mesh: Array, phi: Array, intervals: int) -> Array:
+    """Return a mesh whose intervals have equal shares of the density."""
+    h = np.diff(mesh)
+    total = phi @ h
     if not total > 0:
         return np.linspace(mesh[0], mesh[-1], intervals + 1)
     share = np.concatenate([[0.0], np.cumsum(phi * h)]) / total

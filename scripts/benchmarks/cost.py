@@ -10,7 +10,7 @@ import numpy as np
 
 import contin
 from benchmarks.measure import median
-from contin.discretization.mesh import density
+from contin.discretization.mesh import equidistributed
 from contin.stepping.trial import Trial
 from ribbon_model import exact
 from ribbon_model.laws import RIBBON
@@ -23,12 +23,13 @@ DEGREES = range(2, 9)
 def run(quick: bool) -> dict:
     """Return all cost laws."""
     repeats = 5 if quick else 15
+    counts = (5, 10, 20, 40, 80) if quick else (5, 8, 12, 20, 32, 50, 80, 125, 200)
     return {
         "intervals": _sweep([(n, 7, 4) for n in (10, 20, 40, 80, 160, 320, 640)], repeats),
         "components": _sweep([(20, n, 4) for n in (2, 4, 7, 13, 20, 26, 40)], repeats),
         "degree": _sweep([(40, 7, d) for d in DEGREES], repeats),
         "blas": [_blas(size) for size in (8, 16, 28, 52, 80, 104, 160)],
-        "errors": [_errors(*case, quick=quick) for case in CASES],
+        "errors": [_errors(*case, counts, DEGREES) for case in CASES],
     }
 
 
@@ -118,14 +119,13 @@ CASES = (
 )
 
 
-def _errors(m, n, limits, chosen, name, quick) -> dict:
+def _errors(m, n, limits, chosen, name, counts, degrees) -> dict:
     """Return the error of kappa* at a point of the exact branch, by degree and intervals, on uniform and adapted meshes."""
     truth = next(point for point in exact.curve(m, n, NU, kappa_limits=limits) if chosen(point))
     system, x = _reference(m, n, truth)
     truth = exact.solve(m, n, NU, truth, kappa_n=system.parameter(x, "kappa_n"))
     rows = []
-    counts = (5, 10, 20, 40, 80) if quick else (5, 8, 12, 20, 32, 50, 80, 125, 200)
-    for degree in DEGREES:
+    for degree in degrees:
         for intervals in counts:
             for adapted in (False, True):
                 try:
@@ -162,12 +162,7 @@ def _kappa_star(reference, x, intervals, degree, adapted) -> float:
     mesh = np.linspace(0, 1, intervals + 1)
     if adapted:
         fine = on(reference.mesh)
-        values = density(fine, reference.carrier(fine)(x))
-        h = np.diff(fine.mesh)
-        values = np.maximum(values, 0.1 * (values @ h))
-        share = np.concatenate([[0.0], np.cumsum(values * h)])
-        mesh = np.interp(mesh, share / share[-1], fine.mesh)
-        mesh[0], mesh[-1] = 0.0, 1.0
+        mesh = equidistributed(fine.basis, fine.mesh, fine.states(reference.carrier(fine)(x)), intervals)
     system = on(mesh)
     guess = reference.carrier(system)(x)
     row = np.zeros(system.size)
