@@ -1,4 +1,5 @@
 # The public names, and where they come from. `import contin` loads none of them: each is imported when it is first used.
+from .analysis.connections import homoclinic
 from .analysis.cycles import cycle
 from .analysis.diagram import Diagram, diagram
 from .analysis.sensitivity import sensitivities
@@ -21,6 +22,7 @@ from .functions.pointwise import Pointwise
 from .names import exact_text
 from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
+from .problems.connection import ConnectionProblem
 from .problems.cycle import CycleProblem
 from .problems.variational import VariationalProblem
 from .results.branch import Branch
@@ -33,10 +35,10 @@ from .stepping.state import State, Stop
 from .stepping.trial import Monitor, TestFunction, Trial
 
 __all__ = [
-    "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation", "ContinError",
-    "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl", "Monitor", "MultiplePoint", "Newton",
-    "Point", "Pointwise", "ProblemError", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial",
-    "VariationalProblem", "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow",
-    "gradient", "interpolation", "load", "locate_branch_point", "point_of", "read_columns", "save", "sensitivities",
-    "solve", "temporary_name", "trace", "write_whole",
+    "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation",
+    "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl",
+    "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise", "ProblemError", "Settings", "State", "Stop", "StoredColumns",
+    "TestFunction", "Trial", "VariationalProblem", "basis", "cache_directory", "correct", "curve", "cycle", "diagram",
+    "exact_text", "follow", "gradient", "homoclinic", "interpolation", "load", "locate_branch_point", "point_of",
+    "read_columns", "save", "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

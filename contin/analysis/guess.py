@@ -14,7 +14,7 @@ from contin.analysis.multipliers import with_guessed_multipliers
 from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
-from contin.discretization.cycles import CycleCollocation, discretized
+from contin.discretization.kinds import discretized
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.names import exact_text
@@ -71,7 +71,7 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
         return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
     states = _sampled(guess, system.nodes, len(problem.state_names))
     x = system.pack(states, {**problem.parameters, **options.parameters})
-    return (system.with_reference(x) if isinstance(system, CycleCollocation) else system), x
+    return system.with_reference(x), x
 
 
 def _sampled(guess: Guess, nodes: Array, count: int) -> Array:

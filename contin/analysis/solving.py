@@ -79,6 +79,16 @@ def solve(
     system, x = first_guess(problem, guess, Options(parameters, free, intervals, degree))
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
+    return solved(system, x, control, newton, others)
+
+
+def solved(system: System, x: Array, control: MeshControl, newton: Newton, others: Sequence[Point] = ()) -> Point:
+    """Return the solution near a vector of unknowns, on a mesh adapted to it.
+
+    Raises
+    ------
+    ConvergenceError, ProblemError
+    """
     for _ in range(_ROUNDS):
         done = _corrected(system, x, others, newton)
         adapted = system.adapted(done.x, control)

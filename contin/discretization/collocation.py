@@ -312,6 +312,10 @@ class Collocation(System):
         """Return the same problem with every interval halved, and the carrier."""
         return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
 
+    def with_reference(self, x: Array) -> Collocation:
+        """Return the same with x as the orbit that a phase condition refers to, where a kind of problem has one."""
+        return self
+
     def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
         """Return the same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
         mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control) if control.every else None

@@ -17,7 +17,6 @@ from contin.errors import ProblemError
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.periodic import log_eigenvalues
-from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import CycleProblem
 
 #: A multiplier on the unit circle that is this near to -1, as an angle, is -1: round-off of a double one is its square root.
@@ -200,13 +199,3 @@ class CycleCollocation(Collocation):
         other = self._with(mesh=self.mesh if mesh is None else mesh)
         other._set_reference(self._between(self.states(x), other.nodes))
         return other, self.carrier(other)
-
-
-def discretized(
-    problem: BoundaryValueProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
-    parameters: Mapping[str, float], scales: Scales | None = None,
-) -> Collocation:  # fmt: skip
-    """Return a boundary value problem on a mesh: the system of its kind."""
-    if isinstance(problem, CycleProblem):
-        return CycleCollocation(problem, mesh, degree, free, parameters, scales)
-    return Collocation(problem, mesh, degree, free, parameters, scales)

@@ -107,7 +107,8 @@ def _raised(phi: Array, h: Array) -> Array:
     """Return the density, smoothed and not far below its mean."""
     padded = np.pad(phi, 1, mode="edge")
     phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
-    return np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
+    raised: Array = np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
+    return raised
 
 
 def _equidistributed(mesh: Array, phi: Array, intervals: int) -> Array:

@@ -16,7 +16,7 @@ from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
-from contin.discretization.cycles import CycleCollocation, discretized
+from contin.discretization.kinds import discretized
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
 from contin.files import write_whole
@@ -150,7 +150,7 @@ def _system(
 
 def _point(row: dict[str, Any], system: Collocation | Algebraic, arrays: dict[str, Array], number: int) -> Point:
     x = arrays[f"x{number}"]
-    system = system.with_reference(x) if isinstance(system, CycleCollocation) else system
+    system = system.with_reference(x) if isinstance(system, Collocation) else system
     details: BranchPoint | MultiplePoint | None = None
     if row["imperfection"] is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}

@@ -1,0 +1,88 @@
+"""A homoclinic orbit from a cycle of long period."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.analysis.solving import solve, solved
+from contin.arrays import Array
+from contin.discretization.connections import ConnectionCollocation
+from contin.discretization.cycles import CycleCollocation
+from contin.discretization.mesh import MeshControl
+from contin.errors import ContinError, ProblemError
+from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.connection import TIME, ConnectionProblem
+from contin.problems.cycle import PERIOD
+from contin.results.point import Point
+from contin.stepping.newton import Newton
+
+
+def homoclinic(cycle: Point, free: Sequence[str], *, mesh: MeshControl | None = None, newton: Newton = Newton()) -> Point:
+    """Return the homoclinic orbit near a cycle that spends most of its period beside a saddle.
+
+    The cycle is cut where it comes closest to the saddle, and corrected as a `ConnectionProblem`. Its time is the period of
+    the cycle. Follow the result with two free parameters, or with ``time`` and one to make the column ``gap`` smaller.
+
+    Parameters
+    ----------
+    cycle : Point
+        Of a `CycleProblem`.
+    free : sequence of str
+        The parameter to be found.
+    mesh, newton : optional
+        As in `solve`.
+
+    Raises
+    ------
+    ProblemError
+        It is no cycle, or the equilibrium next to it is no saddle.
+    ConvergenceError
+        No homoclinic orbit is found near the cycle.
+    """
+    checks.instance("cycle", cycle, Point, "a Point")
+    system: Any = cycle.system
+    if not isinstance(system, CycleCollocation):
+        raise ProblemError("cycle: must be a point of a CycleProblem")
+    states, names = system.states(cycle.x), system.problem.state_names
+    rest, unstable = _saddle(cycle, states)
+    parameters = {name: value for name, value in cycle.parameters.items() if name != PERIOD}
+    problem = ConnectionProblem(system.problem.field, names, parameters, unstable=unstable)
+    degree = system.degree
+    cut = int(np.abs(states[::degree] - rest).max(axis=1)[:-1].argmin())  # at a mesh point
+    mesh_points = np.concatenate([system.mesh[cut:], 1 + system.mesh[1 : cut + 1]]) - system.mesh[cut]
+    mesh_points[-1] = 1.0
+    turned = np.concatenate([states[cut * degree :], states[1 : cut * degree + 1]])
+    values = {**parameters, TIME: cycle.parameters[PERIOD], **dict(zip(problem.multipliers, rest))}
+    started = ConnectionCollocation(problem, mesh_points, degree, tuple(free), values)
+    x = started.pack(turned, values)
+    return solved(started.with_reference(x), x, MeshControl() if mesh is None else mesh, newton)
+
+
+def _saddle(cycle: Point, states: Array) -> tuple[Array, int]:
+    """Return the equilibrium that a cycle comes closest to, shape (n,), and the number of its unstable eigenvalues.
+
+    Raises
+    ------
+    ProblemError
+        None is found from where the motion is slowest, or it is no saddle.
+    """
+    system: Any = cycle.system
+    problem = system.problem
+    parameters = system.all_parameters(cycle.x)
+    rates = problem.batch("field").values(system.nodes, states, np.empty((0, states.shape[1])), parameters)
+    slowest = states[np.linalg.norm(rates, axis=1).argmin()]
+    equilibria = AlgebraicProblem(problem.field, problem.state_names, problem.parameters)
+    try:
+        rest = solve(equilibria, slowest, cycle.parameters)
+    except ContinError as error:
+        raise ProblemError(f"cycle: no equilibrium is found where it is slowest: {error}") from error
+    eigenvalues = np.linalg.eigvals(rest.system.jacobian(rest.x))  # type: ignore[attr-defined]
+    unstable = int(np.count_nonzero(eigenvalues.real > 0))
+    if unstable in (0, len(eigenvalues)):
+        kind = "stable" if unstable == 0 else "a source"
+        raise ProblemError(f"cycle: the equilibrium where it is slowest is {kind}, no saddle; take a cycle of longer period")
+    return rest.x, unstable

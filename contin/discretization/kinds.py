@@ -1,0 +1,26 @@
+"""Which system discretizes which kind of boundary value problem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from contin.arrays import Array
+from contin.discretization.collocation import Collocation
+from contin.discretization.connections import ConnectionCollocation
+from contin.discretization.cycles import CycleCollocation
+from contin.discretization.scales import Scales
+from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.connection import ConnectionProblem
+from contin.problems.cycle import CycleProblem
+
+
+def discretized(
+    problem: BoundaryValueProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+    parameters: Mapping[str, float], scales: Scales | None = None,
+) -> Collocation:  # fmt: skip
+    """Return a boundary value problem on a mesh: the system of its kind."""
+    if isinstance(problem, CycleProblem):
+        return CycleCollocation(problem, mesh, degree, free, parameters, scales)
+    if isinstance(problem, ConnectionProblem):
+        return ConnectionCollocation(problem, mesh, degree, free, parameters, scales)
+    return Collocation(problem, mesh, degree, free, parameters, scales)

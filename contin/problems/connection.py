@@ -1,0 +1,151 @@
+"""Connecting orbits as the user states them: orbits from one equilibrium of a vector field to another, or back to it."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from contin import checks
+from contin.arrays import Function
+from contin.errors import ProblemError
+from contin.functions.batch import Batch
+from contin.functions.signature import Signature, argument_count, result_count
+from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.statement import check_statement
+
+#: The name, among the parameters, of the time that the computed part of the orbit takes.
+TIME = "time"
+
+
+class ConnectionProblem(BoundaryValueProblem):
+    """Orbits of u' = F(u, p) that connect equilibria, cut off to a time: u' = time F(u, p) on the unit interval.
+
+    The orbit begins in the plane that is tangent to the unstable manifold of the first equilibrium, and ends in the one that
+    is tangent to the stable manifold of the last one (projection conditions, Beyn 1990). A phase condition keeps it from
+    sliding along itself. The equilibria are found along: their coordinates are the parameters ``from_`` + state and ``to_`` +
+    state, which are free on every curve and need not be named. An orbit that returns to its equilibrium (homoclinic) has no
+    ``to_``.
+
+    The error of cutting off is about the square of the column ``gap``, the largest distance of an end from its equilibrium
+    divided by the size of the orbit. A longer ``time`` makes it smaller.
+
+    Parameters
+    ----------
+    field : callable
+        ``field(u, p)`` returns the rates of the states.
+    states : sequence of str
+    parameters : mapping of str to float
+        Names and default values.
+    unstable : int
+        Dimension of the unstable manifold of the first equilibrium.
+    stable : int, optional
+        Dimension of the stable manifold of the last equilibrium; without it the orbit is homoclinic.
+
+    Raises
+    ------
+    ProblemError
+        A name, function or dimension that cannot be used.
+
+    Notes
+    -----
+    A curve needs n - unstable - stable + 2 free parameters besides the equilibria: two for homoclinic orbits.
+
+    Examples
+    --------
+    The travelling front of u_t = u_xx + u (1 - u) (u - a) has the speed (1 - 2 a) / sqrt(2):
+
+    >>> import contin, math
+    >>> def field(u, p):
+    ...     return u.v, p.c * u.v - u.u * (1 - u.u) * (u.u - p.a)
+    >>> problem = ConnectionProblem(field, ["u", "v"], {"a": 0.25, "c": 0.3}, unstable=1, stable=1)
+    >>> def guess(t):
+    ...     s = math.tanh(20 * (t - 0.5) / math.sqrt(8))
+    ...     return (1 + s) / 2, (1 - s**2) / math.sqrt(32)
+    >>> front = contin.solve(problem, guess, {"time": 40, "to_u": 1}, free=["c"])
+    >>> print(abs(front["c"] - 0.5 / math.sqrt(2)) < 1e-8)
+    True
+    """
+
+    field: Function
+    unstable: int
+    stable: int
+    homoclinic: bool
+
+    def __init__(
+        self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *, unstable: int,
+        stable: int | None = None,
+    ) -> None:  # fmt: skip
+        names = check_statement(states, parameters, {})
+        homoclinic, count = stable is None, len(names)
+        checks.whole("unstable", unstable, 1, count - 1 if homoclinic else count)
+        if stable is not None:
+            checks.whole("stable", stable, 1, count)
+        first, last = ([kind + name for name in names] for kind in ("from_", "to_"))
+        own = [TIME, *first] if homoclinic else [TIME, *first, *last]
+        for name in own:
+            if name in parameters:
+                raise ProblemError(f"parameters: {name} is a parameter of every connection by itself")
+        signature = Signature(names, (*parameters, *own), times=False)
+        if argument_count(checks.function("field", field)) != 2:
+            raise ProblemError("field: must be a function of (u, p)")
+        found = result_count(field, signature.arguments, "field")
+        if found != count:
+            raise ProblemError(f"field returns {found} values for the {count} states {', '.join(names)}")
+        object.__setattr__(self, "field", field)
+        object.__setattr__(self, "homoclinic", homoclinic)
+        object.__setattr__(self, "unstable", unstable)
+        object.__setattr__(self, "stable", count - unstable if stable is None else stable)
+        rhs, boundary = _scaled_by_time(field, count), _at_rest(field, names, homoclinic)
+        super().__init__(rhs, boundary, names, {**parameters, TIME: 1.0, **dict.fromkeys(own[1:], 0.0)})
+        object.__setattr__(self, "functionals", {"gap": _found_elsewhere})
+
+    @property
+    def multipliers(self) -> tuple[str, ...]:
+        """Names of the parameters that are free on every curve: the coordinates of the equilibria."""
+        kinds = ("from_",) if self.homoclinic else ("from_", "to_")
+        return tuple(kind + name for kind in kinds for name in self.state_names)
+
+    @property
+    def conditions(self) -> tuple[int, int]:
+        """Numbers of projection conditions at the first and at the last end."""
+        return len(self.state_names) - self.unstable, len(self.state_names) - self.stable
+
+    @property
+    def free_size(self) -> int:
+        """Number of free parameters on a curve: as many as conditions, less the states, and one."""
+        return self.boundary_size + sum(self.conditions) + 1 - len(self.state_names) + 1
+
+    def _compiled(self, name: str) -> Batch:
+        if name == "vector field":
+            return Batch([self.field], [len(self.state_names)], self.state_names, tuple(self.parameters), times=False)
+        return super()._compiled(name)
+
+
+def _found_elsewhere(u: Any, p: Any) -> Any:
+    """Stand for a column that is not an integral."""
+    raise NotImplementedError
+
+
+def _scaled_by_time(field: Function, count: int) -> Function:
+    """Return the field times the time; the text is generated because compiled code has tuples of fixed sizes."""
+    scope: dict[str, Any] = {"field": field, "__name__": __name__}
+    values = "".join(f"p.time * r[{i}], " for i in range(count))
+    exec(f"def rhs(t, u, p):\n    r = field(u, p)\n    return ({values})", scope)
+    found: Function = scope["rhs"]
+    return found
+
+
+def _at_rest(field: Function, names: Sequence[str], homoclinic: bool) -> Function:
+    """Return the boundary conditions: the field vanishes at the equilibria."""
+    state: Any = namedtuple("State", names)  # type: ignore[misc]  # noqa: PYI024
+    scope: dict[str, Any] = {"field": field, "State": state, "__name__": __name__}
+    lines = ["def boundary(a, b, p):"]
+    values = []
+    for kind in ("from_",) if homoclinic else ("from_", "to_"):
+        lines.append(f"    {kind} = field(State({''.join(f'p.{kind}{name}, ' for name in names)}), p)")
+        values += [f"{kind}[{i}], " for i in range(len(names))]
+    lines.append(f"    return ({''.join(values)})")
+    exec("\n".join(lines), scope)
+    found: Function = scope["boundary"]
+    return found
