@@ -11,5 +11,13 @@ class ProblemError(ContinError, ValueError):
     """The statement of a problem is not usable; the message names the field, the value and what is allowed."""
 
 
+class CompilationError(ProblemError):
+    """A function cannot be compiled, or differentiated symbolically."""
+
+
+class InterpretedWarning(UserWarning):
+    """A function cannot be compiled and is evaluated in Python; the message says why, and what it costs."""
+
+
 class ConvergenceError(ContinError, ArithmeticError):
     """Newton's method did not converge; the message holds the last residuals and what to change."""

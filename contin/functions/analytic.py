@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numba
+import numpy as np
 from numba import types
 from numba.core import ir
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -20,7 +21,7 @@ from numba.core.untyped_passes import IRProcessing
 from numba.extending import overload
 
 from contin.arrays import Function
-from contin.errors import ProblemError
+from contin.errors import CompilationError
 from contin.functions.complex_step import REPLACED, ComplexStep
 from contin.functions.kernel import Kernel
 from contin.functions.pointwise import parts, searches
@@ -40,7 +41,15 @@ class _Compiled(ComplexStep):
     def stand_in(self, value: Any) -> Any:
         """Return the stand-in as compiled code calls it."""
         found = super().stand_in(value)
-        return numba.njit(found) if found in REPLACED.values() else found
+        return numba.njit(_with_helpers(found)) if found in REPLACED.values() else found
+
+
+def _with_helpers(function: Function) -> Function:
+    """Return a copy of a stand-in that calls compiled code in place of its helpers."""
+    plain: Any = function
+    helpers = {name: plain.__globals__.get(name) for name in plain.__code__.co_names}
+    compiled = {name: numba.njit(helper) for name, helper in helpers.items() if isinstance(helper, python_types.FunctionType)}
+    return python_types.FunctionType(plain.__code__, plain.__globals__ | compiled, plain.__name__)
 
 
 def compile_batch(kernel: Kernel, functions: Sequence[Function]) -> Any:
@@ -48,8 +57,8 @@ def compile_batch(kernel: Kernel, functions: Sequence[Function]) -> Any:
 
     Raises
     ------
-    ProblemError
-        A function that cannot be compiled; the message says which and why.
+    CompilationError
+        The message says which function cannot be compiled, and why.
     """
     rewriter = _Compiled()
     compiled = {f"function{i}": rewriter.function(parts(function)[0]) for i, function in enumerate(functions)}
@@ -57,9 +66,9 @@ def compile_batch(kernel: Kernel, functions: Sequence[Function]) -> Any:
     kernel.function.__globals__.update(compiled)
     try:
         return kernel.compiled
-    except (numba.core.errors.NumbaError, AssertionError) as error:  # the latter are numba's own
+    except Exception as error:  # besides its own exceptions, numba lets others through where it meets what it does not expect
         names = " and ".join(function.__name__ for function in functions)
-        raise ProblemError(_explanation(names, error)) from error
+        raise CompilationError(_explanation(names, error)) from error
 
 
 def _explanation(name: str, error: Exception) -> str:
@@ -67,8 +76,8 @@ def _explanation(name: str, error: Exception) -> str:
     reason = next((line for line in lines if line.startswith(_REASONS)), None)
     reason = reason or (lines[0] if lines else "numba fails (a list of whole and other numbers? write 0.0, not 0)")
     return (
-        f"function {name!r} cannot be compiled for real and complex numbers: {reason} "
-        "(use arithmetic, comparisons, and functions of numbers from math or numpy)"
+        f"function {name!r} cannot be compiled for real and complex numbers ({reason}); arithmetic, comparisons, and functions "
+        "of numbers from math or numpy can"
     )
 
 
@@ -182,10 +191,40 @@ def _compare(function, plain):
     return function
 
 
+def remainder(a, b):
+    """a % b, with the quotient of the real parts."""
+    return a - b * np.floor(a.real / b.real)
+
+
+def quotient(a, b):
+    """a // b of the real parts."""
+    return np.floor(a.real / b.real)
+
+
+def _plain_remainder(a, b):
+    return a % b
+
+
+def _plain_quotient(a, b):
+    return a // b
+
+
+def _divide(function, plain):
+    def choose(a, b):
+        return function if isinstance(a, types.Complex) or isinstance(b, types.Complex) else plain
+
+    overload(function)(choose)
+    return function
+
+
 #: Operators whose meaning for complex numbers spoils the complex step, and the functions called in their place.
 _STAND_INS = {
     operator.pow: power,
     operator.ipow: power,
+    operator.mod: _divide(remainder, _plain_remainder),
+    operator.imod: remainder,
+    operator.floordiv: _divide(quotient, _plain_quotient),
+    operator.ifloordiv: quotient,
     operator.gt: _compare(greater, _plain_greater),
     operator.lt: _compare(less, _plain_less),
     operator.ge: _compare(greater_equal, _plain_greater_equal),

@@ -19,9 +19,11 @@ import numpy as np
 
 from contin import threads
 from contin.arrays import Array, Function, Indices, Pattern
-from contin.errors import ProblemError
+from contin.errors import CompilationError, ProblemError
+from contin.functions.cache import keep_text, kept_text
 from contin.functions.colouring import Colouring, colouring
 from contin.functions.complex_step import ComplexStep
+from contin.functions.interpreted import Interpreted
 from contin.functions.kernel import Kernel
 from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, Vector
 from contin.functions.machine_code import Raised
@@ -70,10 +72,15 @@ class Batch:
     times : bool
         The functions take t; ``f(u, p)`` without.
 
+    Warns
+    -----
+    InterpretedWarning
+        A function that cannot be compiled, when derivatives are first asked for; the message says which and why.
+
     Raises
     ------
     ProblemError
-        A function that cannot be compiled; the message says which and why.
+        No functions, or not a count for each.
 
     Examples
     --------
@@ -102,15 +109,27 @@ class Batch:
         if not self._functions or len(self._functions) != len(self._counts):
             raise ProblemError("functions: there must be at least one, with a count for each")
         self._colourings: dict[tuple[int, ...], Colouring] = {}
-        rewriter = ComplexStep()
-        for function in functions:
-            rewriter.function(parts(function)[0])
-        for solve in searches(functions):
-            rewriter.function(solve)
-        source = _source(self.signature, functions, counts)
-        rewriter.note(source, self.signature.states, self.signature.parameters)
         self._seconds: dict[int, float] = {}  # a place takes, by the number of colours
-        self._evaluate = _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
+        try:
+            self._evaluate: Any = self._compiled()
+        except CompilationError as error:
+            self._evaluate = Interpreted(self._functions, self._counts, self.signature, str(error))
+
+    def _compiled(self) -> Any:
+        """Return the generated kernel.
+
+        Raises
+        ------
+        CompilationError
+        """
+        rewriter = ComplexStep()
+        for function in self._functions:
+            rewriter.function(parts(function)[0])
+        for solve in searches(self._functions):
+            rewriter.function(solve)
+        source = _source(self.signature, self._functions, self._counts)
+        rewriter.note(source, self.signature.states, self.signature.parameters)
+        return _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
@@ -151,7 +170,8 @@ class Batch:
             What one call for all places raises: the same for any number of threads.
         """
         count, kind = len(given[1]), len(given[5])
-        if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
+        long = count * self._seconds.get(kind, 0.0) > _LONG and not isinstance(self._evaluate, Interpreted)
+        if long and threads.count() > 1:
             with contextlib.suppress(Raised):  # parts are not in the order of one call
                 threads.each(self._evaluate_part, _divided(given))
                 return
@@ -258,8 +278,7 @@ def _evaluate(key: str, source: str, signature: Signature, functions: Sequence[F
 
     Raises
     ------
-    ProblemError
-        A function that cannot be compiled.
+    CompilationError
     """
     if key in _KNOWN:
         return _KNOWN[key]
@@ -271,8 +290,16 @@ def _evaluate(key: str, source: str, signature: Signature, functions: Sequence[F
     kernel = Kernel(scope["evaluate"], reorder=False, key=key)
     found = kernel.stored()
     if found is None:
+        refusal = f"u{kernel.key}.txt"
+        reason = kept_text(refusal)
+        if reason:  # it could not be compiled before
+            raise CompilationError(reason)
         from contin.functions.analytic import compile_batch  # numba takes .3 s, and is needed the first time only
 
-        found = compile_batch(kernel, functions)
+        try:
+            found = compile_batch(kernel, functions)
+        except CompilationError as error:
+            keep_text(refusal, str(error))
+            raise
     _KNOWN[key] = found
     return found

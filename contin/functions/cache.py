@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import sys
@@ -41,6 +42,20 @@ def _temporary_directory() -> Path:
         raise ContinError(f"no place for compiled code: {error.strerror}; {_ADVICE}") from error
     print(f"contin: no writable cache, compiling into {path}; set CONTIN_CACHE_DIR to keep it", file=sys.stderr)
     return path
+
+
+def kept_text(name: str) -> str:
+    """Return the text that `keep_text` kept under a name, nothing where there is none."""
+    try:
+        return (cache_directory() / name).read_text(encoding="utf-8")
+    except OSError:
+        return ""
+
+
+def keep_text(name: str, text: str) -> None:
+    """Keep a short text in the cache directory, if it can be written."""
+    with contextlib.suppress(OSError):
+        write_whole(cache_directory() / name, text.encode("utf-8"))
 
 
 def run_kept_source(name: str, derive: Callable[[], str], scope: dict[str, Any]) -> None:

@@ -6,6 +6,8 @@ only, by ones that are analytic in the real part's branch:
 - comparisons, ``abs``, ``sign``, ``max`` and ``min`` decide on real parts;
 - integer powers become products (the polar form of a complex power loses the tiny imaginary part of a negative base);
 - ``atan2`` is turned by its real angle;
+- ``floor``, ``ceil`` and ``trunc`` are of the real part, and so is the quotient in ``%`` and ``//``;
+- ``erf``, ``erfc``, ``gamma`` and ``lgamma`` are the value at the real part and the exact first derivative;
 - functions of ``math``, which exist for real numbers only, become those of numpy.
 
 Functions are replaced where a `Rewriter` meets them (`ComplexStep`), operators by a pass of the compiler
@@ -44,12 +46,64 @@ def _analytic_atan2(y: Any, x: Any) -> Any:
     return np.arctan2(b, a) + np.arctan((y * a - x * b) / (x * a + y * b))
 
 
+def _analytic_hypot(a: Any, b: Any) -> Any:
+    return np.sqrt(a * a + b * b)
+
+
+def _analytic_floor(z: Any) -> Any:
+    return np.floor(z.real)
+
+
+def _analytic_ceil(z: Any) -> Any:
+    return np.ceil(z.real)
+
+
+def _analytic_trunc(z: Any) -> Any:
+    return np.trunc(z.real)
+
+
+def _analytic_erf(z: Any) -> Any:
+    return math.erf(z.real) + (z - z.real) * _OF_ERF * math.exp(-z.real * z.real)
+
+
+def _analytic_erfc(z: Any) -> Any:
+    return math.erfc(z.real) - (z - z.real) * _OF_ERF * math.exp(-z.real * z.real)
+
+
+def _analytic_gamma(z: Any) -> Any:
+    return math.gamma(z.real) * (1.0 + (z - z.real) * _digamma(z.real))
+
+
+def _analytic_lgamma(z: Any) -> Any:
+    return math.lgamma(z.real) + (z - z.real) * _digamma(z.real)
+
+
+#: Slope of the error function at 0.
+_OF_ERF = 2 / math.sqrt(math.pi)
+
+
+def _digamma(x: Any) -> Any:
+    """Return the derivative of log gamma: reflected, raised to 10 by recurrence, then the asymptotic series (DLMF 5.11.2)."""
+    reflected, total = x < 0.5, 0.0
+    if reflected:
+        total, x = -math.pi / math.tan(math.pi * x), 1 - x
+    while x < 10:
+        total -= 1 / x
+        x += 1
+    y = 1 / (x * x)
+    series = y * (1 / 12 - y * (1 / 120 - y * (1 / 252 - y * (1 / 240 - y * (1 / 132 - y * (691 / 32760 - y / 12))))))
+    return total + math.log(x) - 0.5 / x - series
+
+
 #: Functions that are not analytic, and what replaces them.
 REPLACED: dict[Any, Function] = {
     abs: _analytic_abs, math.fabs: _analytic_abs, np.absolute: _analytic_abs, np.fabs: _analytic_abs, np.sign: _analytic_sign,
     max: _analytic_max, np.maximum: _analytic_max, np.fmax: _analytic_max,
     min: _analytic_min, np.minimum: _analytic_min, np.fmin: _analytic_min,
-    math.atan2: _analytic_atan2, np.arctan2: _analytic_atan2,
+    math.atan2: _analytic_atan2, np.arctan2: _analytic_atan2, math.hypot: _analytic_hypot, np.hypot: _analytic_hypot,
+    math.floor: _analytic_floor, np.floor: _analytic_floor, math.ceil: _analytic_ceil, np.ceil: _analytic_ceil,
+    math.trunc: _analytic_trunc, np.trunc: _analytic_trunc, math.erf: _analytic_erf, math.erfc: _analytic_erfc,
+    math.gamma: _analytic_gamma, math.lgamma: _analytic_lgamma,
 }  # fmt: skip
 #: Functions of ``math`` that numpy has under the same name, ...
 _SAME_NAMES = ("sqrt", "exp", "expm1", "log", "log1p", "log10", "sin", "cos", "tan", "sinh", "cosh", "tanh")

@@ -14,7 +14,7 @@ from typing import Any
 
 from contin import checks
 from contin.arrays import Function
-from contin.errors import ProblemError
+from contin.errors import CompilationError
 from contin.functions.fingerprint import Fingerprint
 
 
@@ -53,14 +53,14 @@ class Rewriter:
 
         Raises
         ------
-        ProblemError
+        CompilationError
             It is no plain Python function, or it calls itself.
         """
         function = getattr(function, "py_func", function)
         if not isinstance(function, types.FunctionType):
-            raise ProblemError(f"{checks.shown(function)} must be a plain Python function (def or lambda)")
+            raise CompilationError(f"{checks.shown(function)} is no plain Python function (def or lambda)")
         if function in self._open:
-            raise ProblemError(f"function {function.__name__!r} calls itself; write a loop instead")
+            raise CompilationError(f"function {function.__name__!r} calls itself; write a loop instead")
         if function not in self._done:
             self._open.add(function)
             self._fingerprints.append(Fingerprint())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,7 +54,7 @@ class Signature:
 
 
 def argument_count(function: Function) -> int:
-    """Return the number of positional arguments of a user's function.
+    """Return the number of arguments of a user's function that have no default.
 
     Raises
     ------
@@ -63,26 +62,41 @@ def argument_count(function: Function) -> int:
         It is no function, or one that does not say.
     """
     try:
-        return len(inspect.signature(getattr(function, "py_func", function)).parameters)
+        given = inspect.signature(getattr(function, "py_func", function)).parameters.values()
     except (TypeError, ValueError):
-        raise ProblemError(f"{checks.shown(function)} must be a plain Python function (def or lambda)") from None
+        raise ProblemError(f"{checks.shown(function)} must be a Python function that says which arguments it takes") from None
+    return sum(each.default is each.empty and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in given)
 
 
 def result_count(function: Function, arguments: Arguments, what: str) -> int:
-    """Return how many values a function returns (0: a bare number), from one call in Python with NaN for every number.
+    """Return how many values a function returns (0: a bare number), from one call in Python with numbers.
 
     Raises
     ------
     ProblemError
-        The call fails; ``what`` names the function.
+        The call fails, for each of some numbers; ``what`` names the function.
     """
     plain = getattr(function, "py_func", function)
-    tuples: list[Any] = [None if names is None else namedtuple("Values", names) for names in arguments]
-    values = [math.nan if kind is None else kind(*[math.nan] * len(kind._fields)) for kind in tuples]
-    try:
-        with np.errstate(all="ignore"):
-            result = plain(*values)
-    except Exception as error:  # a user's function may raise anything
-        reason = " ".join(str(error).split())
-        raise ProblemError(f"{what} cannot be called: {type(error).__name__}: {reason}") from error
-    return len(result) if isinstance(result, (tuple, list, np.ndarray)) else 0
+    kinds: list[Any] = [None if names is None else namedtuple("Values", names) for names in arguments]
+    first: Exception | None = None
+    for number in _PROBES:
+        values = [number if kind is None else kind(*[number + 0.01 * i for i in range(len(kind._fields))]) for kind in kinds]
+        try:
+            with np.errstate(all="ignore"):
+                result = plain(*values)
+        except (ArithmeticError, ValueError) as error:  # it may have values elsewhere
+            first = first or error
+            continue
+        except Exception as error:  # a user's function may raise anything
+            first = error
+            break
+        return len(result) if isinstance(result, (tuple, list, np.ndarray)) else 0
+    assert first is not None
+    reason = " ".join(str(first).split())
+    if isinstance(first, AttributeError):
+        reason += "; the states and parameters are " + ", ".join(name for names in arguments for name in names or ())
+    raise ProblemError(f"{what} cannot be called: {type(first).__name__}: {reason}") from first
+
+
+#: Numbers with which functions are called to see what they return: in the domain of most functions.
+_PROBES = (0.5, 1.5, -0.5, 0.0, 10.0)
