@@ -71,7 +71,7 @@ def _of_cycles(system: CycleCollocation) -> list[TestFunction]:
 
 @own_test_functions.register
 def _of_equilibria(system: Algebraic) -> list[TestFunction]:
-    return [hopf()] if system.problem.dynamics else []
+    return [hopf()] if system.problem.dynamics and not system.is_sparse else []
 
 
 @functools.singledispatch

@@ -15,6 +15,7 @@ from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
 from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
+from contin.linalg.sparse import SparseFactors
 from contin.problems.algebraic import AlgebraicProblem
 
 
@@ -68,11 +69,24 @@ class Algebraic(System):
         """The residual, compiled."""
         return self._batch("residual", ("residual",))
 
-    def _jacobian(self, x: Array) -> tuple[Array, Array]:
-        u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
-        batch = self._residual
-        values, jacobian = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.colouring(self._free))
-        return values[0], jacobian[0]
+    @functools.cached_property
+    def is_sparse(self) -> bool:
+        """The matrix is kept sparse: it is large, and few colours suffice for its entries."""
+        colours = len(self._residual.colouring(self._free).owner)
+        return self.state_size >= _MANY and colours <= _FEW * self.size
+
+    def _jacobian(self, x: Array) -> tuple[Array, Any]:
+        """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
+        given = _NO_TIME, x[: self.state_size].reshape(1, -1), _none(self.state_size), self._scaled_parameters(x)
+        colours = self._residual.colouring(self._free)
+        if not self.is_sparse:
+            values, jacobian = self._residual.jacobian(*given, colours)
+            return values[0], jacobian[0]
+        from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s; only large problems need it
+
+        residual, entries = self._residual.entries(*given, colours)
+        rows, columns, _ = colours.entries
+        return residual, csr_array((entries, (rows, columns)), shape=(self.equations, self.size))
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
@@ -81,15 +95,27 @@ class Algebraic(System):
         residual, jacobian = self._jacobian(x)
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        return residual, DenseFactors(np.vstack([np.hstack([jacobian, columns.T]), rows]))
+        if not self.is_sparse:
+            return residual, DenseFactors(np.vstack([np.hstack([jacobian, columns.T]), rows]))
+        from scipy.sparse import csr_array, hstack, vstack
+
+        beside = hstack([jacobian, csr_array(columns.T)]) if len(columns) else jacobian
+        return residual, SparseFactors(vstack([beside, csr_array(rows)]) if len(rows) else beside, len(rows))
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
         which = self._indices(names)
         u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
         batch = self._residual
-        columns: Array = batch.jacobian(_NO_TIME, u, _none(n), p, batch.colouring(which))[1][0, :, n:]
-        return columns
+        colours = batch.colouring(which)
+        if self.is_sparse:
+            rows, places, _ = colours.entries
+            entries = batch.entries(_NO_TIME, u, _none(n), p, colours)[1]
+            columns = np.zeros((self.equations, len(which)))
+            columns[rows[places >= n], places[places >= n] - n] = entries[places >= n]
+            return columns
+        dense: Array = batch.jacobian(_NO_TIME, u, _none(n), p, colours)[1][0, :, n:]
+        return dense
 
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,)."""
@@ -99,9 +125,11 @@ class Algebraic(System):
     def jacobian(self, x: Array) -> Array:
         """Return F_u in the user's units, shape (equations, n)."""
         jacobian = self._jacobian(x)[1][:, : self.state_size]
+        jacobian = jacobian.toarray() if self.is_sparse else jacobian
         if self.scales is not None:
             jacobian = jacobian * self.scales.rows["residual"][:, None] / self.scales.states
-        return jacobian
+        full: Array = jacobian
+        return full
 
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
@@ -123,7 +151,9 @@ class Algebraic(System):
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
         scaled = self._with(scales=Scales(states, parameters, {"residual": np.ones(self.equations)}))
         z = self.carrier(scaled)(x)
-        rows = usual(np.abs(scaled._jacobian(z)[1]).max(axis=1, initial=0.0))
+        jacobian = abs(scaled._jacobian(z)[1])
+        largest = jacobian.max(axis=1).toarray().ravel() if self.is_sparse else jacobian.max(axis=1, initial=0.0)
+        rows = usual(largest)
         return self._with(scales=Scales(states, parameters, {"residual": rows})), z
 
     def without_scales(self, x: Array) -> tuple[Algebraic, Array]:
@@ -133,6 +163,8 @@ class Algebraic(System):
 
     def couplings(self, x: Array) -> tuple[Array, Indices]:
         """Return sizes of derivatives of the residual; its values are no rates of states here, -1."""
+        if self.is_sparse:
+            return super().couplings(x)
         jacobian = np.abs(self._jacobian(x)[1])
         return jacobian, np.full(len(jacobian), -1)
 
@@ -163,6 +195,9 @@ class Algebraic(System):
         return other, other.pack(self.states(x), values)
 
 
+#: From so many states on the matrix is kept sparse where no more colours than this part of the columns suffice for it. Below, a
+#: dense factorization takes no longer.
+_MANY, _FEW = 200, 0.1
 #: The t of functions that do not take it.
 _NO_TIME = np.zeros(1)
 

@@ -83,5 +83,15 @@ class ScaledBatch:
         """Return values and derivatives, shape (points, count, colours.width)."""
         arguments = u * self._states, v * self._states, p * self._parameters
         values, jacobian = self._batch.jacobian(t, *arguments, colours)
-        inputs = np.concatenate([self._states, *([self._states] if self._batch.signature.ends else []), self._parameters])
-        return values / self._values, jacobian * inputs[colours.columns] / self._values[:, None]
+        return values / self._values, jacobian * self._inputs[colours.columns] / self._values[:, None]
+
+    def entries(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
+        """Return the values at one place and the entries of the Jacobian, as `Batch.entries`."""
+        values, entries = self._batch.entries(t, u * self._states, v * self._states, p * self._parameters, colours)
+        rows, columns, _ = colours.entries
+        return values / self._values, entries * self._inputs[colours.columns[columns]] / self._values[rows]
+
+    @property
+    def _inputs(self) -> Array:
+        """Sizes of all inputs."""
+        return np.concatenate([self._states, *([self._states] if self._batch.signature.ends else []), self._parameters])

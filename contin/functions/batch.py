@@ -161,6 +161,12 @@ class Batch:
             jac.fill(np.nan)
         return out, jac
 
+    def entries(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
+        """Return the values at one place, shape (count,), and entries of the Jacobian in the order of `Colouring.entries`."""
+        values, compressed = self.jacobian(t, u, v, p, colours.compressed())
+        rows, _, colour = colours.entries
+        return values[0], compressed[0, rows, colour]
+
     def _evaluate_many(self, given: _Arguments) -> None:
         """Call the kernel for many places, in several threads where one took long before.
 
@@ -221,52 +227,62 @@ def _divided(given: _Arguments) -> list[_Arguments]:
 def _source(signature: Signature, functions: Sequence[Function], counts: Sequence[int]) -> str:
     """Return the generated kernel: every function called at point i, with real and with complex numbers."""
     solves = searches(functions)
-    once = [f"w{k} = solve{k}({', '.join(_arguments(signature, True, 'float64'))})" for k in range(len(solves))]
+    once = [f"w{k} = solve{k}({', '.join(_arguments(signature, 'float64'))})" for k in range(len(solves))]
     real: list[str] = []
     step: list[str] = []
     row = 0
     for index, (function, count) in enumerate(zip(functions, counts)):
         solve = parts(function)[1]
-        found = "" if solve is None else f"w{solves.index(solve)}"
-        filled = count if signature.fills(function) else None
-        real += _call(signature, index, filled, found, "float64")
-        step += _call(signature, index, filled, found, "complex128")
-        for j in range(max(count, 1)):
-            value = f"r[{j}]" if count else "r"
-            real.append(f"out[i, {row}] = {value}")
-            step.append(f"work[{signature.inputs + row}] = complex({value}).imag")
-            row += 1
+        found = [] if solve is None else [f"w{solves.index(solve)}"]
+        size = max(count, 1)
+        if signature.fills(function):
+            real += _filled(signature, index, count, found, "float64")
+            step += _filled(signature, index, count, found, "complex128")
+            real.append(f"out[i, {row} : {row + size}] = r")
+            step += [f"for j in range({size}):", f"    work[{signature.inputs + row} + j] = r[j].imag"]
+        else:
+            for lines, kind in ((real, "float64"), (step, "complex128")):
+                lines.append(f"r = function{index}({', '.join(_arguments(signature, kind) + found)})")
+            values = [f"r[{j}]" for j in range(count)] or ["r"]
+            real += [f"out[i, {row + j}] = {value}" for j, value in enumerate(values)]
+            step += [f"work[{signature.inputs + row + j}] = complex({value}).imag" for j, value in enumerate(values)]
+        row += size
     return _TEMPLATE.format(
         real="\n".join(" " * 8 + line for line in [*once, *real]), complex="\n".join(" " * 12 + line for line in step),
         inputs=signature.inputs, between=_SAME_LOOP if once else _OTHER_LOOP,
     )  # fmt: skip
 
 
-def _call(signature: Signature, index: int, filled: int | None, found: str, kind: str) -> list[str]:
-    """Return the lines that set r to the result of a function.
-
-    ``filled`` is the size of the array that it fills, ``found`` the name of what its search has found.
-    """
-    arguments = _arguments(signature, filled is None, kind) + [found] * bool(found)
-    if filled is None:
-        return [f"r = function{index}({', '.join(arguments)})"]
-    return [f"r = np.zeros({filled}, np.{kind})", f"function{index}({', '.join(arguments)}, r)"]
+def _groups(signature: Signature) -> list[tuple[str, str, int]]:
+    """Return the groups of inputs: the name of its named tuple, where it stands, and its size."""
+    count = len(signature.states)
+    ends = [("V", "v[i]", count)] if signature.ends else []
+    return [("U", "u[i]", count), *ends, ("P", "p", len(signature.parameters))]
 
 
-def _arguments(signature: Signature, named: bool, kind: str) -> list[str]:
-    """Return the arguments of functions at point i: t, and named tuples or arrays."""
+def _arguments(signature: Signature, kind: str) -> list[str]:
+    """Return the arguments of functions at point i: t, and named tuples."""
     arguments, slot = ["t[i]"] if signature.times else [], 0
-    groups = [("U", "u[i, {}]", len(signature.states)), ("P", "p[{}]", len(signature.parameters))]
-    if signature.ends:
-        groups.insert(1, ("V", "v[i, {}]", len(signature.states)))
-    for name, component, size in groups:
-        numbers = [component.format(j) for j in range(size)]
+    for name, place, size in _groups(signature):
+        numbers = [f"{place}[{j}]" for j in range(size)]
         if kind == "complex128":
             numbers = [f"complex({number}, work[{slot + j}])" for j, number in enumerate(numbers)]
         slot += size
-        inside = "".join(number + ", " for number in numbers)
-        arguments.append(f"{name}({inside})" if named else f"np.array([{inside}])")
+        arguments.append(f"{name}({''.join(number + ', ' for number in numbers)})")
     return arguments
+
+
+def _filled(signature: Signature, index: int, count: int, found: list[str], kind: str) -> list[str]:
+    """Return the lines that call a function with arrays, and let it fill r; they do not grow with the number of states."""
+    lines, arguments, slot = [], ["t[i]"] if signature.times else [], 0
+    for name, place, size in _groups(signature):
+        given = f"{name.lower()}{index}"
+        lines += [f"{given} = np.empty({size}, np.{kind})", f"for j in range({size}):"]
+        number = f"{place}[j]" if kind == "float64" else f"complex({place}[j], work[{slot} + j])"
+        lines.append(f"    {given}[j] = {number}")
+        slot += size
+        arguments.append(given)
+    return [*lines, f"r = np.zeros({count}, np.{kind})", f"function{index}({', '.join([*arguments, *found, 'r'])})"]
 
 
 #: Compiled kernels of this process, by their keys.

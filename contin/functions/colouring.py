@@ -9,8 +9,9 @@ import numpy as np
 
 from contin.arrays import Indices, Pattern
 
-#: With more columns each input has a colour of its own: the search takes the number of columns squared times the values.
-_MOST_COLUMNS = 500
+#: With more columns than this, and this part of all entries or more, each input has a colour of its own: the search takes the
+#: number of columns times that of colours times that of values.
+_MOST_COLUMNS, _DENSE = 500, 0.1
 
 
 class Colouring(NamedTuple):
@@ -30,6 +31,17 @@ class Colouring(NamedTuple):
         """Number of columns of the Jacobian."""
         return self.columns.size
 
+    @property
+    def entries(self) -> tuple[Indices, Indices, Indices]:
+        """Values, columns and colours of the entries of the Jacobian that may differ from zero, a vector each."""
+        colours, values = np.nonzero(self.owner >= 0)
+        return values, self.owner[colours, values], colours
+
+    def compressed(self) -> Colouring:
+        """Return the colouring whose Jacobian has a column for each colour: the entries next to each other."""
+        owner = np.where(self.owner >= 0, np.arange(len(self.owner))[:, None], -1)
+        return Colouring(self.inputs, owner, np.arange(len(owner)))
+
 
 def colouring(depends: Pattern, columns: Sequence[int] | Indices) -> Colouring:
     """Return a colouring for derivatives by the inputs ``columns``, by first fit.
@@ -41,6 +53,7 @@ def colouring(depends: Pattern, columns: Sequence[int] | Indices) -> Colouring:
     columns : sequence of int
         The inputs to differentiate by, one for each column of the Jacobian.
     """
+    search = len(columns) <= _MOST_COLUMNS or depends.mean() < _DENSE
     together: list[list[int]] = []
     taken: list[Any] = []
     for column, slot in enumerate(columns):
@@ -48,7 +61,7 @@ def colouring(depends: Pattern, columns: Sequence[int] | Indices) -> Colouring:
         if not mine.any():
             continue
         at = len(taken)
-        if len(columns) <= _MOST_COLUMNS:
+        if search:
             at = next((c for c, others in enumerate(taken) if not (others & mine).any()), at)
         if at == len(taken):
             together.append([])

@@ -22,8 +22,8 @@ from contin.functions.pointwise import parts
 from contin.functions.rewriting import Rewriter
 from contin.functions.signature import Signature, result_count
 
-#: With more inputs the pattern is not looked for: the sets of inputs, kept as bits, would take longer than they save.
-_MOST_INPUTS = 500
+#: With more inputs the pattern is not looked for: it would take a gigabyte.
+_MOST_INPUTS = 30_000
 
 
 class _TracingNumber:
@@ -85,7 +85,10 @@ def sparsity_pattern(functions: Sequence[Function], counts: Sequence[int], signa
             rows += [_sources(value) for value in values]
     except Exception:  # the function needed to know a value; it may have raised anything
         return everything
-    return np.array([[bool(row >> slot & 1) for slot in range(inputs)] for row in rows]).reshape(total, inputs)
+    length = inputs // 8 + 1
+    bits = np.frombuffer(b"".join(row.to_bytes(length, "little") for row in rows), dtype=np.uint8).reshape(total, length)
+    pattern: Pattern = np.unpackbits(bits, axis=1, count=inputs, bitorder="little").astype(bool)
+    return pattern
 
 
 def _traced(function: Function, count: int, signature: Signature) -> list[Any]:

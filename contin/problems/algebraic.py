@@ -30,7 +30,8 @@ class AlgebraicProblem:
     functionals : mapping of str to callable
         ``f(u, p)``: columns of every point.
     dynamics : bool
-        Whether u' = F(u, p): Hopf points are then looked for. Needs as many equations as states.
+        Whether u' = F(u, p): Hopf points are then looked for. Needs as many equations as states. For 200 states or more with a
+        sparse Jacobian they are not looked for: all eigenvalues would take longer than everything else.
     count : int, optional
         Number of equations of a residual that fills an array; as many as states by default.
 
