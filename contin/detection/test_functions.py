@@ -7,6 +7,7 @@ import functools
 from collections.abc import Mapping, Sequence
 
 from contin.detection.hopf import hopf
+from contin.detection.lyapunov import critical_pair, first_lyapunov
 from contin.detection.second_variation import legendre
 from contin.detection.segment import SpecialPoint
 from contin.discretization.algebraic import Algebraic
@@ -78,6 +79,32 @@ def _of_equilibria(system: Algebraic) -> list[TestFunction]:
 def own_end(system: Discretization, point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as the end of the branch where a kind of problem knows it as one. Each kind registers its own."""
     return point
+
+
+@functools.singledispatch
+def own_normal_form(system: Discretization, point: SpecialPoint) -> SpecialPoint:
+    """Return a special point with its normal form: in the details the coefficient, in the name what it means.
+
+    Each kind of problem registers its own.
+    """
+    return point
+
+
+@own_normal_form.register
+def _of_hopf_points(system: Algebraic, point: SpecialPoint) -> SpecialPoint:
+    """The first Lyapunov coefficient, where one pair crosses the axis."""
+    simple = isinstance(point.details, dict) and point.details.get("pairs") == 1
+    if point.label != "HB" or not simple or point.name.startswith("possible"):
+        return point
+    pair = critical_pair(system.jacobian(point.trial.x), point.details["frequency"])
+    return _with_normal_form(point, *first_lyapunov(system, point.trial.x, pair))
+
+
+def _with_normal_form(point: SpecialPoint, coefficient: float, error: float) -> SpecialPoint:
+    """Return a special point with the coefficient that is negative where the bifurcation is supercritical."""
+    details = {**(point.details or {}), "normal_form": coefficient, "normal_form_error": error}
+    kind = ", supercritical" if coefficient < -error else ", subcritical" if coefficient > error else ""
+    return dataclasses.replace(point, name=point.name + kind, details=details)
 
 
 @own_end.register

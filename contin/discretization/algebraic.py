@@ -98,10 +98,14 @@ class Algebraic(System):
 
     def jacobian(self, x: Array) -> Array:
         """Return F_u in the user's units, shape (equations, n)."""
-        jacobian = self._jacobian(x)[1][:, : self.state_size]
-        if self.scales is not None:
-            jacobian = jacobian * self.scales.rows["residual"][:, None] / self.scales.states
+        jacobian: Array = self.jacobians(x, self.states(x))[0]
         return jacobian
+
+    def jacobians(self, x: Array, states: Array) -> Array:
+        """Return F_u in the user's units at other states (K, n), with the parameters of x; shape (K, equations, n)."""
+        batch, times = self.problem.batch("residual"), np.zeros(len(states))
+        jacobians: Array = batch.jacobian(times, states, _none(self.state_size), self.all_parameters(x), batch.colouring([]))[1]
+        return jacobians
 
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
