@@ -18,9 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from contin.analysis.critical_curve import other_pairs
 from contin.analysis.extended import FITS, Borders, Extended, cosine
 from contin.arrays import Array
 from contin.detection.test_functions import own_test_functions
+from contin.discretization.algebraic import Algebraic
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.trial import TestFunction, Trial
@@ -38,30 +40,22 @@ class FoldCurve(Extended):
     Parameters
     ----------
     base : System
-        With one free parameter more than a curve of solutions needs.
-    primary : int
-        Which of its free parameters is the one of the folds.
+        With one free parameter more than a curve of solutions needs: the first is the one of the folds.
     """
 
-    def __init__(self, base: System, borders: Borders | None = None, primary: int = 0) -> None:
+    def __init__(self, base: System, borders: Borders | None = None) -> None:
         super().__init__(base, borders)
         self.equations = base.equations + 1
-        self.primary = primary
-
-    @property
-    def primary_index(self) -> int:
-        """The place of the parameter of the folds in x."""
-        return self.base.state_size + self.primary
 
     def on(self, base: System) -> FoldCurve:
         """Return the extended system of another underlying one, with borders of its own."""
-        return FoldCurve(base, None, self.primary)
+        return FoldCurve(base)
 
     def null_vectors(self, x: Array) -> tuple[Array, Array, float]:
         """Return v (size,), w (equations of F,), and g; borders are made of v and w where there are none."""
         base = self.base
         held = np.zeros((2, base.size + 1))  # both parameters stay where they are
-        held[[0, 1], [self.primary_index, base.size - 1]] = 1.0
+        held[[0, 1], [base.state_size, base.size - 1]] = 1.0
         random = np.random.default_rng(11)
         renew = self.borders is None
         b, c = (random.standard_normal(base.equations), random.standard_normal(base.size)) if renew else self.borders
@@ -120,6 +114,32 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
     def crossing(trial: Trial) -> float:
         system: Any = trial.system
         _, w, _ = system.null_vectors(trial.x)
-        return float(system.base.transposed_product(trial.x, w)[system.primary_index])
+        return float(system.base.transposed_product(trial.x, w)[system.base.state_size])
 
-    return [TestFunction("CP", "cusp", cusp), TestFunction("BP", "fold meets a branch point", crossing)]
+    found = [TestFunction("CP", "cusp", cusp), TestFunction("BP", "fold meets a branch point", crossing)]
+    if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
+        found += _of_equilibria()
+    return found
+
+
+def _of_equilibria() -> list[TestFunction]:
+    """Where a second eigenvalue of an equilibrium is zero (Bogdanov-Takens), or a pair is imaginary (zero-Hopf)."""
+
+    def double_zero(trial: Trial) -> float:
+        system: Any = trial.system
+        v, w, _ = system.null_vectors(trial.x)
+        base, scales = system.base, system.base.scales
+        v = v[: base.state_size]
+        if scales is not None:
+            v, w = v * scales.states, w / scales.rows["residual"]
+        return float(w @ v) / float(np.linalg.norm(v) * np.linalg.norm(w))
+
+    def others(trial: Trial) -> tuple[float, bool]:
+        system: Any = trial.system
+        values = system.base.eigenvalues(trial.x)
+        return other_pairs(np.delete(values, np.argmin(np.abs(values))))
+
+    return [
+        TestFunction("BT", "Bogdanov-Takens", double_zero),
+        TestFunction("ZH", "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
+    ]

@@ -45,8 +45,16 @@ def critical_pair(jacobian: Array, frequency: float | None = None) -> CriticalPa
         return CriticalPair(frequency, right, left / (left @ right))
 
 
-def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> tuple[float, float]:
-    """Return the first Lyapunov coefficient at a Hopf point, and its estimated error; NaN where another eigenvalue is zero."""
+class Coefficient(NamedTuple):
+    """A coefficient of a normal form, its estimated error, and the sum of the absolute values of its terms."""
+
+    value: float
+    error: float
+    size: float
+
+
+def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:
+    """Return the first Lyapunov coefficient at a Hopf point; NaN where another eigenvalue is zero."""
     here, omega, q, w = system.states(x), pair.frequency, pair.right, pair.left
 
     def jacobian(states: Array) -> Array:
@@ -62,7 +70,8 @@ def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> tuple[flo
             constant = np.linalg.solve(matrix, (along_q @ q.conj()).real)
             twice = np.linalg.solve(2j * omega * np.eye(len(q)) - matrix, along_q @ q)
         except np.linalg.LinAlgError:
-            return float("nan"), float("nan")
-        terms = along_both @ q - 2 * along_q @ constant + along_q.conj() @ twice
-        values.append(float((w @ terms).real) / (2 * omega))
-    return values[0], abs(values[0] - values[1])
+            return Coefficient(float("nan"), float("nan"), float("nan"))
+        terms = np.array([along_both @ q, -2 * along_q @ constant, along_q.conj() @ twice])
+        values.append((terms @ w).real / (2 * omega))
+    best, rough = values
+    return Coefficient(float(best.sum()), float(abs(best.sum() - rough.sum())), float(np.abs(best).sum()))

@@ -7,7 +7,7 @@ import functools
 from collections.abc import Mapping, Sequence
 
 from contin.detection.hopf import hopf
-from contin.detection.lyapunov import critical_pair, first_lyapunov
+from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.second_variation import legendre
 from contin.detection.segment import SpecialPoint
 from contin.discretization.algebraic import Algebraic
@@ -97,13 +97,13 @@ def _of_hopf_points(system: Algebraic, point: SpecialPoint) -> SpecialPoint:
     if point.label != "HB" or not simple or point.name.startswith("possible"):
         return point
     pair = critical_pair(system.jacobian(point.trial.x), point.details["frequency"])
-    return _with_normal_form(point, *first_lyapunov(system, point.trial.x, pair))
+    return _with_normal_form(point, first_lyapunov(system, point.trial.x, pair))
 
 
-def _with_normal_form(point: SpecialPoint, coefficient: float, error: float) -> SpecialPoint:
+def _with_normal_form(point: SpecialPoint, found: Coefficient) -> SpecialPoint:
     """Return a special point with the coefficient that is negative where the bifurcation is supercritical."""
-    details = {**(point.details or {}), "normal_form": coefficient, "normal_form_error": error}
-    kind = ", supercritical" if coefficient < -error else ", subcritical" if coefficient > error else ""
+    details = {**(point.details or {}), "normal_form": found.value, "normal_form_error": found.error}
+    kind = ", supercritical" if found.value < -found.error else ", subcritical" if found.value > found.error else ""
     return dataclasses.replace(point, name=point.name + kind, details=details)
 
 

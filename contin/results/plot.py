@@ -17,6 +17,8 @@ from contin.results.point import Point
 #: Marks of labelled points: matplotlib's symbol and colour (Okabe-Ito: told apart by the colour-blind).
 _MARKS = {
     "LP": ("*", "#D55E00"), "BP": ("o", "#000000"), "HB": ("s", "#009E73"), "UZ": ("D", "#CC79A7"), "CP": ("^", "#D55E00"),
+    "PD": ("X", "#0072B2"), "TR": ("h", "#56B4E9"), "BT": ("v", "#000000"), "GH": ("P", "#009E73"), "ZH": ("<", "#E69F00"),
+    "HH": (">", "#56B4E9"),
 }  # fmt: skip
 _OTHER_MARK = (".", "#000000")
 #: Dashes and legend of pieces, by whether they are stable; None: not known.
