@@ -14,7 +14,7 @@ Hopf points, the cosine of the angle at torus bifurcations):
 
 They stay regular where r passes zero and the pair becomes real (Bogdanov-Takens points, strong resonances). A curve has the
 unknowns [x | kappa] and the equations F = 0, g = 0. Where the critical multiplier is real, there is one copy of L and no
-kappa. The gradient of g_i is -w_i.(dL v), with w_i from the transposed matrix: differences of transposed products, as for folds.
+kappa. The gradient of g_i is -w_i.(dL v), with w_i from the transposed matrix; as for folds, by differences.
 """
 
 from __future__ import annotations
@@ -34,8 +34,11 @@ from contin.linalg.factors import Factors
 #: Length of a central difference of Jacobians, and rounds that make borders, as in `contin.analysis.fold_curve`.
 _DIFFERENCE, _ROUNDS = 1e-5, 3
 #: Cosine between a border and the complex vector that it stands for, below which it is renewed: it is .7 at least when it is
-#: made, and 0 where the bordered matrix is singular. Ten times smaller, Newton's method converges slowly.
+#: made, and 0 where the bordered matrix is singular. Ten times smaller, the curves of the tests are the same.
 _FITS = 0.5
+#: The imaginary parts of null vectors count where that of the eigenvalue is larger than this; they vanish with it, and are
+#: divided by it. Ten times larger or smaller, the curves of the tests are the same.
+_ALMOST_REAL = 1e-2
 
 
 class NullVectors(NamedTuple):
@@ -89,7 +92,7 @@ class CriticalCurve(Extended):
         """Return r; 0 where the pair is real."""
 
     @abstractmethod
-    def by_kappa(self, right: Array, left: Array) -> Array:
+    def by_kappa(self, x: Array, right: Array, left: Array) -> Array:
         """Return w.(dL/dkappa) v, of several w (copies, copies, m) and one v (copies, m); shape (copies,)."""
 
     @property
@@ -100,24 +103,28 @@ class CriticalCurve(Extended):
     # --- null vectors --------------------------------------------------------------------------------------------
 
     def null_vectors(self, x: Array) -> NullVectors:
-        """Return v, g and w; borders are made where there are none."""
+        """Return v, g and w; borders are made, or renewed, where they do not fit."""
         key = x.tobytes()
         if self._known is not None and self._known[0] == key:
             return self._known[1]
-        renew = self.borders is None
         equations, weights = self.copy_shape
-        if renew:
+        if self.borders is None:
             random = np.random.default_rng(11)
             self.borders = random.standard_normal(equations), random.standard_normal(len(weights))
-        for _ in range(_ROUNDS if renew else 1):
-            found = self._solved(x)
-            if renew:
-                v, w = self.complex_vectors(x, found)
-                self.borders = _largest_part(w), _largest_part(v) * weights
-        if renew:
+        found = self._solved(x)
+        for _ in range(_ROUNDS):
+            v, w = self.complex_vectors(x, found)
+            if self._fit(v, w):
+                break
+            self.borders = _largest_part(w), _largest_part(v) * weights
             found = self._solved(x)
         self._known = key, found
         return found
+
+    def _fit(self, v: ComplexArray, w: ComplexArray) -> bool:
+        """Return whether the borders are close to the null vectors, or these are not finite."""
+        (b, c), root = self.borders, np.sqrt(self.copy_shape[1])
+        return not min(_cosine(c / root, v * root), _cosine(b, w)) < _FITS
 
     def _solved(self, x: Array) -> NullVectors:
         (equations, weights), copies = self.copy_shape, self.copies
@@ -134,18 +141,16 @@ class CriticalCurve(Extended):
         return NullVectors(solution[:inside].reshape(copies, -1), solution[inside:], np.array(lefts))
 
     def complex_vectors(self, x: Array, found: NullVectors) -> tuple[ComplexArray, ComplexArray]:
-        """Return the right and the left null vector of one copy; real where the pair is."""
+        """Return the right and the left null vector of one copy; where the pair is almost real, their real parts."""
         v, w = found.right[0].astype(complex), found.left[0, 0].astype(complex)
         r = self.imaginary_part(x)
-        if r > 0:
+        if r > _ALMOST_REAL * math.sqrt(self.kappa_size):
             v, w = v + 1j * r * found.right[1], w + 1j / r * found.left[0, 1]
         return v, w
 
     def borders_fit(self, x: Array) -> bool:
-        """Return whether the null vectors have not turned away from the borders."""
-        v, w = self.complex_vectors(x, self.null_vectors(x))
-        (b, c), root = self.borders, np.sqrt(self.copy_shape[1])
-        return not min(_cosine(c / root, v * root), _cosine(b, w)) < _FITS
+        """Return True: borders are renewed where they do not fit."""
+        return True
 
     # --- the equations -------------------------------------------------------------------------------------------
 
@@ -168,7 +173,7 @@ class CriticalCurve(Extended):
                 change = base.transposed_product(y + h * wide, w) - base.transposed_product(y - h * wide, w)
                 result[i, : base.size] -= change / (2 * h)
         if self.copies == 2:
-            result[:, -1] = -self.by_kappa(right, left) * self.kappa_size
+            result[:, -1] = -self.by_kappa(x, right, left) * self.kappa_size
         return result
 
     def _place(self, wide: Array, v: Array) -> None:

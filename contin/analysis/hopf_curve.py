@@ -22,9 +22,6 @@ from contin.discretization.system import System
 from contin.linalg.dense import DenseFactors
 from contin.stepping.trial import TestFunction, Trial
 
-#: The first Lyapunov coefficient is zero below this part of its terms, or where these are round-off of derivatives of order
-#: one. Where large terms are round-off, its sign changes without a zero.
-_CANCELLED, _ZERO = 1e-6, 1e-9
 #: A kappa below this part of its first value is zero: Bogdanov-Takens points are located more exactly than that.
 _NO_FREQUENCY = 1e-10
 
@@ -60,7 +57,7 @@ class HopfCurve(CriticalCurve):
         factors = DenseFactors(np.block([[coupled, columns], [rows, np.zeros((2, 2))]]))
         return factors.solve, factors.solve_transposed
 
-    def by_kappa(self, right: Array, left: Array) -> Array:
+    def by_kappa(self, x: Array, right: Array, left: Array) -> Array:
         """Return w_1.v_2."""
         result: Array = left[:, 0] @ right[1]
         return result
@@ -97,8 +94,7 @@ def _of_hopf_curve(system: HopfCurve) -> list[TestFunction]:
         return curve(trial).lyapunov(trial.x).value
 
     def is_zero(trial: Trial) -> bool:
-        found = curve(trial).lyapunov(trial.x)
-        return bool(abs(found.value) < _CANCELLED * found.size + _ZERO)
+        return curve(trial).lyapunov(trial.x).vanishes
 
     def zero(trial: Trial) -> float:
         values = curve(trial).others(trial.x)

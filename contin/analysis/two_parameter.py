@@ -9,6 +9,7 @@ import numpy as np
 
 from contin import checks
 from contin.analysis.branch_point_curve import BranchPointCurve
+from contin.analysis.cycle_curves import DoublingCurve, TorusCurve
 from contin.analysis.extended import Extended
 from contin.analysis.fold_curve import FoldCurve
 from contin.analysis.hopf_curve import HopfCurve
@@ -18,6 +19,7 @@ from contin.continuation.run import follow
 from contin.detection.branch_point import BranchPoint
 from contin.detection.lyapunov import critical_pair
 from contin.discretization.algebraic import Algebraic
+from contin.discretization.cycles import CycleCollocation
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.results.branch import Branch
@@ -27,12 +29,13 @@ from contin.stepping.settings import Settings, settings_with
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
           **options: Any) -> Branch:  # fmt: skip
-    """Follow the curve of folds, branch points or Hopf points through one, in two parameters.
+    """Follow the curve of special points of one kind through one of them, in two parameters.
 
     Parameters
     ----------
     start : Point
-        A fold (LP), branch point (BP) or Hopf point of equilibria (HB), found on a branch.
+        A fold (LP), branch point (BP), Hopf point of equilibria (HB), or a period doubling (PD) or torus bifurcation (TR) of
+        cycles, found on a branch.
     second : str, optional
         The parameter that is free beside those of the branch.
     settings : Settings, optional
@@ -45,8 +48,10 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     Branch
         Points with labels LP (the curve turns) and, on curves of folds: CP (cusp), BP (fold meets a branch point) and, of
         equilibria, BT (Bogdanov-Takens), ZH (zero-Hopf). On curves of Hopf points: GH (generalized Hopf: the first Lyapunov
-        coefficient is zero), ZH, HH (double Hopf), and BT, where the curve ends; columns ``frequency`` and ``lyapunov``. Points
-        of a curve of branch points carry their imperfection beta as the last entry of x.
+        coefficient is zero), ZH, HH (double Hopf), and BT, where the curve ends; columns ``frequency`` and ``lyapunov``. On
+        curves of period doublings: R2 (a second multiplier -1). On curves of torus bifurcations, with the column ``angle``: the
+        strong resonances R3 and R4, and R1 and R2, where the curve ends. Points of a curve of branch points carry their
+        imperfection beta as the last entry of x.
 
     Raises
     ------
@@ -75,7 +80,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         found = kind(start, base, x)
         if found is not None:
             return follow(*found, settings)
-    raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} is neither a fold nor a branch or Hopf point")
+    raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be one of {_STARTS}")
 
 
 def _free_parameters(start: Point, system: System, second: str | None, free: Sequence[str] | None) -> tuple[str, ...]:
@@ -119,5 +124,20 @@ def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
     return HopfCurve(base, size=square), np.append(x, 1.0)
 
 
-#: What a start may be, in the order in which it is asked.
-_KINDS = (_branch_points, _folds, _hopf_points)
+def _doublings(start: Point, base: System, x: Array) -> _First | None:
+    return (DoublingCurve(base), x) if start.label == "PD" and isinstance(base, CycleCollocation) else None
+
+
+def _tori(start: Point, base: System, x: Array) -> _First | None:
+    if start.label != "TR" or not isinstance(base, CycleCollocation):
+        return None
+    angle = frequency_of(start)
+    if angle is None:
+        values = base.eigenvalues(x)
+        angle = abs(values[np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))].imag)
+    return TorusCurve(base), np.append(x, np.cos(angle))
+
+
+#: What a start may be, in words, and in the order in which it is asked.
+_STARTS = "LP, BP, HB (of equilibria), PD and TR"
+_KINDS = (_branch_points, _folds, _hopf_points, _doublings, _tori)

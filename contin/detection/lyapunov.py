@@ -19,6 +19,10 @@ from contin.arrays import Array, ComplexArray
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.bends import bends
 
+#: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
+#: tests are the same.
+_CANCELLED, _ZERO = 1e-6, 1e-9
+
 
 class CriticalPair(NamedTuple):
     """A pair of eigenvalues -+ i omega: its frequency, and the right and left eigenvector, |q| = 1 and w.q = 1."""
@@ -52,6 +56,19 @@ class Coefficient(NamedTuple):
     error: float
     size: float
 
+    @classmethod
+    def of(cls, best: Array, rough: Array) -> Coefficient:
+        """Return the coefficient of terms that are computed in two ways."""
+        return cls(float(best.sum()), float(abs(best.sum() - rough.sum())), float(np.abs(best).sum()))
+
+    @property
+    def vanishes(self) -> bool:
+        """The terms cancel, or are round-off of derivatives of order one.
+
+        Where a coefficient is round-off of large terms, or infinite, its sign changes without a zero.
+        """
+        return abs(self.value) < _CANCELLED * self.size + _ZERO
+
 
 def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:
     """Return the first Lyapunov coefficient at a Hopf point; NaN where another eigenvalue is zero."""
@@ -73,5 +90,4 @@ def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficie
             return Coefficient(float("nan"), float("nan"), float("nan"))
         terms = np.array([along_both @ q, -2 * along_q @ constant, along_q.conj() @ twice])
         values.append((terms @ w).real / (2 * omega))
-    best, rough = values
-    return Coefficient(float(best.sum()), float(abs(best.sum() - rough.sum())), float(np.abs(best).sum()))
+    return Coefficient.of(*values)

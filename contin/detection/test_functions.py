@@ -6,6 +6,7 @@ import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 
+from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.hopf import hopf
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.second_variation import legendre
@@ -98,6 +99,22 @@ def _of_hopf_points(system: Algebraic, point: SpecialPoint) -> SpecialPoint:
         return point
     pair = critical_pair(system.jacobian(point.trial.x), point.details["frequency"])
     return _with_normal_form(point, first_lyapunov(system, point.trial.x, pair))
+
+
+@own_normal_form.register
+def _of_cycles_at_bifurcations(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
+    """The coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
+    details = point.details if isinstance(point.details, dict) else {}
+    if point.name.startswith("possible") or (point.label in ("PD", "TR") and details.get("pairs") != 1):
+        return point
+    if point.label == "LP" and point.details is None:
+        found = NormalForms(system, point.trial.x).fold()
+        return dataclasses.replace(point, details={"normal_form": found.value, "normal_form_error": found.error})
+    if point.label == "PD":
+        return _with_normal_form(point, NormalForms(system, point.trial.x).period_doubling())
+    if point.label == "TR":
+        return _with_normal_form(point, NormalForms(system, point.trial.x).torus(details["frequency"]))
+    return point
 
 
 def _with_normal_form(point: SpecialPoint, found: Coefficient) -> SpecialPoint:

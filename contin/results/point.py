@@ -89,8 +89,9 @@ class Point:
     def normal_form(self) -> float | None:
         """The coefficient of the normal form; negative where the bifurcation is supercritical. None where there is none.
 
-        At a Hopf point it is the first Lyapunov coefficient (Kuznetsov), with a critical eigenvector of unit length. Its
-        estimated error is ``details["normal_form_error"]``.
+        At a Hopf point of equilibria it is the first Lyapunov coefficient, with a critical eigenvector of unit length; at a
+        period doubling c and at a torus bifurcation Re d of `contin.detection.cycle_normal_forms`; at a fold of cycles |b|,
+        which is zero at a cusp. The error of its derivatives is ``details["normal_form_error"]``.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
 

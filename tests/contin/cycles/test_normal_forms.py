@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import contin
-from contin import AlgebraicProblem
+from contin import AlgebraicProblem, CycleProblem
 
 
 def circle(u, p):
@@ -32,6 +32,43 @@ def waves(u, p):
     f = 0.3 * u.x * u.y + math.sin(u.x) - u.x + 0.5 * (math.exp(u.y) - 1 - u.y)
     g = math.cos(u.x + u.y) - 1 + 0.2 * u.x**2 * u.y
     return p.mu * u.x - 2 * u.y + f, 2 * u.x + p.mu * u.y + g
+
+
+def once_round(t):
+    return math.cos(2 * math.pi * t), math.sin(2 * math.pi * t), 0, 0
+
+
+def moebius(u, p):
+    """A cycle r = 1 with a direction that turns by half a turn in a round: w = (p + i q) exp(i theta / 2).
+
+    p' = (mu - s p**2 + k (r**2 - 1) / 2) p, q' = -q, theta' = 1 + g p**2 and r' = r (1 - r**2 + h p**2), but for the factor r
+    that stands before (1 + mu) / 2 of the linear terms.
+    """
+    square, size = u.x**2 + u.y**2, u.a**2 + u.b**2
+    part = ((u.a**2 - u.b**2) * u.x + 2 * u.a * u.b * u.y + size) / 2  # p**2, where r = 1
+    mirrored = u.x * u.a + u.y * u.b, u.y * u.a - u.x * u.b  # exp(i theta) times the conjugate of w
+    turn, growth, both, other = 1 + p.g * part, 1 - square + p.h * part, (p.mu - 1) / 2, (p.mu + 1) / 2
+    cubic = -p.s * part + p.k * (square - 1) / 2
+    return (
+        growth * u.x - turn * u.y, turn * u.x + growth * u.y,
+        -turn * u.b / 2 + both * u.a + other * mirrored[0] + cubic * (u.a + mirrored[0]) / 2,
+        turn * u.a / 2 + both * u.b + other * mirrored[1] + cubic * (u.b + mirrored[1]) / 2,
+    )  # fmt: skip
+
+
+def spiral(u, p):
+    """A cycle r = 1, and w' = (mu + .3 i + (.4 i - s) |w|**2 + k (r**2 - 1) / 2) w; r and theta as in ``moebius``."""
+    square, size = u.x**2 + u.y**2, u.a**2 + u.b**2
+    turn, growth = 1 + p.g * size, 1 - square + p.h * size
+    rate, angle = p.mu - p.s * size + p.k * (square - 1) / 2, 0.3 + 0.4 * size
+    return growth * u.x - turn * u.y, turn * u.x + growth * u.y, rate * u.a - angle * u.b, angle * u.a + rate * u.b
+
+
+def bifurcation_of(field, label, **parameters):
+    problem = CycleProblem(field, ["x", "y", "a", "b"], {"mu": -0.1, "s": 1.0, **parameters})
+    orbit = contin.solve(problem, once_round, {"period": 6.0}, degree=7)
+    (point,) = contin.trace(orbit, free=["mu"], limits={"mu": (-0.1, 0.1)}).labelled(label)
+    return point
 
 
 def hopf_of(field, states, parameter, first, **limits):
@@ -92,3 +129,66 @@ def test_the_coefficient_is_a_column():
     pytest.importorskip("pandas")
     _, branch, point = hopf_of(circle, [0, 0], "mu", -1.0, limits=(-1, 1))
     assert np.nanmin(branch.to_pandas()["normal_form"]) == point.normal_form
+
+
+# --- cycles ---------------------------------------------------------------------------------------------------------
+
+#: The rate of theta, the coupling to r, and the rate of r.
+COUPLINGS = [{"g": 0.0, "k": 0.0, "h": 0.0}, {"g": 0.7, "k": 1.3, "h": 0.8}, {"g": 0.7, "k": 1.3, "h": 2.8}]
+
+
+@pytest.mark.parametrize("given", COUPLINGS)
+def test_of_a_period_doubling(given):
+    """On the centre manifold r**2 = 1 + h p**2, so p' = (-s + k h / 2 + h / 4) p**3: the last term from the factor r."""
+    point = bifurcation_of(moebius, "PD", **given)
+    expected = -1 + given["k"] * given["h"] / 2 + given["h"] / 4
+    assert point["mu"] == pytest.approx(0, abs=1e-11)
+    assert point.normal_form == pytest.approx(expected, abs=1e-9)
+    assert point.name == f"period doubling, {'super' if expected < 0 else 'sub'}critical"
+
+
+@pytest.mark.parametrize("given", COUPLINGS)
+def test_of_a_torus_bifurcation(given):
+    """r**2 = 1 + h |w|**2, and |w|**2 = 2 |xi|**2 for an eigenvector of length one: Re d = 2 (-s + k h / 2)."""
+    point = bifurcation_of(spiral, "TR", **given)
+    expected = 2 * (-1 + given["k"] * given["h"] / 2)
+    assert point.normal_form == pytest.approx(expected, abs=1e-9)
+    assert point.name == f"torus, {'super' if expected < 0 else 'sub'}critical"
+
+
+@pytest.mark.parametrize("shear", [0.0, 0.7])
+def test_of_a_fold_of_cycles(shear):
+    """r' = mu r + r**3 - r**5: half the second derivative at mu = -1/4, r**2 = 1/2 is -2 r, of absolute value sqrt(2)."""
+
+    def field(u, p):
+        s = u.x**2 + u.y**2
+        growth, turn = p.mu + s - s * s, 1 + p.g * (s - 0.5)
+        return growth * u.x - turn * u.y, turn * u.x + growth * u.y
+
+    problem = CycleProblem(field, ["x", "y"], {"mu": 0.5, "g": shear})
+    orbit = contin.solve(problem, lambda t: np.array(once_round(t)[:2]) * 1.2, {"period": 6.0}, degree=6)
+    limits = {"mu": (-1, 0.6), "max_x": (0.5, 2)}
+    (fold,) = contin.trace(orbit, free=["mu"], limits=limits, direction=-1).labelled("LP")
+    assert fold.normal_form == pytest.approx(math.sqrt(2), abs=1e-9) and fold.name == "mu"
+
+
+@pytest.mark.parametrize(("field", "label", "name", "s"), [(moebius, "PD", "GPD", 0.72), (spiral, "TR", "CH", 0.52)])
+def test_where_the_coefficient_vanishes_on_a_curve(field, label, name, s):
+    """At s = k h / 2 + h / 4 and s = k h / 2, from the two tests above."""
+    point = bifurcation_of(field, label, **COUPLINGS[1])
+    found = contin.curve(point, free=["mu", "s"], direction=-1, limits={"s": (0, 1.5)})
+    (special,) = found.labelled(name)
+    assert special["s"] == pytest.approx(s, abs=1e-9) and special["normal_form"] == pytest.approx(0, abs=1e-9)
+    slope = {"PD": -1.0, "TR": -2.0}[label]
+    for other in found:
+        assert other["normal_form"] == pytest.approx(slope * (other["s"] - s), abs=1e-8)
+
+
+def test_of_roessler():
+    """The doubled cycles are on the side where the cycle itself is unstable, and attract."""
+    problem = CycleProblem(lambda u, p: (-u.y - u.z, u.x + 0.2 * u.y, 0.2 + u.z * (u.x - p.c)), ["x", "y", "z"], {"c": 2.0})
+    orbit = contin.cycle(problem, [1.0, 1.0, 0.0])
+    (point,) = contin.trace(orbit, free=["c"], limits={"c": (1.5, 3)}).labelled("PD")
+    double = contin.trace(point, branch=1, limits={"c": (1.5, 6)}, max_points=4).points[-1]
+    assert point.name == "period doubling, supercritical"
+    assert double["c"] > point["c"] and double.system.eigenvalues(double.x).real.max() < 1e-8

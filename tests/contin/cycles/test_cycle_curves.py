@@ -1,0 +1,95 @@
+"""Curves of period doublings and of torus bifurcations in two parameters, against closed forms and AUTO-07p."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from scipy.special import mathieu_a, mathieu_b
+
+import contin
+from contin import CycleProblem
+
+
+def roessler(u, p):
+    return -u.y - u.z, u.x + p.a * u.y, 0.2 + u.z * (u.x - p.c)
+
+
+def mathieu(u, p):
+    """The circle r = 1 with the period 2 pi drives x'' - 2 mu x' + (k + e cos t) x = 0."""
+    s = u.x**2 + u.y**2
+    return u.x - u.y - u.x * s, u.x + u.y - u.y * s, u.b, -(p.k + p.e * u.x) * u.a + 2 * p.mu * u.b
+
+
+@functools.cache
+def driven(**parameters):
+    problem = CycleProblem(mathieu, ["x", "y", "a", "b"], {"mu": -0.1, "k": 0.1, "e": 0.1, **parameters})
+    return contin.solve(
+        problem, lambda t: (math.cos(2 * math.pi * t), math.sin(2 * math.pi * t), 0, 0), {"period": 6.0}, degree=7
+    )
+
+
+def edges(e):
+    """Where a multiplier of x'' + (k + e cos t) x = 0 is 1 (the lowest k), and where one is -1 (the next two)."""
+    return mathieu_a(0, 2 * e) / 4, mathieu_b(1, 2 * e) / 4, mathieu_a(1, 2 * e) / 4
+
+
+def labels(branch):
+    return [point.label for point in branch if point.label]
+
+
+def test_doublings_of_roessler():
+    """AUTO-07p (ISW=2, NTST=200, NCOL=5, EPSL=EPSU=1e-8) prints these c and periods at a = .1 and a = .35."""
+    orbit = contin.cycle(CycleProblem(roessler, ["x", "y", "z"], {"c": 2.0, "a": 0.2}), [1.0, 1.0, 0.0])
+    (doubling,) = contin.trace(orbit, free=["c"], limits={"c": (1.5, 3)}).labelled("PD")
+    known = {-1: (0.1, 6.37577730345, 6.07426398015), 1: (0.35, 1.89042115041, 5.23439264921)}
+    for direction, (a, c, period) in known.items():
+        found = contin.curve(doubling, free=["c", "a"], direction=direction, limits={"a": (0.1, 0.35)})
+        end = found.points[-1]
+        assert labels(found) == ["EP", "EP"] and end["a"] == pytest.approx(a, abs=1e-12)
+        assert (end["c"], end["period"]) == pytest.approx((c, period), abs=1e-10)
+        for point in found:
+            exponents = point.system.base.eigenvalues(point.x)
+            assert np.abs(np.abs(exponents.imag) - math.pi + np.abs(exponents.real) * 1j).min() < 1e-9
+
+
+def test_a_curve_of_tori_passes_all_strong_resonances():
+    """On mu = 0 the pair lies on the circle between the edges of Mathieu's equation, which are the resonances 1:1 and 1:2."""
+    (torus,) = contin.trace(driven(), free=["mu"], limits={"mu": (-0.1, 0.1)}).labelled("TR")
+    lowest, second, _ = edges(0.1)
+    for direction, expected, k in ((1, ["EP", "R3", "R2"], second), (-1, ["EP", "R4", "R1"], lowest)):
+        found = contin.curve(torus, "k", direction=direction, limits={"k": (-1, 1)})
+        end = found.points[-1]
+        assert labels(found) == expected and end["k"] == pytest.approx(k, abs=1e-12)
+        for point in found.points[:-1]:
+            assert point["mu"] == pytest.approx(0, abs=1e-11)
+            exponents = point.system.base.eigenvalues(point.x[:-1])
+            assert np.abs(exponents - 1j * point["angle"]).min() < 1e-7
+    angles = {"R3": 2 * math.pi / 3, "R4": math.pi / 2, "R1": 0.0}
+    assert end["angle"] == pytest.approx(0, abs=1e-6)
+    for point in found:
+        if point.label in angles:
+            assert point["angle"] == pytest.approx(angles[point.label], abs=1e-6)
+
+
+def test_a_curve_of_doublings_passes_a_resonance():
+    """With the product of both multipliers exp(4 pi mu), a second one is -1 at mu = 0, on an edge of Mathieu's equation."""
+    start = driven(mu=-0.02, e=0.4)
+    doubling = contin.trace(start, free=["k"], direction=-1, limits={"k": (-0.1, 0.2)}).labelled("PD")[0]
+    found = contin.curve(doubling, free=["k", "mu"], limits={"mu": (-0.05, 0.05)})
+    (resonance,) = found.labelled("R2")
+    assert resonance["mu"] == pytest.approx(0, abs=1e-9)
+    assert min(abs(resonance["k"] - edge) for edge in edges(0.4)) < 1e-9
+
+
+def test_a_stored_torus_bifurcation_starts_a_curve(tmp_path):
+    branch = contin.trace(driven(), free=["mu"], limits={"mu": (-0.1, 0.1)})
+    contin.save(branch, tmp_path / "cycles.npz")
+    (loaded,) = contin.load(branch.points[0].system.problem, tmp_path / "cycles.npz").labelled("TR")
+    found = contin.curve(loaded, "e", limits={"e": (0.0, 0.15)})
+    assert found.points[-1]["e"] == pytest.approx(0.15, abs=1e-12) and abs(found.points[-1]["mu"]) < 1e-10
+
+
+def test_what_is_refused():
+    with pytest.raises(contin.ProblemError, match="labelled 'EP' must be one of LP, BP"):
+        contin.curve(contin.trace(driven(), free=["mu"], limits={"mu": (-0.1, 0.1)}).points[0], "k")
