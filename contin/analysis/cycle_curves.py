@@ -13,6 +13,7 @@ The equations are regular at the strong resonances theta = 0 (R1) and theta = pi
 
 from __future__ import annotations
 
+import functools
 import math
 from abc import abstractmethod
 from collections.abc import Callable
@@ -22,6 +23,7 @@ import numpy as np
 
 from contin.analysis.critical_curve import CriticalCurve
 from contin.analysis.extended import Borders
+from contin.analysis.fold_curve import FoldCurve
 from contin.arrays import Array
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.lyapunov import Coefficient
@@ -32,7 +34,12 @@ from contin.discretization.system import System
 from contin.problems.cycle import PERIOD
 from contin.stepping.trial import TestFunction, Trial
 
-#: With a smaller imaginary part of the multiplier the curve is at its end: resonances are located more exactly than that.
+#: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
+_DOUBLE = 1e-3
+#: Cosines of the angles at strong resonances.
+_RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
+#: With a smaller imaginary part of the multiplier the curve is at its end, with a smaller difference of kappa at a resonance:
+#: they are located more exactly than that.
 _REAL = 1e-6
 
 
@@ -43,6 +50,17 @@ class CycleCurve(CriticalCurve):
     def cycles(self) -> CycleCollocation:
         """The underlying system."""
         return cast(CycleCollocation, self.base)
+
+    @functools.cached_property
+    def _folds(self) -> FoldCurve:
+        return FoldCurve(self.base)
+
+    def fold(self, x: Array) -> float:
+        """Return a number that vanishes where the cycle is at a fold, too."""
+        y = x[: self.base.size]
+        if self._folds.borders is not None and not self._folds.borders_fit(y):
+            self._folds.borders = None
+        return float(self._folds.null_vectors(y)[2])
 
     @abstractmethod
     def coupling(self, x: Array) -> Array:
@@ -140,8 +158,8 @@ class TorusCurve(CycleCurve):
         return math.acos(min(max(self.kappa(x), -1.0), 1.0))
 
     def normal_form(self, x: Array) -> Coefficient:
-        """Return the real part of d; NaN at the ends of the curve, where it is infinite."""
-        if self.imaginary_part(x) < _REAL:
+        """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
+        if self.imaginary_part(x) < _REAL or abs(self.kappa(x) - _RESONANCES["R3"]) < _REAL:
             return Coefficient(math.nan, math.nan, math.nan)
         return NormalForms(self.cycles, x[: self.base.size]).torus(self._angle(x))
 
@@ -159,6 +177,17 @@ def _resonance(label: str, kappa: float) -> TestFunction:
     return TestFunction(label, name, lambda trial: sign * (_curve(trial).kappa(trial.x) - kappa), terminal=abs(kappa) == 1)
 
 
+def _at_fold(label: str, name: str) -> TestFunction:
+    """Return the test function of points where the cycle is at a fold, too: two multipliers are one, up to a square root."""
+
+    def confirm(trial: Trial) -> bool:
+        curve = _curve(trial)
+        exponents = curve.cycles.eigenvalues(trial.x[: curve.base.size])
+        return bool(np.sort(np.abs(exponents))[1] < _DOUBLE)
+
+    return TestFunction(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)
+
+
 def _degenerate(label: str, name: str) -> TestFunction:
     """Return the test function of points where the coefficient of the normal form is zero."""
     return TestFunction(
@@ -167,19 +196,16 @@ def _degenerate(label: str, name: str) -> TestFunction:
     )  # fmt: skip
 
 
-#: Cosines of the angles at strong resonances.
-_RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
-
-
 @own_test_functions.register
 def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
-    """Strong resonances, and Chenciner points."""
-    return [*(_resonance(label, kappa) for label, kappa in _RESONANCES.items()), _degenerate("CH", "Chenciner")]
+    """Strong resonances, Chenciner points, and folds."""
+    resonances = [_resonance(label, kappa) for label, kappa in _RESONANCES.items()]
+    return [*resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
 
 @own_test_functions.register
 def _of_doubling_curve(system: DoublingCurve) -> list[TestFunction]:
-    """A second multiplier -1 (R2: the derivative of g by the multiplier vanishes), and generalized period doublings."""
+    """A second multiplier -1 (R2: the derivative of g by the multiplier vanishes), generalized period doublings, and folds."""
 
     def double(trial: Trial) -> float:
         curve = _curve(trial)
@@ -187,4 +213,7 @@ def _of_doubling_curve(system: DoublingCurve) -> list[TestFunction]:
         v, w = curve.starts(right[0]), curve.ends(left[0, 0])
         return float(v @ w) / float(np.linalg.norm(v) * np.linalg.norm(w))
 
-    return [TestFunction("R2", "resonance 1:2", double), _degenerate("GPD", "generalized period doubling")]
+    return [
+        TestFunction("R2", "resonance 1:2", double), _degenerate("GPD", "generalized period doubling"),
+        _at_fold("LPPD", "fold-flip"),
+    ]  # fmt: skip

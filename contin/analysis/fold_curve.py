@@ -23,6 +23,7 @@ from contin.analysis.extended import FITS, Borders, Extended, cosine
 from contin.arrays import Array
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
+from contin.discretization.cycles import CycleCollocation
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.trial import TestFunction, Trial
@@ -119,7 +120,29 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
     found = [TestFunction("CP", "cusp", cusp), TestFunction("BP", "fold meets a branch point", crossing)]
     if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
         found += _of_equilibria()
+    if isinstance(system.base, CycleCollocation):
+        found += _of_cycles()
     return found
+
+
+def _of_cycles() -> list[TestFunction]:
+    """Where a third multiplier of a cycle is one (the change of g with the multiplier vanishes), or another is -1."""
+
+    def triple(trial: Trial) -> float:
+        system: Any = trial.system
+        v, w, _ = system.null_vectors(trial.x)
+        n = len(system.problem.states)
+        starts, ends = v[:n], w[-1 - n : -1]
+        return float(starts @ ends) / float(np.linalg.norm(starts) * np.linalg.norm(ends))
+
+    def flip(trial: Trial) -> float:
+        system: Any = trial.system
+        exponents = system.base.eigenvalues(trial.x)
+        others = exponents[np.argsort(np.abs(exponents))[2:]]
+        size = np.maximum(others.real, 0.0)
+        return float(np.prod((np.exp(-size) + np.exp(others - size)) / (np.exp(-size) + np.abs(np.exp(others - size)))).real)
+
+    return [TestFunction("R1", "resonance 1:1", triple), TestFunction("LPPD", "fold-flip", flip)]
 
 
 def _of_equilibria() -> list[TestFunction]:

@@ -49,9 +49,11 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         Points with labels LP (the curve turns) and, on curves of folds: CP (cusp), BP (fold meets a branch point) and, of
         equilibria, BT (Bogdanov-Takens), ZH (zero-Hopf). On curves of Hopf points: GH (generalized Hopf: the first Lyapunov
         coefficient is zero), ZH, HH (double Hopf), and BT, where the curve ends; columns ``frequency`` and ``lyapunov``. On
-        curves of period doublings: R2 (a second multiplier -1). On curves of torus bifurcations, with the column ``angle``: the
-        strong resonances R3 and R4, and R1 and R2, where the curve ends. Points of a curve of branch points carry their
-        imperfection beta as the last entry of x.
+        curves of period doublings: R2 (a second multiplier -1), GPD (the coefficient of the normal form is zero), LPPD
+        (fold-flip). On curves of torus bifurcations, with the column ``angle``: the strong resonances R3 and R4, and R1 and R2,
+        where the curve ends; CH (Chenciner: the coefficient is zero), LPTR (fold-torus). Both have the column ``normal_form``.
+        On curves of folds of cycles: R1, LPPD. Points of a curve of branch points carry their imperfection beta as the last
+        entry of x.
 
     Raises
     ------
@@ -85,6 +87,8 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
 
 def _free_parameters(start: Point, system: System, second: str | None, free: Sequence[str] | None) -> tuple[str, ...]:
     """Return the free parameters of a curve: that in which the start was found first, the second parameter last."""
+    if len(system.free) != system.problem.free_size:
+        raise ProblemError("start: must be a point of a branch, with the free parameters of a curve")
     known = tuple(system.problem.parameters)
     found_in = start.name if start.label == "LP" else system.free[0]
     if (second is None) == (free is None):
@@ -98,9 +102,9 @@ def _free_parameters(start: Point, system: System, second: str | None, free: Seq
     else:
         pair = tuple(checks.names("free", free))
     others = [name for name in system.free if name != found_in]
-    for name in pair:
-        if name not in known or name in others or len(set(pair)) != 2:
-            raise ProblemError(f"free: {', '.join(pair)} must be two of the parameters {', '.join(known)}")
+    allowed = [name for name in known if name not in others]
+    if len(pair) != 2 or len({*pair} & {*allowed}) != 2:
+        raise ProblemError(f"free: {', '.join(pair)} must be two of the parameters {', '.join(allowed)}")
     return (pair[0], *others, pair[1])
 
 

@@ -48,7 +48,8 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
 
 def frequency_of(point: Point) -> float | None:
     """Return the frequency of a Hopf or torus bifurcation; None where it was stored without it."""
-    return None if point.details is None else float(point.details["frequency"])
+    known = isinstance(point.details, dict) and "frequency" in point.details
+    return float(point.details["frequency"]) if known else None
 
 
 def doubled(point: Point) -> tuple[CycleCollocation, Array, Array]:

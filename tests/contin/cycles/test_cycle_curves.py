@@ -82,6 +82,57 @@ def test_a_curve_of_doublings_passes_a_resonance():
     assert min(abs(resonance["k"] - edge) for edge in edges(0.4)) < 1e-9
 
 
+def fold_and_flip(u, p):
+    """r' = mu r + r**3 - r**5 has a fold at mu = -1/4; beside it p' = nu p - p**3 in a direction that turns by pi."""
+    square = u.x**2 + u.y**2
+    x, y = u.x / math.sqrt(square), u.y / math.sqrt(square)
+    part = ((u.a**2 - u.b**2) * x + 2 * u.a * u.b * y + u.a**2 + u.b**2) / 2
+    a, b = x * u.a + y * u.b, y * u.a - x * u.b
+    growth, turn = p.mu + square - square**2, 1 + 0.3 * (square - 0.5)
+    both, other = (p.nu - 1) / 2, (p.nu + 1) / 2
+    return (
+        growth * u.x - turn * u.y, turn * u.x + growth * u.y, -turn * u.b / 2 + both * u.a + other * a - part * (u.a + a) / 2,
+        turn * u.a / 2 + both * u.b + other * b - part * (u.b + b) / 2,
+    )  # fmt: skip
+
+
+def test_a_fold_flip_lies_on_both_curves():
+    """Folds at mu = -1/4, doublings at nu = 0."""
+    problem = CycleProblem(fold_and_flip, ["x", "y", "a", "b"], {"mu": 0.3, "nu": -0.1})
+    orbit = contin.solve(
+        problem, lambda t: (1.1 * math.cos(2 * math.pi * t), 1.1 * math.sin(2 * math.pi * t), 0, 0), {"period": 6.0}, degree=6
+    )
+    limits = {"mu": (-0.5, 0.5), "nu": (-0.3, 0.3), "max_x": (0.5, 2)}
+    (fold,) = contin.trace(orbit, free=["mu"], direction=-1, limits=limits).labelled("LP")
+    (doubling,) = contin.trace(orbit, free=["nu"], limits=limits).labelled("PD")
+    folds = contin.curve(fold, free=["mu", "nu"], limits=limits)
+    doublings = contin.curve(doubling, free=["nu", "mu"], direction=-1, limits=limits)
+    assert labels(folds) == ["EP", "LPPD", "EP"] and labels(doublings) == ["EP", "LP", "LPPD", "EP"]
+    for point in (*folds.labelled("LPPD"), *doublings.labelled("LPPD")):
+        assert (point["mu"], point["nu"]) == pytest.approx((-0.25, 0), abs=1e-9)
+
+
+def driven_takens(u, p):
+    """Bogdanov and Takens's normal form, driven by the cycle r = 1."""
+    s = u.x**2 + u.y**2
+    return u.x - u.y - u.x * s, u.x + u.y - u.y * s, u.b, p.k - u.a**2 + p.n * u.b + u.a * u.b + 0.1 * u.x * u.a
+
+
+@pytest.mark.full
+def test_a_resonance_lies_on_the_curves_of_folds_and_of_tori():
+    """Both curves are followed by equations of their own; no closed form."""
+    problem = CycleProblem(driven_takens, ["x", "y", "a", "b"], {"k": 0.5, "n": -0.6})
+    guess = lambda t: (math.cos(2 * math.pi * t), math.sin(2 * math.pi * t), math.sqrt(0.5), 0)  # noqa: E731
+    orbit = contin.solve(problem, guess, {"period": 6.0}, degree=6)
+    branch = contin.trace(orbit, free=["k"], direction=-1, limits={"k": (0.35, 1)})
+    limits = {"k": (0.35, 1), "n": (-1, 0)}
+    tori = contin.curve(branch.labelled("TR")[0], free=["k", "n"], limits=limits)
+    folds = contin.curve(branch.labelled("LP")[0], free=["k", "n"], limits=limits)
+    end, passed = tori.points[-1], folds.labelled("R1")[0]
+    assert end.label == "R1" and tori.stop.message == "met resonance 1:1"
+    assert (end["k"], end["n"], end["period"]) == pytest.approx((passed["k"], passed["n"], 2 * math.pi), abs=1e-9)
+
+
 def test_a_stored_torus_bifurcation_starts_a_curve(tmp_path):
     branch = contin.trace(driven(), free=["mu"], limits={"mu": (-0.1, 0.1)})
     contin.save(branch, tmp_path / "cycles.npz")
