@@ -159,6 +159,16 @@ def test_of_the_reactor_of_the_ab_demo():
             assert p2 * x - 1 / (1 - x) - 1 - p3 == pytest.approx(0, abs=1e-8)
 
 
+def test_both_parameters_may_be_others():
+    """The Hopf point is found in p1; the curve is in p2 and p3, with p1 as it was."""
+    start = contin.solve(reactor(), [0, 0], {"p1": 0.0, "p2": 14.0})
+    hopf = contin.trace(start, free=["p1"], limits={"p1": (0, 0.15)}).labelled("HB")[0]
+    for point in contin.curve(hopf, free=["p2", "p3"], limits={"p3": (1.5, 3)}):
+        x, p2, p3 = point.x[0], point["p2"], point["p3"]
+        assert p2 * x - 1 / (1 - x) - 1 - p3 == pytest.approx(0, abs=1e-8)
+        assert point["p1"] == pytest.approx(hopf["p1"], abs=1e-14)
+
+
 def test_what_is_refused():
     problem = AlgebraicProblem(takens, ["x", "y"], {"m": 4.0, "n": -1.0})
     hopf = first_hopf(problem, [2, 0], "m", direction=-1, limits={"m": (0.1, 5)})

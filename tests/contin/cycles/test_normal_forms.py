@@ -1,6 +1,7 @@
 """First Lyapunov coefficients of Hopf points, and normal forms of bifurcations of cycles, against closed forms."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -62,6 +63,24 @@ def spiral(u, p):
     turn, growth = 1 + p.g * size, 1 - square + p.h * size
     rate, angle = p.mu - p.s * size + p.k * (square - 1) / 2, 0.3 + 0.4 * size
     return growth * u.x - turn * u.y, turn * u.x + growth * u.y, rate * u.a - angle * u.b, angle * u.a + rate * u.b
+
+
+class Straight(NamedTuple):
+    x: float
+    y: float
+    a: float
+    b: float
+
+
+def bent(field):
+    """The same field with a + .6 b**2 in place of a: the coefficient is the same, but other terms contribute to it."""
+
+    def other(u, p):
+        a = u.a - 0.6 * u.b**2
+        rates = field(Straight(u.x, u.y, a, u.b), p)
+        return rates[0], rates[1], rates[2] + 1.2 * u.b * rates[3], rates[3]
+
+    return other
 
 
 def bifurcation_of(field, label, **parameters):
@@ -137,20 +156,22 @@ def test_the_coefficient_is_a_column():
 COUPLINGS = [{"g": 0.0, "k": 0.0, "h": 0.0}, {"g": 0.7, "k": 1.3, "h": 0.8}, {"g": 0.7, "k": 1.3, "h": 2.8}]
 
 
+@pytest.mark.parametrize("coordinates", [lambda field: field, bent])
 @pytest.mark.parametrize("given", COUPLINGS)
-def test_of_a_period_doubling(given):
+def test_of_a_period_doubling(given, coordinates):
     """On the centre manifold r**2 = 1 + h p**2, so p' = (-s + k h / 2 + h / 4) p**3: the last term from the factor r."""
-    point = bifurcation_of(moebius, "PD", **given)
+    point = bifurcation_of(coordinates(moebius), "PD", **given)
     expected = -1 + given["k"] * given["h"] / 2 + given["h"] / 4
     assert point["mu"] == pytest.approx(0, abs=1e-11)
     assert point.normal_form == pytest.approx(expected, abs=1e-9)
     assert point.name == f"period doubling, {'super' if expected < 0 else 'sub'}critical"
 
 
+@pytest.mark.parametrize("coordinates", [lambda field: field, bent])
 @pytest.mark.parametrize("given", COUPLINGS)
-def test_of_a_torus_bifurcation(given):
+def test_of_a_torus_bifurcation(given, coordinates):
     """r**2 = 1 + h |w|**2, and |w|**2 = 2 |xi|**2 for an eigenvector of length one: Re d = 2 (-s + k h / 2)."""
-    point = bifurcation_of(spiral, "TR", **given)
+    point = bifurcation_of(coordinates(spiral), "TR", **given)
     expected = 2 * (-1 + given["k"] * given["h"] / 2)
     assert point.normal_form == pytest.approx(expected, abs=1e-9)
     assert point.name == f"torus, {'super' if expected < 0 else 'sub'}critical"
@@ -185,10 +206,17 @@ def test_where_the_coefficient_vanishes_on_a_curve(field, label, name, s):
 
 
 def test_of_roessler():
-    """The doubled cycles are on the side where the cycle itself is unstable, and attract."""
+    """Beside the point the doubled cycles u0 -+ xi v have xi**2 = -rate / c, with the rate log|mu| / T of the cycle itself."""
     problem = CycleProblem(lambda u, p: (-u.y - u.z, u.x + 0.2 * u.y, 0.2 + u.z * (u.x - p.c)), ["x", "y", "z"], {"c": 2.0})
     orbit = contin.cycle(problem, [1.0, 1.0, 0.0])
-    (point,) = contin.trace(orbit, free=["c"], limits={"c": (1.5, 3)}).labelled("PD")
-    double = contin.trace(point, branch=1, limits={"c": (1.5, 6)}, max_points=4).points[-1]
-    assert point.name == "period doubling, supercritical"
-    assert double["c"] > point["c"] and double.system.eigenvalues(double.x).real.max() < 1e-8
+    zeros = {"c": [2.835]}
+    single = contin.trace(orbit, free=["c"], limits={"c": (1.5, 3)}, zeros=zeros)
+    (point,), (beside,) = single.labelled("PD"), single.labelled("UZ")
+    (double,) = contin.trace(point, branch=1, limits={"c": (1.5, 2.84)}, zeros=zeros).labelled("UZ")
+    assert point.name == "period doubling, supercritical" and double.system.eigenvalues(double.x).real.max() < 1e-8
+    exponents = beside.system.eigenvalues(beside.x)
+    rate = exponents[np.abs(exponents.imag) > 3].real.max() / beside["period"]
+    t = np.linspace(0, 0.5, 2001)[:-1]
+    change = double.system.evaluate(double.x, t) - double.system.evaluate(double.x, t + 0.5)
+    square = np.mean(np.sum((change / 2) ** 2, axis=1))
+    assert point.normal_form == pytest.approx(-rate / square, rel=0.01)
