@@ -194,15 +194,20 @@ class CriticalCurve(Extended):
         return np.append(residual, self.null_vectors(x).g), factors
 
 
-def other_pairs(values: ComplexArray) -> tuple[float, bool]:
-    """Return the product of the sums of all pairs of eigenvalues, and whether one that is complex lies on the imaginary axis.
+def signed_smallest(factors: ComplexArray) -> float:
+    """Return the smallest absolute value of some numbers, with the sign of the product of all: it would underflow.
 
-    Each factor is divided by the sizes of its two eigenvalues, so that it lies between -1 and 1.
+    Complex ones stand there with their conjugates.
     """
+    signs = np.sign(factors.real[factors.imag == 0])
+    return float(np.abs(factors).min(initial=1.0) * np.prod(signs))
+
+
+def other_pairs(values: ComplexArray) -> tuple[float, bool]:
+    """Return a number that vanishes where two of the eigenvalues have the sum zero, and whether these are a complex pair."""
     i, j = np.triu_indices(len(values), 1)
-    sums = (values[i] + values[j]) / (1e-300 + np.abs(values[i]) + np.abs(values[j]))
     on_axis = (np.abs(values.real) < _ON_AXIS * np.abs(values)) & (values.imag > 0)
-    return float(np.prod(sums).real), bool(on_axis.any())
+    return signed_smallest(values[i] + values[j]), bool(on_axis.any())
 
 
 #: An eigenvalue with a real part below this part of its size is on the axis: it is at a located zero of the product.

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.analysis.critical_curve import other_pairs
+from contin.analysis.critical_curve import other_pairs, signed_smallest
 from contin.analysis.extended import FITS, Borders, Extended, cosine
 from contin.arrays import Array
 from contin.detection.test_functions import own_test_functions
@@ -31,6 +31,8 @@ from contin.stepping.trial import TestFunction, Trial
 #: Length of a central difference of Jacobians along v, as its largest component: the cube root of round-off, where the error of
 #: second order and round-off are equal.
 _DIFFERENCE = 1e-5
+#: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
+_REAL = 1e-12
 #: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
 _ROUNDS = 3
 
@@ -139,8 +141,10 @@ def _of_cycles() -> list[TestFunction]:
         system: Any = trial.system
         exponents = system.base.eigenvalues(trial.x)
         others = exponents[np.argsort(np.abs(exponents))[2:]]
-        size = np.maximum(others.real, 0.0)
-        return float(np.prod((np.exp(-size) + np.exp(others - size)) / (np.exp(-size) + np.abs(np.exp(others - size)))).real)
+        size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
+        multipliers = np.exp(others - size)
+        multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
+        return signed_smallest(np.exp(-size) + multipliers)
 
     return [TestFunction("R1", "resonance 1:1", triple), TestFunction("LPPD", "fold-flip", flip)]
 

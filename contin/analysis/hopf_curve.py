@@ -13,7 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from contin.analysis.critical_curve import CriticalCurve, other_pairs
+from contin.analysis.critical_curve import CriticalCurve, other_pairs, signed_smallest
 from contin.analysis.extended import Borders
 from contin.arrays import Array, ComplexArray
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
@@ -97,8 +97,7 @@ def _of_hopf_curve(system: HopfCurve) -> list[TestFunction]:
         return curve(trial).lyapunov(trial.x).vanishes
 
     def zero(trial: Trial) -> float:
-        values = curve(trial).others(trial.x)
-        return float(np.prod(values / (1 + np.abs(values))).real)
+        return signed_smallest(curve(trial).others(trial.x))
 
     def pairs(trial: Trial) -> float:
         return other_pairs(curve(trial).others(trial.x))[0]

@@ -34,8 +34,8 @@ class Point:
     Attributes
     ----------
     label : str
-        AUTO's two letters: EP end, LP fold (limit point), BP branch point, HB Hopf point, UZ user zero, MX failed; "" for a
-        regular point.
+        AUTO's two letters: EP end, LP fold (limit point), BP branch point, HB Hopf point, PD period doubling, TR torus
+        bifurcation, UZ user zero, MX failed; "" for a regular point. Those of `contin.curve` are listed there.
     name : str
         The test function's name, "" for a regular point.
     parameters, functionals : mapping of str to float
