@@ -25,7 +25,15 @@ from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint
-from contin.detection.test_functions import fold, limits, own_end, own_normal_form, own_test_functions, user_zeros
+from contin.detection.test_functions import (
+    fold,
+    limits,
+    own_end,
+    own_normal_form,
+    own_test_functions,
+    user_zeros,
+    with_normal_form,
+)
 from contin.detection.trivial import crossed, jumped
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
@@ -452,11 +460,14 @@ class Continuation:
         """Return the point of a branch; a labelled one is located again on finer meshes, if errors are wanted."""
         errors: Mapping[str, float] = {}
         labelled = found.label not in ("", "MX") and found.name != "closed"  # closed: the first point once more
+        coarse = own_normal_form(found.trial.system, found)
         if labelled and self.settings.errors:
             again = refined(found.same_as or found, self.settings)
             details = found.details if found.same_as else again.details
             found, errors = dataclasses.replace(found, trial=again.trial, details=details), again.errors
-        found = own_normal_form(found.trial.system, found)
+        if coarse is not None:
+            better = own_normal_form(found.trial.system, found) if errors else coarse
+            found = with_normal_form(found, better or coarse, coarse)
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
         stability = Stability()

@@ -19,6 +19,8 @@ from contin.arrays import Array, ComplexArray
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.bends import bends
 
+#: An error is no smaller than this part of the terms: round-off, which second differences divide by the square of their length.
+_ROUND_OFF = 1e-13
 #: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
 #: tests are the same.
 _CANCELLED, _ZERO = 1e-6, 1e-9
@@ -59,7 +61,8 @@ class Coefficient(NamedTuple):
     @classmethod
     def of(cls, best: Array, rough: Array) -> Coefficient:
         """Return the coefficient of terms that are computed in two ways."""
-        return cls(float(best.sum()), float(abs(best.sum() - rough.sum())), float(np.abs(best).sum()))
+        size = float(np.abs(best).sum())
+        return cls(float(best.sum()), float(abs(best.sum() - rough.sum())) + _ROUND_OFF * size, size)
 
     @property
     def vanishes(self) -> bool:
