@@ -27,7 +27,7 @@ _NO_FREQUENCY = 1e-10
 
 
 class HopfCurve(CriticalCurve):
-    """Hopf points of an `Algebraic` system without scales; columns ``frequency`` and ``lyapunov``, the first coefficient."""
+    """Hopf points of an `Algebraic` system made by `as_field`; columns ``frequency`` and ``lyapunov`` (l1)."""
 
     copies = 2
 
@@ -40,9 +40,9 @@ class HopfCurve(CriticalCurve):
         return self.base.state_size, self.base.weights[: self.base.state_size]
 
     def matrix(self, x: Array) -> Array:
-        """Return the Jacobian of the vector field, shape (n, n)."""
+        """Return the Jacobian of the vector field, with the states divided by their sizes, shape (n, n)."""
         system: Any = self.base
-        jacobian: Array = system.jacobian(x[: self.base.size])
+        jacobian: Array = system.field_jacobian(x[: self.base.size])
         return jacobian
 
     def imaginary_part(self, x: Array) -> float:

@@ -123,9 +123,8 @@ def _folds(start: Point, base: System, x: Array) -> _First | None:
 def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
     if start.label != "HB" or not isinstance(base, Algebraic):
         return None
-    base, x = base.without_scales(x)  # eigenvalues are those of the user's units
-    square = critical_pair(base.jacobian(x), frequency_of(start)).frequency ** 2
-    return HopfCurve(base, size=square), np.append(x, 1.0)
+    frequency = critical_pair(base.jacobian(x), frequency_of(start)).frequency
+    return HopfCurve(base.as_field(), size=frequency**2), np.append(x, 1.0)
 
 
 def _doublings(start: Point, base: System, x: Array) -> _First | None:

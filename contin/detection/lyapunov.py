@@ -75,10 +75,11 @@ class Coefficient(NamedTuple):
 
 def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:
     """Return the first Lyapunov coefficient at a Hopf point; NaN where another eigenvalue is zero."""
-    here, omega, q, w = system.states(x), pair.frequency, pair.right, pair.left
+    size = np.ones(system.state_size) if system.scales is None else system.scales.states
+    here, omega, q, w = system.states(x) / size, pair.frequency, pair.right / size, pair.left * size
 
     def jacobian(states: Array) -> Array:
-        return system.jacobians(x, states)
+        return system.jacobians(x, states * size) * size / size[:, None]
 
     matrix = jacobian(here)[0]
     (real_b, real_c), (imaginary_b, imaginary_c) = (bends(jacobian, here, part[None]) for part in (q.real, q.imag))

@@ -107,6 +107,17 @@ class Algebraic(System):
         jacobians: Array = batch.jacobian(times, states, _none(self.state_size), self.all_parameters(x), batch.colouring([]))[1]
         return jacobians
 
+    def field_jacobian(self, x: Array) -> Array:
+        """Return F_u as the unknowns have it: with `as_field`, a matrix with the eigenvalues of F_u."""
+        jacobian: Array = self._jacobian(x)[1][:, : self.state_size]
+        return jacobian
+
+    def as_field(self) -> Algebraic:
+        """Return the same problem with the residual divided by the sizes of the states, as their rates; x stays the same."""
+        if self.scales is None:
+            return self
+        return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
+
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
         return np.linalg.eigvals(self.jacobian(x)).astype(complex, copy=False)

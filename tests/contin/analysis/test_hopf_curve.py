@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from bank import abc
 from bank.ab import problem as reactor
 
 import contin
@@ -35,6 +36,24 @@ def test_of_the_brusselator():
             assert point["b"] == pytest.approx(1 + a * a, abs=1e-10)
             assert point["frequency"] == pytest.approx(a, abs=1e-10)
             assert point["lyapunov"] == pytest.approx(-(2 + a * a) / (2 * a * (1 + 2 * a * a)), abs=1e-8)
+
+
+def test_in_odd_units():
+    """The Brusselator in units of a million, of states and of time: frequencies, and l1 for the unit eigenvector, are those."""
+
+    def small(u, p):
+        x, y = u.x * 1e6, u.y * 1e6
+        return 1e-9 * (p.a - (p.b + 1) * x + x**2 * y), 1e-9 * (p.b * x - x**2 * y)
+
+    problem = AlgebraicProblem(small, ["x", "y"], {"a": 1.0, "b": 1.0})
+    hopf = first_hopf(problem, [1e-6, 1e-6], "b", limits={"b": (0.5, 3)})
+    found = contin.curve(hopf, free=["b", "a"], limits={"a": (0.1, 3)})
+    assert labels(found) == ["EP", "EP"]
+    for point in found:
+        a = point["a"]
+        assert point["b"] == pytest.approx(1 + a * a, rel=1e-9)
+        assert point["frequency"] == pytest.approx(1e-3 * a, rel=1e-9)
+        assert point["lyapunov"] == pytest.approx(-1e12 * (2 + a * a) / (2 * a * (1 + 2 * a * a)), rel=1e-7)
 
 
 def takens(u, p):
@@ -157,6 +176,28 @@ def test_of_the_reactor_of_the_ab_demo():
         for point in found:
             x, p2, p3 = point.x[0], point["p2"], point["p3"]
             assert p2 * x - 1 / (1 - x) - 1 - p3 == pytest.approx(0, abs=1e-8)
+
+
+def test_of_the_reactor_of_the_abc_demo():
+    """From Hopf points at beta = 1.55 to those at 1.57 and 1.21, which the bank knows to 30 digits; BT on both curves."""
+    zeros = {"beta": [1.21, 1.57]}
+    known = {beta: [case.values for case in specials.specials if case.label == "HB"] for beta, specials in
+             ((1.21, abc.CASES[0]), (1.57, abc.CASES[2]))}  # fmt: skip
+    first, *_, last = abc.run(1.55).labelled("HB")
+    limits = {"beta": (1.1, 1.6)}
+    curves = [
+        contin.curve(start, free=["d", "beta"], direction=way, limits=limits, zeros=zeros)
+        for start in (first, last) for way in (1, -1)
+    ]  # fmt: skip
+    passed = [point for branch in curves for point in branch.labelled("UZ")]
+    assert sorted(point.name for point in passed) == ["beta = 1.21", "beta = 1.57", "beta = 1.57"]
+    for point in passed:
+        values = known[round(point["beta"], 6)]
+        assert min(abs(point["d"] - value["d"]) + abs(point["frequency"] - value["frequency"]) for value in values) < 1e-9
+    (end,) = [point for branch in curves for point in branch.labelled("BT")]
+    fold = abc.run(1.21).labelled("LP")[0]
+    ends = contin.curve(fold, free=["d", "beta"], limits={"beta": (1.1, 1.4)}).labelled("BT")
+    assert min(abs(point["d"] - end["d"]) + abs(point["beta"] - end["beta"]) for point in ends) < 1e-9
 
 
 def test_both_parameters_may_be_others():
