@@ -23,7 +23,7 @@ import numpy as np
 
 from contin.analysis.critical_curve import CriticalCurve
 from contin.analysis.extended import Borders
-from contin.analysis.fold_curve import FoldCurve
+from contin.analysis.fold_curve import FoldCurve, shrinking
 from contin.arrays import Array
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.lyapunov import Coefficient
@@ -200,7 +200,7 @@ def _degenerate(label: str, name: str) -> TestFunction:
 def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
     """Strong resonances, Chenciner points, and folds."""
     resonances = [_resonance(label, kappa) for label, kappa in _RESONANCES.items()]
-    return [*resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
+    return [shrinking(), *resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
 
 @own_test_functions.register
@@ -214,6 +214,6 @@ def _of_doubling_curve(system: DoublingCurve) -> list[TestFunction]:
         return float(v @ w) / float(np.linalg.norm(v) * np.linalg.norm(w))
 
     return [
-        TestFunction("R2", "resonance 1:2", double), _degenerate("GPD", "generalized period doubling"),
+        shrinking(), TestFunction("R2", "resonance 1:2", double), _degenerate("GPD", "generalized period doubling"),
         _at_fold("LPPD", "fold-flip"),
     ]  # fmt: skip

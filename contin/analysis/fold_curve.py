@@ -31,6 +31,9 @@ from contin.stepping.trial import TestFunction, Trial
 #: Length of a central difference of Jacobians along v, as its largest component: the cube root of round-off, where the error of
 #: second order and round-off are equal.
 _DIFFERENCE = 1e-5
+#: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
+#: from those of the equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
+_SHRUNK = 0.1
 #: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
 _REAL = 1e-12
 #: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
@@ -127,6 +130,19 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
     return found
 
 
+def shrinking() -> TestFunction:
+    """Return the test function of the end of a curve where cycles shrink onto an equilibrium; beyond it is itself.
+
+    At the equilibrium the equations of the curve are singular, so the run ends a little before.
+    """
+
+    def amplitude(trial: Trial) -> float:
+        system: Any = trial.system
+        return float(system.base.amplitude(trial.x[: system.base.size])) - _SHRUNK
+
+    return TestFunction("EP", "the end, near a Hopf point where the cycles have no size", amplitude, terminal=True)
+
+
 def _of_cycles() -> list[TestFunction]:
     """Where a third multiplier of a cycle is one (the change of g with the multiplier vanishes), or another is -1."""
 
@@ -146,7 +162,7 @@ def _of_cycles() -> list[TestFunction]:
         multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
         return signed_smallest(np.exp(-size) + multipliers)
 
-    return [TestFunction("R1", "resonance 1:1", triple), TestFunction("LPPD", "fold-flip", flip)]
+    return [shrinking(), TestFunction("R1", "resonance 1:1", triple), TestFunction("LPPD", "fold-flip", flip)]
 
 
 def _of_equilibria() -> list[TestFunction]:

@@ -191,6 +191,17 @@ class CycleCollocation(Collocation):
         states = self._scaled_states(x)
         return bool(np.all(np.ptp(states, axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
 
+    def amplitude(self, x: Array) -> float:
+        """Return the size of an orbit as a part of that of the reference; negative where the orbit is half a period later.
+
+        It is the product of both, without their means, over that of the reference with itself.
+        """
+        weights = self.weights[: self.state_size : self._n]
+        reference = self.reference - weights @ self.reference
+        states = self.states(x)
+        product = np.einsum("k,ka,ka->", weights, reference, states - weights @ states)
+        return float(product / np.einsum("k,ka,ka->", weights, reference, reference))
+
     # --- meshes and references -----------------------------------------------------------------------------------
 
     def _with(self, **changes: Any) -> CycleCollocation:

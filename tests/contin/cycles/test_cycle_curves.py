@@ -133,6 +133,26 @@ def test_a_resonance_lies_on_the_curves_of_folds_and_of_tori():
     assert (end["k"], end["n"], end["period"]) == pytest.approx((passed["k"], passed["n"], 2 * math.pi), abs=1e-9)
 
 
+def test_a_curve_of_folds_ends_at_a_generalized_hopf_point():
+    """Folds of r' = mu r + a r**3 - r**5 at mu = -a**2 / 4, r**2 = a / 2, for a > 0; the curve ends near 0."""
+
+    def field(u, p):
+        s = u.x**2 + u.y**2
+        growth = p.mu + p.a * s - s * s
+        return growth * u.x - u.y, u.x + growth * u.y
+
+    guess = lambda t: (1.2 * math.cos(2 * math.pi * t), 1.2 * math.sin(2 * math.pi * t))  # noqa: E731
+    orbit = contin.solve(CycleProblem(field, ["x", "y"], {"mu": 0.5, "a": 1.0}), guess, {"period": 6.0}, degree=6)
+    (fold,) = contin.trace(orbit, free=["mu"], limits={"mu": (-1, 0.6), "max_x": (0.5, 2)}, direction=-1).labelled("LP")
+    found = contin.curve(fold, "a", direction=-1, limits={"a": (-1, 2)})
+    end = found.points[-1]
+    assert (
+        labels(found) == ["EP", "EP"] and found.stop.message == "met the end, near a Hopf point where the cycles have no size"
+    )
+    assert (end["mu"], end["max_x"] ** 2) == pytest.approx((-(end["a"] ** 2) / 4, end["a"] / 2), abs=1e-9)
+    assert 0 < end["a"] < 1e-3
+
+
 def test_a_stored_torus_bifurcation_starts_a_curve(tmp_path):
     branch = contin.trace(driven(), free=["mu"], limits={"mu": (-0.1, 0.1)})
     contin.save(branch, tmp_path / "cycles.npz")
