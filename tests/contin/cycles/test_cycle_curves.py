@@ -118,6 +118,40 @@ def driven_takens(u, p):
     return u.x - u.y - u.x * s, u.x + u.y - u.y * s, u.b, p.k - u.a**2 + p.n * u.b + u.a * u.b + 0.1 * u.x * u.a
 
 
+def langford(u, p):
+    """In cylindrical coordinates r' = (z - b) r, theta' = 3.5, z' = lam + z - z**3 / 3 - r**2 (1 + z / 4)."""
+    square, growth = u.x**2 + u.y**2, u.z - p.b
+    return growth * u.x - 3.5 * u.y, 3.5 * u.x + growth * u.y, p.lam + u.z - u.z**3 / 3 - square * (1 + u.z / 4)
+
+
+def meridian(u, p):
+    return (u.z - p.b) * u.r, p.lam + u.z - u.z**3 / 3 - u.r**2 * (1 + u.z / 4)
+
+
+def test_tori_of_langford():
+    """Tori are cycles of r and z: Hopf points at r**2 = 4 (1 - b**2), z = b, with the frequency and l1 of the torus bifurcation.
+
+    There lam = r**2 (1 + b / 4) - b + b**3 / 3, the determinant is 2 r**2 (1 + b / 4), and Re d is l1 times the frequency.
+    """
+    radius = math.sqrt(4 * 0.51)
+    problem = CycleProblem(langford, ["x", "y", "z"], {"lam": 1.7, "b": 0.7})
+    guess = lambda t: (radius * math.cos(2 * math.pi * t), radius * math.sin(2 * math.pi * t), 0.7)  # noqa: E731
+    orbit = contin.solve(problem, guess, {"period": 2 * math.pi / 3.5}, degree=6)
+    (torus,) = contin.trace(orbit, free=["lam"], limits={"lam": (1.5, 2)}).labelled("TR")
+    found = contin.curve(torus, free=["lam", "b"], direction=1, limits={"b": (0.5, 0.9)})
+    for point in found:
+        b = point["b"]
+        square = 4 * (1 - b * b)
+        assert point["lam"] == pytest.approx(square * (1 + b / 4) - b + b**3 / 3, abs=1e-9)
+        assert math.cos(point["angle"]) == pytest.approx(
+            math.cos(math.sqrt(2 * square * (1 + b / 4)) * 2 * math.pi / 3.5), abs=1e-9
+        )
+    rest = contin.solve(contin.AlgebraicProblem(meridian, ["r", "z"], {"lam": 1.7, "b": 0.7}), [radius, 0.7])
+    (hopf,) = contin.trace(rest, free=["lam"], limits={"lam": (1.5, 2)}).labelled("HB")
+    assert torus["lam"] == pytest.approx(hopf["lam"], abs=1e-10)
+    assert torus.normal_form == pytest.approx(hopf.normal_form * hopf.details["frequency"], rel=1e-8)
+
+
 @pytest.mark.full
 def test_a_resonance_lies_on_the_curves_of_folds_and_of_tori():
     """Both curves are followed by equations of their own; no closed form."""
