@@ -129,7 +129,7 @@ def meridian(u, p):
 
 
 def test_tori_of_langford():
-    """Tori are cycles of r and z: Hopf points at r**2 = 4 (1 - b**2), z = b, with the frequency and l1 of the torus bifurcation.
+    """Tori are cycles of r and z: Hopf points at r**2 = 4 (1 - b**2), z = b, with the same frequency and l1.
 
     There lam = r**2 (1 + b / 4) - b + b**3 / 3, the determinant is 2 r**2 (1 + b / 4), and Re d is l1 times the frequency.
     """
