@@ -31,7 +31,7 @@ class Solver:
     """Solves with a sparse square matrix, real or complex, and with its transpose; solutions are NaN where it is singular."""
 
     def __init__(self, matrix: Any) -> None:
-        from scipy.sparse.linalg import splu  # type: ignore[import-untyped]  # .2 s; only this needs it
+        from scipy.sparse.linalg import splu  # type: ignore[import-untyped]  # takes .6 s to load
 
         self.size = matrix.shape[0]
         try:
