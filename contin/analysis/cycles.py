@@ -89,9 +89,10 @@ def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
     ProblemError
     """
     across = np.asarray(field(0.0, start), dtype=float)
+    beside = float(_RESTS * np.linalg.norm(across) * (1 + np.abs(start).max()))  # the integrator finds no zero right at t = 0
 
     def plane(t: float, u: Array) -> float:
-        return float(across @ (u - start))
+        return float(across @ (u - start)) + beside
 
     plane.direction = 1.0  # type: ignore[attr-defined]
     done = _integrated(field, start, longest, events=plane, dense_output=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from contin.arrays import Array, Function
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.system import System
+from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.problems.statement import Statement, multipliers_of
 
@@ -35,12 +36,22 @@ class Extended(Discretization):
     base : System
     borders : pair of ndarray, optional
         Made when they are first needed where they are not given.
+    columns : sequence of str
+        Names of columns beyond those of ``base``.
+
+    Raises
+    ------
+    ProblemError
+        The problem has a column of such a name.
     """
 
-    def __init__(self, base: System, borders: Borders | None) -> None:
+    def __init__(self, base: System, borders: Borders | None, columns: Sequence[str] = ()) -> None:
+        for name in columns:
+            if name in base.problem.parameters or name in base.problem.functionals:
+                raise ProblemError(f"start: its problem has a column {name!r}, which is one of the curve; give it another name")
         self.base = base
         self.borders: Any = borders
-        self.problem, self.free = _ExtendedStatement(base.problem, len(base.free)), base.free
+        self.problem, self.free = _ExtendedStatement(base.problem, len(base.free), tuple(columns)), base.free
         self.weights, self.size, self.state_size = base.weights, base.size, base.state_size
         self.intervals, self.degree = base.intervals, base.degree
         self.scales, self.free_scales = base.scales, base.free_scales
@@ -106,12 +117,18 @@ def cosine(a: Array, b: Array) -> float:
     return float(abs(a @ b) / np.sqrt((a @ a) * (b @ b)))
 
 
+def _found_elsewhere(u: Any, p: Any) -> Any:
+    """Stand for a column that the extended system computes."""
+    raise NotImplementedError
+
+
 @dataclasses.dataclass(frozen=True)
 class _ExtendedStatement:
     """The statement behind an extended system: that of the problem, but for the number of free parameters."""
 
     problem: Statement
     free_size: int
+    columns: tuple[str, ...] = ()
 
     @property
     def states(self) -> Any:
@@ -125,8 +142,8 @@ class _ExtendedStatement:
 
     @property
     def functionals(self) -> Mapping[str, Function]:
-        """Functionals of the problem."""
-        return self.problem.functionals
+        """Functionals of the problem, and columns of the curve."""
+        return {**self.problem.functionals, **dict.fromkeys(self.columns, _found_elsewhere)}
 
     @property
     def multipliers(self) -> tuple[str, ...]:

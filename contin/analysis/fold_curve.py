@@ -18,9 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from contin.analysis.critical_curve import other_pairs, signed_smallest
 from contin.analysis.extended import FITS, Borders, Extended, cosine
 from contin.arrays import Array
 from contin.detection.test_functions import own_test_functions
+from contin.discretization.algebraic import Algebraic
+from contin.discretization.cycles import CycleCollocation
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.trial import TestFunction, Trial
@@ -28,6 +31,11 @@ from contin.stepping.trial import TestFunction, Trial
 #: Length of a central difference of Jacobians along v, as its largest component: the cube root of round-off, where the error of
 #: second order and round-off are equal.
 _DIFFERENCE = 1e-5
+#: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
+#: from those of the equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
+_SHRUNK = 0.1
+#: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
+_REAL = 1e-12
 #: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
 _ROUNDS = 3
 
@@ -38,30 +46,22 @@ class FoldCurve(Extended):
     Parameters
     ----------
     base : System
-        With one free parameter more than a curve of solutions needs.
-    primary : int
-        Which of its free parameters is the one of the folds.
+        With one free parameter more than a curve of solutions needs: the first is the one of the folds.
     """
 
-    def __init__(self, base: System, borders: Borders | None = None, primary: int = 0) -> None:
+    def __init__(self, base: System, borders: Borders | None = None) -> None:
         super().__init__(base, borders)
         self.equations = base.equations + 1
-        self.primary = primary
-
-    @property
-    def primary_index(self) -> int:
-        """The place of the parameter of the folds in x."""
-        return self.base.state_size + self.primary
 
     def on(self, base: System) -> FoldCurve:
         """Return the extended system of another underlying one, with borders of its own."""
-        return FoldCurve(base, None, self.primary)
+        return FoldCurve(base)
 
     def null_vectors(self, x: Array) -> tuple[Array, Array, float]:
         """Return v (size,), w (equations of F,), and g; borders are made of v and w where there are none."""
         base = self.base
         held = np.zeros((2, base.size + 1))  # both parameters stay where they are
-        held[[0, 1], [self.primary_index, base.size - 1]] = 1.0
+        held[[0, 1], [base.state_size, base.size - 1]] = 1.0
         random = np.random.default_rng(11)
         renew = self.borders is None
         b, c = (random.standard_normal(base.equations), random.standard_normal(base.size)) if renew else self.borders
@@ -120,6 +120,69 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
     def crossing(trial: Trial) -> float:
         system: Any = trial.system
         _, w, _ = system.null_vectors(trial.x)
-        return float(system.base.transposed_product(trial.x, w)[system.primary_index])
+        return float(system.base.transposed_product(trial.x, w)[system.base.state_size])
 
-    return [TestFunction("CP", "cusp", cusp), TestFunction("BP", "fold meets a branch point", crossing)]
+    found = [TestFunction("CP", "cusp", cusp), TestFunction("BP", "fold meets a branch point", crossing)]
+    if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
+        found += _of_equilibria()
+    if isinstance(system.base, CycleCollocation):
+        found += _of_cycles()
+    return found
+
+
+def shrinking() -> TestFunction:
+    """Return the test function of the end of a curve where cycles shrink onto an equilibrium; beyond it is itself.
+
+    At the equilibrium the equations of the curve are singular, so the run ends a little before.
+    """
+
+    def amplitude(trial: Trial) -> float:
+        system: Any = trial.system
+        return float(system.base.amplitude(trial.x[: system.base.size])) - _SHRUNK
+
+    return TestFunction("EP", "the end, near a Hopf point where the cycles have no size", amplitude, terminal=True)
+
+
+def _of_cycles() -> list[TestFunction]:
+    """Where a third multiplier of a cycle is one (the change of g with the multiplier vanishes), or another is -1."""
+
+    def triple(trial: Trial) -> float:
+        system: Any = trial.system
+        v, w, _ = system.null_vectors(trial.x)
+        n = len(system.problem.states)
+        starts, ends = v[:n], w[-1 - n : -1]
+        return float(starts @ ends) / float(np.linalg.norm(starts) * np.linalg.norm(ends))
+
+    def flip(trial: Trial) -> float:
+        system: Any = trial.system
+        exponents = system.base.eigenvalues(trial.x)
+        others = exponents[np.argsort(np.abs(exponents))[2:]]
+        size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
+        multipliers = np.exp(others - size)
+        multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
+        return signed_smallest(np.exp(-size) + multipliers)
+
+    return [shrinking(), TestFunction("R1", "resonance 1:1", triple), TestFunction("LPPD", "fold-flip", flip)]
+
+
+def _of_equilibria() -> list[TestFunction]:
+    """Where a second eigenvalue of an equilibrium is zero (Bogdanov-Takens), or a pair is imaginary (zero-Hopf)."""
+
+    def double_zero(trial: Trial) -> float:
+        system: Any = trial.system
+        v, w, _ = system.null_vectors(trial.x)
+        base, scales = system.base, system.base.scales
+        v = v[: base.state_size]
+        if scales is not None:
+            v, w = v * scales.states, w / scales.rows["residual"]
+        return float(w @ v) / float(np.linalg.norm(v) * np.linalg.norm(w))
+
+    def others(trial: Trial) -> tuple[float, bool]:
+        system: Any = trial.system
+        values = system.base.eigenvalues(trial.x)
+        return other_pairs(np.delete(values, np.argmin(np.abs(values))))
+
+    return [
+        TestFunction("BT", "Bogdanov-Takens", double_zero),
+        TestFunction("ZH", "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
+    ]

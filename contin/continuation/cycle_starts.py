@@ -9,6 +9,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint, locate_branch_point
+from contin.detection.lyapunov import critical_pair
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation
 from contin.errors import ProblemError
@@ -32,19 +33,23 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
     system: Any = point.system
     if point.label != "HB" or not isinstance(system, Algebraic):
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
-    frequency = float(point.details["frequency"])
-    values, vectors = np.linalg.eig(system.jacobian(point.x))
-    vector = vectors[:, np.argmin(np.abs(values - 1j * frequency))]
+    frequency, vector, _ = critical_pair(system.jacobian(point.x), frequency_of(point))
     problem = CycleProblem.of(system.problem)
     parameters = {**point.parameters, PERIOD: 2 * math.pi / frequency}
     mesh = np.linspace(0, 1, _INTERVALS + 1)
     cycles = CycleCollocation(problem, mesh, _DEGREE, (system.free[0], PERIOD), parameters)
     wave = np.exp(2j * math.pi * cycles.nodes)[:, None]
-    ellipse = (wave * vector).real / np.linalg.norm(vector)
+    ellipse = (wave * vector).real
     rest = np.tile(system.states(point.x), (cycles.nodes.size, 1))
     x = cycles.pack(rest, parameters)
     tangent = cycles.pack(ellipse, dict.fromkeys(cycles.free, 0.0))
     return cycles.with_reference(cycles.pack(rest + ellipse, parameters)), x, tangent
+
+
+def frequency_of(point: Point) -> float | None:
+    """Return the frequency of a Hopf or torus bifurcation; None where it was stored without it."""
+    known = isinstance(point.details, dict) and "frequency" in point.details
+    return float(point.details["frequency"]) if known else None
 
 
 def doubled(point: Point) -> tuple[CycleCollocation, Array, Array]:

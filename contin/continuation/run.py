@@ -25,7 +25,15 @@ from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint
-from contin.detection.test_functions import fold, limits, own_end, own_test_functions, user_zeros
+from contin.detection.test_functions import (
+    fold,
+    limits,
+    own_end,
+    own_normal_form,
+    own_test_functions,
+    user_zeros,
+    with_normal_form,
+)
 from contin.detection.trivial import crossed, jumped
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
@@ -450,21 +458,24 @@ class Continuation:
 
     def _point(self, found: SpecialPoint, state: State, change: IndexChange | None = None) -> Point:
         """Return the point of a branch; a labelled one is located again on finer meshes, if errors are wanted."""
-        trial, details = found.trial, found.details
         errors: Mapping[str, float] = {}
         labelled = found.label not in ("", "MX") and found.name != "closed"  # closed: the first point once more
+        coarse = own_normal_form(found.trial.system, found)
         if labelled and self.settings.errors:
             again = refined(found.same_as or found, self.settings)
-            trial, errors = again.trial, again.errors
-            details = details if found.same_as else again.details
-        system = trial.system
+            details = found.details if found.same_as else again.details
+            found, errors = dataclasses.replace(found, trial=again.trial, details=details), again.errors
+        if coarse is not None:
+            better = own_normal_form(found.trial.system, found) if errors else coarse
+            found = with_normal_form(found, better or coarse, coarse)
+        trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
         stability = Stability()
         if self._index is not None:
-            stability = stability_of(dataclasses.replace(found, trial=trial, details=details))
+            stability = stability_of(found)
         return Point(
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
-            state.arclength + found.at, trial.iterations, trial.newton_error, errors, details,
+            state.arclength + found.at, trial.iterations, trial.newton_error, errors, found.details,
             stability.index, stability.nullity, change, stability.breaks,
         )  # fmt: skip
 

@@ -31,6 +31,9 @@ _FAINT = 1e-6
 #: A term that the balance leaves smaller than this, relative to the others, is what cancellation has left of zero: the balance
 #: is made again without it, in so many passes.
 _CANCELLED, _PASSES = 1e-5, 3
+#: A derivative smaller than this part of the largest of its row is a product of round-off, where states vanish: sizes of 1e180
+#: came from such. Units differ by less.
+_NEGLIGIBLE = 1e-60
 #: States without any known size are looked for within so many powers of ten around one.
 _DECADES = 12
 #: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
@@ -106,7 +109,8 @@ def _balanced(system: System, x: Array, sizes: Array) -> Array:
     place = {int(j): i for i, j in enumerate(unknown)}
     rows, values = [], []
     for i, (row, owner) in enumerate(zip(entries, owners)):
-        for j in np.flatnonzero((row > 0) & np.isfinite(row)):
+        least = _NEGLIGIBLE * row[np.isfinite(row)].max(initial=0.0)
+        for j in np.flatnonzero((row > least) & np.isfinite(row)):
             term, value = np.zeros(len(unknown) + len(entries)), -np.log(row[j])
             for sign, which in ((1.0, int(j)), (-1.0, int(owner))):
                 if which < 0:

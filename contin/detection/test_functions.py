@@ -6,7 +6,11 @@ import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
+from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.hopf import hopf
+from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.second_variation import legendre
 from contin.detection.segment import SpecialPoint
 from contin.discretization.algebraic import Algebraic
@@ -78,6 +82,51 @@ def _of_equilibria(system: Algebraic) -> list[TestFunction]:
 def own_end(system: Discretization, point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as the end of the branch where a kind of problem knows it as one. Each kind registers its own."""
     return point
+
+
+@functools.singledispatch
+def own_normal_form(system: Discretization, point: SpecialPoint) -> Coefficient | None:
+    """Return the coefficient of the normal form at a special point; None where there is none. Each kind registers its own."""
+    return None
+
+
+@own_normal_form.register
+def _of_hopf_points(system: Algebraic, point: SpecialPoint) -> Coefficient | None:
+    """The first Lyapunov coefficient, where one pair crosses the axis."""
+    if point.label != "HB" or not _is_simple(point):
+        return None
+    pair = critical_pair(system.jacobian(point.trial.x), point.details["frequency"])
+    return first_lyapunov(system, point.trial.x, pair)
+
+
+@own_normal_form.register
+def _of_bifurcations_of_cycles(system: CycleCollocation, point: SpecialPoint) -> Coefficient | None:
+    """The coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
+    with np.errstate(all="ignore"):
+        if point.label == "LP" and point.details is None and not point.name.startswith("possible"):
+            return NormalForms(system, point.trial.x).fold()
+        if point.label == "PD" and _is_simple(point):
+            return NormalForms(system, point.trial.x).period_doubling()
+        if point.label == "TR" and _is_simple(point):
+            return NormalForms(system, point.trial.x).torus(point.details["frequency"])
+    return None
+
+
+def _is_simple(point: SpecialPoint) -> bool:
+    """Return whether one eigenvalue or pair is critical at a located point."""
+    simple = isinstance(point.details, dict) and point.details.get("pairs") == 1
+    return simple and not point.name.startswith("possible")
+
+
+def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient) -> SpecialPoint:
+    """Return a special point with the coefficient in its details and, but for folds, what it means in its name.
+
+    The error is that of the derivatives, and what the coefficient differs from that on the mesh of the run.
+    """
+    error = found.error + abs(found.value - coarse.value)
+    details = {**(point.details or {}), "normal_form": found.value, "normal_form_error": error}
+    kind = ", supercritical" if found.value < -error else ", subcritical" if found.value > error else ""
+    return dataclasses.replace(point, name=point.name + kind * (point.label != "LP"), details=details)
 
 
 @own_end.register

@@ -124,12 +124,25 @@ class Algebraic(System):
 
     def jacobian(self, x: Array) -> Array:
         """Return F_u in the user's units, shape (equations, n)."""
-        jacobian = self._jacobian(x)[1][:, : self.state_size]
-        jacobian = jacobian.toarray() if self.is_sparse else jacobian
-        if self.scales is not None:
-            jacobian = jacobian * self.scales.rows["residual"][:, None] / self.scales.states
-        full: Array = jacobian
-        return full
+        jacobian: Array = self.jacobians(x, self.states(x))[0]
+        return jacobian
+
+    def jacobians(self, x: Array, states: Array) -> Array:
+        """Return F_u in the user's units at other states (K, n), with the parameters of x; shape (K, equations, n)."""
+        batch, times = self.problem.batch("residual"), np.zeros(len(states))
+        jacobians: Array = batch.jacobian(times, states, _none(self.state_size), self.all_parameters(x), batch.colouring([]))[1]
+        return jacobians
+
+    def field_jacobian(self, x: Array) -> Array:
+        """Return F_u as the unknowns have it: with `as_field`, a matrix with the eigenvalues of F_u."""
+        jacobian: Array = self._jacobian(x)[1][:, : self.state_size]
+        return jacobian
+
+    def as_field(self) -> Algebraic:
+        """Return the same problem with the residual divided by the sizes of the states, as their rates; x stays the same."""
+        if self.scales is None:
+            return self
+        return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
 
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray
+from contin.arrays import Array, ComplexArray, Indices
 from contin.discretization.collocation import Collocation
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier
@@ -111,21 +111,51 @@ class CycleCollocation(Collocation):
 
     # --- stability -----------------------------------------------------------------------------------------------
 
+    def jacobians_of_field(self, x: Array, states: Array) -> Array:
+        """Return the derivatives of T F by the states, at scaled states (K, n) with the parameters of x; shape (K, n, n)."""
+        n, colours = self._n, self.problem.batch("field").colouring([])
+        times, p = np.zeros(len(states)), self._scaled_parameters(x)
+        jacobians: Array = self._field.jacobian(times, states, np.empty((0, n)), p, colours)[1][:, :n, :n]
+        return jacobians
+
     def _jacobian_of_field(self, x: Array) -> Array:
-        """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N, d, n, n)."""
-        n = self._n
-        p, points = self._scaled_parameters(x), self.at_gauss_points(x)
-        colours = self.problem.batch("field").colouring([])
-        jacobian: Array = self._field.jacobian(self._times, points, np.empty((0, n)), p, colours)[1][:, :n, :n]
-        return jacobian.reshape(self.intervals, self._d, n, n)
+        """Return the same at the Gauss points, shape (N, d, n, n)."""
+        return self.jacobians_of_field(x, self.at_gauss_points(x)).reshape(self.intervals, self._d, self._n, self._n)
+
+    def rates(self, x: Array) -> Array:
+        """Return u' at the nodes, scaled, shape (state_size,): the field there, which the collocated u' follows."""
+        p, states = self._scaled_parameters(x), np.ascontiguousarray(self._scaled_states(x))
+        values = self._field.values(np.zeros(len(states)), states, np.empty((0, self._n)), p)[:, : self._n]
+        return np.asarray(values.ravel(), dtype=float)
+
+    @property
+    def by_interval(self) -> Indices:
+        """Places of the nodes of each interval among all nodes, shape (N, d + 1)."""
+        return self._by_interval
+
+    @property
+    def start_direction(self) -> Array:
+        """The direction in which the reference leaves t = 0, scaled, shape (n,)."""
+        first: Array = self.reference[1] - self.reference[0]
+        if self.scales is not None:
+            first /= self.scales.states
+        return np.asarray(first / np.linalg.norm(first), dtype=float)
+
+    def interval_matrices(self, x: Array) -> Array:
+        """Return the linearized collocation equations of each interval, shape (N, d n, (d + 1) n)."""
+        return self._interval_matrices(self._jacobian_of_field(x))
+
+    def _interval_matrices(self, jacobian: Array) -> Array:
+        n, d, N = self._n, self._d, self.intervals
+        matrix: Array = np.einsum("qm,ab->qamb", self.basis.slope, np.eye(n))[None] - np.einsum(
+            "j,qm,jqab->jqamb", self._h, self.basis.value, jacobian
+        )
+        return matrix.reshape(N, d * n, (d + 1) * n)
 
     def _transitions(self, jacobian: Array) -> Array:
         """Return the matrix that takes a perturbation over each interval, shape (N, n, n), from `_jacobian_of_field`."""
-        n, d, N = self._n, self._d, self.intervals
-        matrix = np.einsum("qm,ab->qamb", self.basis.slope, np.eye(n))[None] - np.einsum(
-            "j,qm,jqab->jqamb", self._h, self.basis.value, jacobian
-        )
-        matrix = matrix.reshape(N, d * n, (d + 1) * n)
+        n = self._n
+        matrix: Any = self._interval_matrices(jacobian)
         result: Array = np.linalg.solve(matrix[:, :, n:], -matrix[:, :, :n])[:, -n:]
         return result
 
@@ -159,6 +189,17 @@ class CycleCollocation(Collocation):
         """Return whether an orbit is an equilibrium, up to the square root of round-off."""
         states = self._scaled_states(x)
         return bool(np.all(np.ptp(states, axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+
+    def amplitude(self, x: Array) -> float:
+        """Return the size of an orbit as a part of that of the reference; negative where the orbit is half a period later.
+
+        It is the product of both, without their means, over that of the reference with itself.
+        """
+        weights = self.weights[: self.state_size : self._n]
+        reference = self.reference - weights @ self.reference
+        states = self.states(x)
+        product = np.einsum("k,ka,ka->", weights, reference, states - weights @ states)
+        return float(product / np.einsum("k,ka,ka->", weights, reference, reference))
 
     # --- meshes and references -----------------------------------------------------------------------------------
 

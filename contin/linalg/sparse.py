@@ -9,7 +9,7 @@ import numpy as np
 from contin.arrays import Array, Indices
 
 #: Border rows are scaled to this part of the matrix: one becomes a pivot only where all other entries are smaller. Otherwise
-#: they would become pivots anywhere, and fill the factors. Pivots as small as that lose nine digits; refinement gives them back.
+#: they would become pivots anywhere, and fill the factors. Pivots that small lose nine digits; refinement gives them back.
 _BORDER = 2.0**-30
 
 

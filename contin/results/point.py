@@ -34,8 +34,8 @@ class Point:
     Attributes
     ----------
     label : str
-        AUTO's two letters: EP end, LP fold (limit point), BP branch point, HB Hopf point, UZ user zero, MX failed; "" for a
-        regular point.
+        AUTO's two letters: EP end, LP fold (limit point), BP branch point, HB Hopf point, PD period doubling, TR torus
+        bifurcation, UZ user zero, MX failed; "" for a regular point. Those of `contin.curve` are listed there.
     name : str
         The test function's name, "" for a regular point.
     parameters, functionals : mapping of str to float
@@ -52,7 +52,7 @@ class Point:
         Estimated error of the free parameters, where it was asked for: of the discretization or, without a mesh, of the
         location alone. NaN where the point was not found again, and at points of higher codimension.
     details : object
-        What the location found besides: the `BranchPoint` of a BP, the frequency of an HB.
+        What the location found besides: the `BranchPoint` of a BP; a dictionary with frequency and normal form of an HB.
     index : int or None
         Of a state of a `VariationalProblem`: the number of independent ways to lower its energy; 0 is a minimum. None for other
         problems, and where Legendre's condition fails.
@@ -84,6 +84,16 @@ class Point:
     def __getitem__(self, name: str) -> float:
         """Return a parameter or functional by name."""
         return self.parameters[name] if name in self.parameters else self.functionals[name]
+
+    @property
+    def normal_form(self) -> float | None:
+        """The coefficient of the normal form; negative where the bifurcation is supercritical. None where there is none.
+
+        At a Hopf point of equilibria it is the first Lyapunov coefficient, with a critical eigenvector of unit length; at a
+        period doubling c and at a torus bifurcation Re d of `contin.detection.cycle_normal_forms`; at a fold of cycles |b|,
+        which is zero at a cusp. Its estimated error is ``details["normal_form_error"]``.
+        """
+        return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
 
     def second_variation(self) -> SecondVariation:
         """Return the second variation of the energy there: its eigenvalues, and its modes as functions.

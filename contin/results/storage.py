@@ -37,8 +37,8 @@ _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 def save(branch: Branch, path: str | Path) -> None:
     """Write a branch to a file: all its points, with their solutions.
 
-    The problem is code and is not stored: `load` takes it again. Details of branch points are kept, those of other special
-    points are not.
+    The problem is code and is not stored: `load` takes it again. Details of special points are kept where they are those of a
+    branch point or a dictionary of numbers.
 
     Raises
     ------
@@ -78,6 +78,7 @@ def save(branch: Branch, path: str | Path) -> None:
             "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
             "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
             "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
+            "details": _numbers(point.details),
         })  # fmt: skip
     first = branch.points[0].system
     stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
@@ -88,6 +89,13 @@ def save(branch: Branch, path: str | Path) -> None:
     image = io.BytesIO()
     np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
     write_whole(path, image.getvalue())
+
+
+def _numbers(details: Any) -> dict[str, float] | None:
+    """Return details that are a dictionary of numbers, None for others: a user's test function may describe anything."""
+    if not isinstance(details, dict) or not all(map(checks.is_number, details.values())):
+        return None
+    return {str(name): value if isinstance(value, int) else float(value) for name, value in details.items()}
 
 
 def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> Branch:
@@ -151,7 +159,7 @@ def _system(
 def _point(row: dict[str, Any], system: Collocation | Algebraic, arrays: dict[str, Array], number: int) -> Point:
     x = arrays[f"x{number}"]
     system = system.with_reference(x) if isinstance(system, Collocation) else system
-    details: BranchPoint | MultiplePoint | None = None
+    details: BranchPoint | MultiplePoint | dict[str, float] | None = row.get("details")
     if row["imperfection"] is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}
         details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)

@@ -22,7 +22,8 @@ def to_pandas(points: Sequence[Point]) -> Any:
     rows = [
         {
             "label": point.label, "name": point.name, "arclength": point.arclength, "intervals": point.system.intervals,
-            "iterations": point.iterations, **({} if point.index is None else {"index": point.index}), **point.parameters,
+            "iterations": point.iterations, **({} if point.index is None else {"index": point.index}),
+            **({} if point.normal_form is None else {"normal_form": point.normal_form}), **point.parameters,
             **point.functionals,
         }
         for point in points

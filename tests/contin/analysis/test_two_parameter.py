@@ -128,7 +128,7 @@ def test_sensitivity_of_a_user_zero():
 
 def test_bad_starts():
     branch = cusp_branch()
-    with pytest.raises(ProblemError, match="neither a fold nor"):
+    with pytest.raises(ProblemError, match="must be one of LP, BP"):
         curve(branch.points[1], "lam")
     with pytest.raises(ProblemError, match="'mu' must be a parameter that is not free"):
         curve(branch.labelled("LP")[0], "mu")

@@ -1,0 +1,219 @@
+"""The extended systems of curves of period doublings and of torus bifurcations of cycles in two parameters.
+
+A perturbation of the Poincare map (`contin.discretization.floquet`) that is multiplied by -1, or by exp(i theta), in a round:
+v(1) = -v(0), or, with v = v_1 + i sin(theta) v_2 and kappa = cos(theta),
+
+    [ v_1 ]       [ kappa   kappa^2 - 1 ]  [ v_1 ]
+    [     ] (1) = [                     ]  [     ] (0).
+    [ v_2 ]       [   1        kappa    ]  [ v_2 ]
+
+The equations are regular at the strong resonances theta = 0 (R1) and theta = pi (R2), where the curve ends: beyond, with
+|kappa| > 1, two real multipliers have the product 1, which is no bifurcation.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import cast
+
+import numpy as np
+
+from contin.analysis.critical_curve import CriticalCurve
+from contin.analysis.extended import Borders
+from contin.analysis.fold_curve import FoldCurve, shrinking
+from contin.arrays import Array
+from contin.detection.cycle_normal_forms import NormalForms
+from contin.detection.lyapunov import Coefficient
+from contin.detection.test_functions import own_test_functions
+from contin.discretization.cycles import CycleCollocation
+from contin.discretization.floquet import Round
+from contin.discretization.system import System
+from contin.problems.cycle import PERIOD
+from contin.stepping.trial import TestFunction, Trial
+
+#: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
+_DOUBLE = 1e-3
+#: Cosines of the angles at strong resonances.
+_RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
+#: With a smaller imaginary part of the multiplier the curve is at its end, with a smaller difference of kappa at a resonance:
+#: they are located more exactly than that.
+_REAL = 1e-6
+
+
+class CycleCurve(CriticalCurve):
+    """Cycles with a critical multiplier, on a `CycleCollocation`."""
+
+    @property
+    def cycles(self) -> CycleCollocation:
+        """The underlying system."""
+        return cast(CycleCollocation, self.base)
+
+    @functools.cached_property
+    def _folds(self) -> FoldCurve:
+        return FoldCurve(self.base)
+
+    def fold(self, x: Array) -> float:
+        """Return a number that vanishes where the cycle is at a fold, too."""
+        y = x[: self.base.size]
+        if self._folds.borders is not None and not self._folds.borders_fit(y):
+            self._folds.borders = None
+        return float(self._folds.null_vectors(y)[2])
+
+    @abstractmethod
+    def coupling(self, x: Array) -> Array:
+        """Return P, shape (copies, copies)."""
+
+    @property
+    def copy_shape(self) -> tuple[int, Array]:
+        """Number of equations of one copy of L, and the weights of its unknowns."""
+        weights = np.append(self.base.weights[: self.base.state_size], 1.0)
+        return len(weights), weights
+
+    def bordered(self, x: Array, b: Array, c: Array) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+        """Return functions that solve with the bordered matrix and with its transpose."""
+        solver = self.round(x).solver(self.coupling(x), b, c)
+        return solver.solve, solver.solve_transposed
+
+    def round(self, x: Array) -> Round:
+        """Return the linearization without the trivial multiplier."""
+        return Round(self.cycles, x[: self.base.size], phased=True)
+
+    def _place(self, wide: Array, v: Array) -> None:
+        wide[: self.base.state_size], wide[self.base.parameter_index(PERIOD)] = v[:-1], v[-1]
+
+    def ends(self, left: Array) -> Array:
+        """Return the part of left null vectors that belongs to the condition between the ends."""
+        n = len(self.cycles.problem.state_names)
+        return left[..., self.base.state_size - n : self.base.state_size]
+
+    @abstractmethod
+    def normal_form(self, x: Array) -> Coefficient:
+        """Return the coefficient of the normal form."""
+
+    def functionals(self, x: Array) -> Array:
+        """Return those of the underlying problem, and the coefficient of the normal form."""
+        return np.append(super().functionals(x), self.normal_form(x).value)
+
+    def starts(self, right: Array) -> Array:
+        """Return right null vectors at t = 0."""
+        return right[..., : len(self.cycles.problem.state_names)]
+
+
+class DoublingCurve(CycleCurve):
+    """Period doublings: the multiplier -1; the column ``normal_form`` is its coefficient c."""
+
+    copies = 1
+
+    def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
+        super().__init__(base, borders, size, ("normal_form",))
+
+    def normal_form(self, x: Array) -> Coefficient:
+        """Return c."""
+        return NormalForms(self.cycles, x).period_doubling()
+
+    def coupling(self, x: Array) -> Array:
+        """Return -1."""
+        return -np.eye(1)
+
+    def imaginary_part(self, x: Array) -> float:
+        """Return 0: the multiplier is real."""
+        return 0.0
+
+    def by_kappa(self, x: Array, right: Array, left: Array) -> Array:
+        """Return nothing: there is no kappa."""
+        return np.zeros(1)
+
+
+class TorusCurve(CycleCurve):
+    """Torus bifurcations: the multipliers exp(-+ i theta); columns ``normal_form``, Re d, and ``angle``, theta."""
+
+    copies = 2
+
+    def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
+        super().__init__(base, borders, size, ("normal_form", "angle"))
+
+    def coupling(self, x: Array) -> Array:
+        """Return the real matrix with the eigenvalues exp(-+ i theta)."""
+        kappa = self.kappa(x)
+        return np.array([[kappa, kappa**2 - 1], [1.0, kappa]])
+
+    def imaginary_part(self, x: Array) -> float:
+        """Return sin(theta); 0 where the multipliers are real."""
+        return math.sqrt(max(1 - self.kappa(x) ** 2, 0.0))
+
+    def by_kappa(self, x: Array, right: Array, left: Array) -> Array:
+        """Return -w.(dP/dkappa v(0))."""
+        change = np.array([[1.0, 2 * self.kappa(x)], [0.0, 1.0]])
+        result: Array = -np.einsum("ija,jk,ka->i", self.ends(left), change, self.starts(right))
+        return result
+
+    def functionals(self, x: Array) -> Array:
+        """Return those of the underlying problem, and the angle."""
+        return np.append(super().functionals(x), self._angle(x))
+
+    def _angle(self, x: Array) -> float:
+        return math.acos(min(max(self.kappa(x), -1.0), 1.0))
+
+    def normal_form(self, x: Array) -> Coefficient:
+        """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
+        if self.imaginary_part(x) < _REAL or abs(self.kappa(x) - _RESONANCES["R3"]) < _REAL:
+            return Coefficient(math.nan, math.nan, math.nan)
+        return NormalForms(self.cycles, x[: self.base.size]).torus(self._angle(x))
+
+
+def _curve(trial: Trial) -> CycleCurve:
+    return cast(CycleCurve, trial.system)
+
+
+def _resonance(label: str, kappa: float) -> TestFunction:
+    """Return the test function of the angle with this cosine: a strong resonance; the curve ends where the angle is 0 or pi.
+
+    A test function that ends a run is positive on it.
+    """
+    sign, name = (-1 if kappa == 1 else 1), f"resonance 1:{label[1]}"
+    return TestFunction(label, name, lambda trial: sign * (_curve(trial).kappa(trial.x) - kappa), terminal=abs(kappa) == 1)
+
+
+def _at_fold(label: str, name: str) -> TestFunction:
+    """Return the test function of points where the cycle is at a fold, too: two multipliers are one, up to a square root."""
+
+    def confirm(trial: Trial) -> bool:
+        curve = _curve(trial)
+        exponents = curve.cycles.eigenvalues(trial.x[: curve.base.size])
+        return bool(np.sort(np.abs(exponents))[1] < _DOUBLE)
+
+    return TestFunction(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)
+
+
+def _degenerate(label: str, name: str) -> TestFunction:
+    """Return the test function of points where the coefficient of the normal form is zero."""
+    return TestFunction(
+        label, name, lambda trial: _curve(trial).normal_form(trial.x).value,
+        confirm=lambda trial: _curve(trial).normal_form(trial.x).vanishes,
+    )  # fmt: skip
+
+
+@own_test_functions.register
+def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
+    """Strong resonances, Chenciner points, and folds."""
+    resonances = [_resonance(label, kappa) for label, kappa in _RESONANCES.items()]
+    return [shrinking(), *resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
+
+
+@own_test_functions.register
+def _of_doubling_curve(system: DoublingCurve) -> list[TestFunction]:
+    """A second multiplier -1 (R2: the derivative of g by the multiplier vanishes), generalized period doublings, and folds."""
+
+    def double(trial: Trial) -> float:
+        curve = _curve(trial)
+        right, _, left = curve.null_vectors(trial.x)
+        v, w = curve.starts(right[0]), curve.ends(left[0, 0])
+        return float(v @ w) / float(np.linalg.norm(v) * np.linalg.norm(w))
+
+    return [
+        shrinking(), TestFunction("R2", "resonance 1:2", double), _degenerate("GPD", "generalized period doubling"),
+        _at_fold("LPPD", "fold-flip"),
+    ]  # fmt: skip

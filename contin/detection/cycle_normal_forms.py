@@ -1,0 +1,163 @@
+"""Normal forms of bifurcations of cycles (Kuznetsov, Govaerts, Doedel & Dhooge 2005), by linear boundary value problems.
+
+Time is measured in periods, s = t / T, so that the field is G = T F; J, B and C are its derivatives of first, second and third
+order along the cycle. Near it u = u0(s) + xi v(s) + ..., and in the coordinates (s, xi) of the centre manifold
+
+    fold               ds/dt = (1 - alpha xi) / T,      dxi/dt = b xi^2,
+    period doubling    ds/dt = (1 + a xi^2) / T,        dxi/dt = c xi^3,
+    torus              ds/dt = (1 + a |xi|^2) / T,      dxi/dt = i theta xi / T + d xi |xi|^2.
+
+The expansion of both sides gives, power by power of xi, equations L h = r with L h = h' - J h and a condition h(1) = mu h(0).
+Where L is singular, w.r = 0 for the left null vector w is the condition that determines a coefficient:
+
+    fold               L v = alpha u0', periodic;  w.v = 1:             b T = w.(B(v, v) + 2 alpha J v) / 2
+    period doubling    L v = 0, v(1) = -v(0);  w.v = 1
+                       L h = B(v, v) - 2 a u0', periodic:               c T = w.(C(v, v, v) + 3 B(v, h) - 6 a J v) / 6
+    torus              L v = 0, v(1) = e^(i theta) v(0);  w.v = 1
+                       L h = B(v, v*) - a u0', periodic
+                       L k = B(v, v), k(1) = e^(2 i theta) k(0):
+                                            d T = w.(C(v, v, v*) + 2 B(v, h) + B(v*, k) - 2 a (J v - i theta v)) / 2
+
+The mean of |v|^2 over the period is one, and at folds v is normal to u0' in the mean. Products with w are those of the
+discrete equations, so that the coefficients converge with the cycle. Where c or the real part of d is negative, the bifurcation
+is supercritical: the doubled cycle, or the torus, attracts on the centre manifold. The sign of b depends on that of v, and its
+absolute value is given; it vanishes at a cusp.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.detection.lyapunov import Coefficient
+from contin.discretization.bends import bends
+from contin.discretization.cycles import CycleCollocation
+from contin.discretization.floquet import Round
+from contin.problems.cycle import PERIOD
+
+#: Rounds of inverse iteration for null vectors, from random borders; the first leaves an error of the size of the multiplier's.
+_ROUNDS = 3
+#: The random borders.
+_SEED = 11
+
+
+class NormalForms:
+    """The normal forms at one cycle; each method returns the coefficient at a bifurcation of that kind.
+
+    Parameters
+    ----------
+    system : CycleCollocation
+    x : ndarray, shape (size,)
+    """
+
+    def __init__(self, system: CycleCollocation, x: Array) -> None:
+        self.system, self.x = system, x
+        self.plain, self.phased = Round(system, x, phased=False), Round(system, x, phased=True)
+        self.points = system.at_gauss_points(x)
+        self.jacobian = system.jacobians_of_field(x, self.points)
+        self.h = np.repeat(np.diff(system.mesh), system.degree)[:, None]
+        self.period = float(x[system.parameter_index(PERIOD)])
+
+    def fold(self) -> Coefficient:
+        """Return the absolute value of b."""
+        v, w = self._null_vectors(self.phased, 1.0)
+        along = self.system.rates(self.x)
+        v[: along.size] -= self._mean(v, along) / self._mean(along, along) * along
+        v = v / np.sqrt(self._mean(v, v))
+        here, alpha = self._at_points(v), v[-1] / self.period
+        w, first = w / self._product(w, here), self._bends(here)[0]
+        slope = 2 * alpha * self._apply(self.jacobian, here)
+        found = self._coefficient([[self._product(w, term) for term in (self._apply(b, here), slope)] for b in first], 2)
+        return Coefficient(abs(found.value), found.error, found.size)
+
+    def period_doubling(self) -> Coefficient:
+        """Return c."""
+        v, here, w = self._critical(-1.0)
+        first, second = self._bends(here)
+        values = []
+        for b, c in zip(first, second):
+            h, change = self._periodic(self._apply(b, here))
+            a = -change / (2 * self.period)
+            terms = self._apply(c, here), 3 * self._apply(b, h), -6 * a * self._apply(self.jacobian, here)
+            values.append([self._product(w, term) for term in terms])
+        return self._coefficient(values, 6)
+
+    def torus(self, angle: float) -> Coefficient:
+        """Return the real part of d."""
+        v, here, w = self._critical(np.exp(1j * angle))
+        (real_b, real_c), (imaginary_b, imaginary_c) = self._bends(here.real), self._bends(here.imag)
+        values = []
+        for order in (0, 1):
+            b, c = real_b[order] + 1j * imaginary_b[order], real_c[order] + imaginary_c[order]
+            h, change = self._periodic(self._apply(b, here.conj()).real)
+            a = -change / self.period
+            k = self._at_points(self.plain.solver(np.exp(2j * angle)).solve(self._right_side(self._apply(b, here), self.plain)))
+            slope = -2 * a * (self._apply(self.jacobian, here) - 1j * angle * here)
+            terms = self._apply(c, here), 2 * self._apply(b, h), self._apply(b.conj(), k), slope
+            values.append([self._product(w, term).real for term in terms])
+        return self._coefficient(values, 2)
+
+    # --- solutions of the linear problems ------------------------------------------------------------------------
+
+    def _null_vectors(self, matrix: Round, multiplier: Any) -> tuple[Array, Array]:
+        """Return the right and the left null vector."""
+        random = np.random.default_rng(_SEED)
+        b, c = random.standard_normal(matrix.size), random.standard_normal(matrix.size)
+        unit = np.zeros(matrix.size + 1, dtype=np.result_type(multiplier))
+        unit[-1] = 1.0
+        for _ in range(_ROUNDS):
+            solver = matrix.solver(multiplier, b, c)
+            v, w = solver.solve(unit)[:-1], solver.solve_transposed(unit)[:-1]
+            b, c = w.conj() / np.linalg.norm(w), v.conj() / np.linalg.norm(v)
+        return v, w
+
+    def _critical(self, multiplier: Any) -> tuple[Array, Array, Array]:
+        """Return v, v at the Gauss points, and w, of a multiplier that is not one."""
+        v, w = self._null_vectors(self.plain, multiplier)
+        v = v / np.sqrt(self._mean(v, v.conj()).real)
+        here = self._at_points(v)
+        return v, here, w / self._product(w, here)
+
+    def _periodic(self, right_side: Array) -> tuple[Array, float]:
+        """Return the periodic h with L h = right side + change * F, at the Gauss points, and this change of the period."""
+        solution = self.phased.solver(np.eye(1)).solve(self._right_side(right_side, self.phased))
+        return self._at_points(solution), float(solution[-1])
+
+    def _right_side(self, values: Array, matrix: Round) -> Array:
+        """Return values at the Gauss points as the right side of the discrete equations."""
+        result = np.zeros(matrix.size, dtype=values.dtype)
+        result[: values.size] = (self.h * values).ravel()
+        return result
+
+    def _product(self, w: Array, values: Array) -> Any:
+        """Return w.values."""
+        return w[: values.size] @ (self.h * values).ravel()
+
+    def _mean(self, v: Array, w: Array) -> Any:
+        """Return the mean of v.w over the period, in the user's units."""
+        size = self.system.state_size
+        weights = self.system.weights[:size] * self.system.unscaled_factors[:size] ** 2
+        return weights @ (v[:size] * w[:size])
+
+    def _at_points(self, v: Array) -> Array:
+        """Return states at the nodes, interpolated to the Gauss points."""
+        system, n = self.system, self.points.shape[1]
+        local = v[: system.state_size].reshape(-1, n)[system.by_interval]
+        points: Array = np.einsum("qm,jma->jqa", system.basis.value, local).reshape(-1, n)
+        return points
+
+    # --- derivatives ---------------------------------------------------------------------------------------------
+
+    def _bends(self, v: Array) -> tuple[Array, Array]:
+        return bends(lambda states: self.system.jacobians_of_field(self.x, states), self.points, v)
+
+    @staticmethod
+    def _apply(matrices: Array, v: Array) -> Array:
+        result: Array = np.einsum("kij,kj->ki", matrices, v)
+        return result
+
+    def _coefficient(self, terms: list[list[Any]], factor: int) -> Coefficient:
+        """Return a coefficient per unit of time, from its terms by derivatives of sixth and of fourth order."""
+        return Coefficient.of(*np.array(terms) / (factor * self.system.parameter(self.x, PERIOD)))

@@ -1,0 +1,97 @@
+"""The first Lyapunov coefficient of a Hopf point (Kuznetsov, Elements of Applied Bifurcation Theory, section 5.4).
+
+With A the Jacobian of the field, A q = i omega q, w.A = i omega w., |q| = 1 and w.q = 1, and B and C the derivatives of second
+and third order,
+
+    l1 = Re w.[ C(q, q, q*) - 2 B(q, A^-1 B(q, q*)) + B(q*, (2 i omega - A)^-1 B(q, q)) ] / (2 omega).
+
+Where it is negative the bifurcation is supercritical: cycles are on the side where the equilibrium is unstable, and attract on
+the centre manifold. Where it is positive the bifurcation is subcritical.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.discretization.algebraic import Algebraic
+from contin.discretization.bends import bends
+
+#: An error is no smaller than this part of the terms: round-off, which second differences divide by the square of their length.
+_ROUND_OFF = 1e-13
+#: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
+#: tests are the same.
+_CANCELLED, _ZERO = 1e-6, 1e-9
+
+
+class CriticalPair(NamedTuple):
+    """A pair of eigenvalues -+ i omega: its frequency, and the right and left eigenvector, |q| = 1 and w.q = 1."""
+
+    frequency: float
+    right: ComplexArray
+    left: ComplexArray
+
+
+def critical_pair(jacobian: Array, frequency: float | None = None) -> CriticalPair:
+    """Return the pair of eigenvalues that is nearest to -+ i ``frequency``.
+
+    Without a frequency, it is the complex pair nearest to the imaginary axis.
+    """
+    values, vectors = np.linalg.eig(jacobian)
+    if frequency is None:
+        off_axis = np.where(values.imag > 0, np.abs(values.real), np.inf)
+        frequency = float(values[np.argmin(off_axis)].imag)
+    right = vectors[:, np.argmin(np.abs(values - 1j * frequency))].astype(complex)
+    right = right / np.linalg.norm(right)
+    values, vectors = np.linalg.eig(jacobian.T)
+    left = vectors[:, np.argmin(np.abs(values - 1j * frequency))]
+    with np.errstate(all="ignore"):
+        return CriticalPair(frequency, right, left / (left @ right))
+
+
+class Coefficient(NamedTuple):
+    """A coefficient of a normal form, its estimated error, and the sum of the absolute values of its terms."""
+
+    value: float
+    error: float
+    size: float
+
+    @classmethod
+    def of(cls, best: Array, rough: Array) -> Coefficient:
+        """Return the coefficient of terms that are computed in two ways."""
+        size = float(np.abs(best).sum())
+        return cls(float(best.sum()), float(abs(best.sum() - rough.sum())) + _ROUND_OFF * size, size)
+
+    @property
+    def vanishes(self) -> bool:
+        """The terms cancel, or are round-off of derivatives of order one.
+
+        Where a coefficient is round-off of large terms, or infinite, its sign changes without a zero.
+        """
+        return abs(self.value) < _CANCELLED * self.size + _ZERO
+
+
+def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:
+    """Return the first Lyapunov coefficient at a Hopf point; NaN where another eigenvalue is zero."""
+    size = np.ones(system.state_size) if system.scales is None else system.scales.states
+    here, omega, q, w = system.states(x) / size, pair.frequency, pair.right / size, pair.left * size
+
+    def jacobian(states: Array) -> Array:
+        return system.jacobians(x, states * size) * size / size[:, None]
+
+    matrix = jacobian(here)[0]
+    (real_b, real_c), (imaginary_b, imaginary_c) = (bends(jacobian, here, part[None]) for part in (q.real, q.imag))
+    values = []
+    for order in (0, 1):
+        along_q = real_b[order, 0] + 1j * imaginary_b[order, 0]  # B(q, .)
+        along_both = real_c[order, 0] + imaginary_c[order, 0]  # C(q, q*, .)
+        try:
+            constant = np.linalg.solve(matrix, (along_q @ q.conj()).real)
+            twice = np.linalg.solve(2j * omega * np.eye(len(q)) - matrix, along_q @ q)
+        except np.linalg.LinAlgError:
+            return Coefficient(float("nan"), float("nan"), float("nan"))
+        terms = np.array([along_both @ q, -2 * along_q @ constant, along_q.conj() @ twice])
+        values.append((terms @ w).real / (2 * omega))
+    return Coefficient.of(*values)

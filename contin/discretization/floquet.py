@@ -1,0 +1,114 @@
+"""The linearization of a cycle over one round, with any condition between its ends.
+
+Collocated, v' = T F_u v has the rows C v = 0. With v(1) = P v(0) for several copies of v that the small matrix P couples (or
+one copy with the number P), a perturbation is multiplied by an eigenvalue of P in each round:
+
+                        v_1      a_1      v_2      a_2
+                     [ C        -h F                      ]    collocation; a_i is a change of the period
+                     [ E1 - P11 E0       -P12 E0          ]    v_1(1) = P11 v_1(0) + P12 v_2(0)
+                     [ e                                  ]    e.v_1(0) = 0, with e along the cycle at t = 0
+                     [                    C       -h F    ]
+                     [ -P21 E0            E1 - P22 E0     ]
+                     [                    e               ]
+
+With the columns a and the rows e the trivial multiplier is left out: the matrix is singular where an eigenvalue of P is a
+multiplier of the Poincare map. Without them it is singular where one is a multiplier of the cycle. (A phase condition under an
+integral would not do in place of e: with u' of constant length, (t - 1/2) u' would satisfy it and all equations for P = -1.)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.discretization.cycles import CycleCollocation
+from contin.problems.cycle import PERIOD
+
+
+class Solver:
+    """Solves with a sparse square matrix, real or complex, and with its transpose; solutions are NaN where it is singular."""
+
+    def __init__(self, matrix: Any) -> None:
+        from scipy.sparse.linalg import splu  # type: ignore[import-untyped]  # takes .6 s to load
+
+        self.size = matrix.shape[0]
+        try:
+            self._factors: Any = splu(matrix.tocsc())
+        except (RuntimeError, ValueError):  # exactly singular, or not finite
+            self._factors = None
+
+    def solve(self, b: Array) -> Array:
+        """Return the x with A x = b."""
+        return self._solved(b, "N")
+
+    def solve_transposed(self, c: Array) -> Array:
+        """Return the y with A^T y = c."""
+        return self._solved(c, "T")
+
+    def _solved(self, b: Array, transposed: str) -> Array:
+        if self._factors is None:
+            return np.full(self.size, np.nan)
+        solution: Array = self._factors.solve(b, transposed)
+        return solution
+
+
+class Round:
+    """The linearization of a cycle x over one round.
+
+    Parameters
+    ----------
+    system : CycleCollocation
+    x : ndarray, shape (size,)
+    phased : bool
+        With a change of the period and the condition at t = 0, so that the trivial multiplier is left out.
+
+    Attributes
+    ----------
+    size : int
+        Number of equations, and of unknowns, of one copy.
+    """
+
+    def __init__(self, system: CycleCollocation, x: Array, phased: bool) -> None:
+        self.system, self.phased = system, phased
+        self.states = system.state_size
+        self.size = self.states + phased
+        self._matrices = system.interval_matrices(x)
+        self._period = system.parameter_columns(x, (PERIOD,))[:, 0] if phased else np.empty(0)
+
+    @property
+    def ends(self) -> slice:
+        """Place of the condition between the ends among the equations of one copy."""
+        n = len(self.system.problem.state_names)
+        return slice(self.states - n, self.states)
+
+    def solver(self, coupling: Array, b: Array | None = None, c: Array | None = None) -> Solver:
+        """Return the solver of the matrix for P (k, k), bordered in each copy by a column b and a row c if these are given."""
+        from scipy import sparse  # type: ignore[import-untyped]  # as above
+
+        coupling = np.atleast_2d(coupling)
+        one, n = np.eye(len(coupling)), len(self.system.problem.state_names)
+        first = sparse.coo_array((np.ones(n), (np.arange(n) + self.ends.start, np.arange(n))), (self.size, self.size))
+        matrix = sparse.kron(one, self._collocation()) - sparse.kron(coupling, first)
+        if b is not None and c is not None:
+            column, row = sparse.coo_array(b[:, None]), sparse.coo_array(c[None, :])
+            matrix = sparse.block_array([[matrix, sparse.kron(one, column)], [sparse.kron(one, row), None]])
+        return Solver(matrix)
+
+    def _collocation(self) -> Any:
+        """Return the matrix of one copy, but for what P multiplies."""
+        from scipy import sparse
+
+        count, rows, columns = self._matrices.shape
+        at = rows * np.arange(count)[:, None, None]
+        n, end = len(self.system.problem.state_names), self.states
+        i = np.broadcast_to(at + np.arange(rows)[None, :, None], self._matrices.shape).ravel()
+        j = np.broadcast_to(at + np.arange(columns)[None, None, :], self._matrices.shape).ravel()
+        last = np.arange(end - n, end)
+        values, places = [self._matrices.ravel(), np.ones(n)], [(i, j), (last, last)]
+        if self.phased:
+            values += [self._period, self.system.start_direction]
+            places += [(np.arange(end + 1), np.full(end + 1, end)), (np.full(n, end), np.arange(n))]
+        where = np.concatenate([row for row, _ in places]), np.concatenate([column for _, column in places])
+        return sparse.coo_array((np.concatenate(values), where), (self.size, self.size))
