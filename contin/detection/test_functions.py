@@ -6,12 +6,13 @@ import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 
+from contin.detection.floquet import doubling, torus
 from contin.detection.hopf import hopf
 from contin.detection.second_variation import legendre
 from contin.detection.segment import SpecialPoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
 from contin.problems.variational import VariationalProblem
@@ -65,8 +66,8 @@ def _of_boundary_value(system: Collocation) -> list[TestFunction]:
 
 
 @own_test_functions.register
-def _of_cycles(system: CycleCollocation) -> list[TestFunction]:
-    return [hopf()]
+def _of_cycles(system: PeriodicCollocation) -> list[TestFunction]:
+    return [doubling(), torus()]
 
 
 @own_test_functions.register

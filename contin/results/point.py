@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from contin.arrays import Array
+from contin.detection.floquet import Floquet, floquet
 from contin.detection.second_variation import SecondVariation, index_of, second_variation
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
@@ -84,6 +86,18 @@ class Point:
     def __getitem__(self, name: str) -> float:
         """Return a parameter or functional by name."""
         return self.parameters[name] if name in self.parameters else self.functionals[name]
+
+    def floquet(self) -> Floquet:
+        """Return the Floquet multipliers of a cycle, with estimates of their errors.
+
+        Raises
+        ------
+        ProblemError
+            The point is no cycle.
+        """
+        if not isinstance(self.system, PeriodicCollocation):
+            raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem")
+        return floquet(self.system, self.x, self.tangent)
 
     def second_variation(self) -> SecondVariation:
         """Return the second variation of the energy there: its eigenvalues, and its modes as functions.
