@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,15 @@ def _integrated(field: Any, start: Array, time: float, **options: Any) -> Any:
     return done
 
 
+def _passages(done: Any, height: Callable[[Any], Any]) -> Iterator[float]:
+    """Yield the times at which a height along a motion passes zero upwards; SciPy's own events fail at ends of its steps."""
+    from scipy.optimize import brentq  # type: ignore[import-untyped]  # the integrator has loaded it
+
+    values = height(done.t)
+    for i in np.flatnonzero((values[:-1] < 0) & (values[1:] >= 0)):
+        yield float(brentq(height, done.t[i], done.t[i + 1]))
+
+
 def _forced_rounds(
     problem: CycleProblem, field: Any, start: tuple[Array, float], values: Any
 ) -> tuple[tuple[Array, Array], int]:
@@ -123,17 +133,12 @@ def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
     ProblemError
     """
     across = np.asarray(field(0.0, start), dtype=float)
-
-    def plane(t: float, u: Array) -> float:
-        return float(across @ (u - start))
-
-    plane.direction = 1.0  # type: ignore[attr-defined]
-    done = _integrated(field, start, longest, events=plane, dense_output=True)
+    done = _integrated(field, start, longest, dense_output=True)
     size = float(np.ptp(done.y, axis=1).max())
     if size <= _RESTS * (1 + np.abs(start).max()):
         raise ProblemError(f"start: the motion from there comes to rest near {', '.join(f'{value:.6g}' for value in start)}")
-    for t in done.t_events[0]:
-        if t > 0 and np.abs(done.sol(t) - start).max() <= _BACK * size:
+    for t in _passages(done, lambda t: across @ (done.sol(t).T - start).T):
+        if np.abs(done.sol(t) - start).max() <= _BACK * size:
             times = np.linspace(0.0, t, _SAMPLES)
             return times, done.sol(times).T
     raise ProblemError(

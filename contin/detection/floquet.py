@@ -158,10 +158,15 @@ def _dips(places: list[Place], values: list[float]) -> list[tuple[float, float]]
 
 def _parabola(places: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
     """Return vertex, half the second derivative and value at the vertex of the parabola through three absolute values."""
-    square, linear, constant = np.polyfit(np.array(places) - places[1], np.abs(values), 2)
+    (a, b, c), (first, middle, last) = places, map(abs, values)
+    if not a < b < c:
+        return math.nan, 0.0, math.nan
+    before, behind = (middle - first) / (b - a), (last - middle) / (c - b)
+    square = (behind - before) / (c - a)
+    linear = before + square * (b - a)  # the slope at b
     if not square > 0:
-        return math.nan, float(square), math.nan
-    return float(places[1] - linear / (2 * square)), float(square), float(constant - linear**2 / (4 * square))
+        return math.nan, square, math.nan
+    return b - linear / (2 * square), square, middle - linear**2 / (4 * square)
 
 
 def _below(segment: Segment, knots: list[Place], test: TestFunction) -> list[Place]:

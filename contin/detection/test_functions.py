@@ -7,6 +7,7 @@ import functools
 from collections.abc import Mapping, Sequence
 
 from contin.detection.floquet import doubling, torus
+from contin.detection.homoclinic import homoclinic, resting_place
 from contin.detection.hopf import hopf
 from contin.detection.second_variation import legendre
 from contin.detection.segment import SpecialPoint
@@ -17,7 +18,7 @@ from contin.discretization.protocol import Discretization
 from contin.names import value_names
 from contin.problems.variational import VariationalProblem
 from contin.stepping.state import Stop
-from contin.stepping.trial import TestFunction
+from contin.stepping.trial import TestFunction, Trial
 
 
 def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
@@ -67,7 +68,7 @@ def _of_boundary_value(system: Collocation) -> list[TestFunction]:
 
 @own_test_functions.register
 def _of_cycles(system: PeriodicCollocation) -> list[TestFunction]:
-    return [doubling(), torus()]
+    return [doubling(), torus(), homoclinic()] if isinstance(system, CycleCollocation) else [doubling(), torus()]
 
 
 @own_test_functions.register
@@ -88,3 +89,18 @@ def _of_shrunk_cycles(system: CycleCollocation, point: SpecialPoint) -> SpecialP
         return point
     stop = Stop("Hopf", "the cycles shrink onto an equilibrium, a Hopf point")
     return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
+
+
+@functools.singledispatch
+def own_stop(system: Discretization, trial: Trial, stop: Stop) -> Stop:
+    """Return the reason why a run ends, with what a kind of problem knows of its last point. Each kind registers its own."""
+    return stop
+
+
+@own_stop.register
+def _of_slow_cycles(system: CycleCollocation, trial: Trial, stop: Stop) -> Stop:
+    """Where the period runs away: the equilibrium near which the cycle spends its time."""
+    place = resting_place(trial.system, trial.x)  # type: ignore[arg-type]
+    if place is None:
+        return stop
+    return dataclasses.replace(stop, message=f"{stop.message}; {place.describe(trial.system.problem.states)}")

@@ -38,6 +38,23 @@ PROGRAM = """
       TPI = 8*ATAN(1.0D0)
       {start}
       END SUBROUTINE STPNT
+      SUBROUTINE ADVANCE(NDIM,U,PAR,T)
+      IMPLICIT NONE
+      INTEGER, INTENT(IN) :: NDIM
+      DOUBLE PRECISION, INTENT(INOUT) :: U(NDIM), PAR(*)
+      DOUBLE PRECISION, INTENT(IN) :: T
+      DOUBLE PRECISION K1(NDIM), K2(NDIM), K3(NDIM), K4(NDIM), H, D(1)
+      INTEGER I, N, ICP(1)
+      N = 1 + INT(2000*T)
+      H = T*PAR(11)/N
+      DO I = 1, N
+        CALL FUNC(NDIM,U,ICP,PAR,0,K1,D,D)
+        CALL FUNC(NDIM,U+H/2*K1,ICP,PAR,0,K2,D,D)
+        CALL FUNC(NDIM,U+H/2*K2,ICP,PAR,0,K3,D,D)
+        CALL FUNC(NDIM,U+H*K3,ICP,PAR,0,K4,D,D)
+        U = U + H/6*(K1 + 2*K2 + 2*K3 + K4)
+      END DO
+      END SUBROUTINE ADVANCE
       SUBROUTINE BCND
       END SUBROUTINE BCND
       SUBROUTINE ICND
@@ -49,9 +66,9 @@ PROGRAM = """
 """
 
 CONSTANTS = {
-    "ISW": 1, "NBC": 0, "NINT": 0, "JAC": 0, "NTST": 200, "NCOL": 5, "IAD": 1, "ILP": 1, "ISP": 2, "NMX": 5000, "NPR": 0,
+    "ISW": 1, "NBC": 0, "NINT": 0, "JAC": 0, "NTST": 200, "NCOL": 5, "IAD": 1, "ILP": 1, "ISP": 2, "NMX": 1500, "NPR": 0,
     "MXBF": 0, "IID": 2, "IPLT": 0, "ITMX": 20, "ITNW": 9, "NWTN": 3, "EPSL": 1e-11, "EPSU": 1e-11, "EPSS": 1e-9,
-    "DS": 0.01, "DSMIN": 1e-8, "DSMAX": 0.1, "IADS": 1, "NPAR": 36, "THL": {11: 0.0},
+    "DS": 0.01, "DSMIN": 1e-8, "DSMAX": 0.5, "IADS": 1, "NPAR": 36, "THL": {11: 0.0},
 }  # fmt: skip
 LABELS = {1: "BP", 2: "LP", 3: "HB", 4: "UZ", 5: "LP", 6: "BP", 7: "PD", 8: "TR", 9: "EP", -4: "UZ", -9: "MX"}
 
@@ -126,6 +143,12 @@ def ends(*values: float, period: float | None = None) -> str:
 
 EQUILIBRIA = {"IPS": 1, "ICP": [1]}
 CYCLES = {"IPS": 2, "ICP": [1, 11]}
+#: Tolerances at which special points are found that AUTO-07p gives up at tighter ones, in silence.
+LOOSE = {"EPSL": 1e-10, "EPSU": 1e-10, "EPSS": 1e-7, "DS": 0.001, "DSMAX": 0.02}
+#: A branch that shrinks onto a Hopf point passes it, labelled BP and misplaced, and comes back: it is stopped there.
+SHRINKING = {**CYCLES, "SP": "['BP1']"}
+
+LORENZ = "F(1) = 10*(U(2) - U(1)); F(2) = PAR(1)*U(1) - U(2) - U(1)*U(3); F(3) = U(1)*U(2) - 8D0/3*U(3)"
 
 STUDIES = {
     # x" + .1 x' + x + x^3 = .5 cos(w t): PAR(1) is w; (u3, u4) = (sin, cos) on the circle
@@ -173,6 +196,101 @@ STUDIES = {
         },
         oscillator=True,
     ),
+    # demo ab: PAR(1) is p1, PAR(2) p2, and p3 = 3
+    **{
+        f"ab {p2}": Study(
+            2,
+            "S = EXP(U(2)); F(1) = -U(1) + PAR(1)*(1 - U(1))*S; F(2) = -U(2) + PAR(1)*PAR(2)*(1 - U(1))*S - 3*U(2)",
+            f"PAR(1) = 0; PAR(2) = {p2}; U = 0",
+            {
+                "rest": Run({**EQUILIBRIA, "UZSTOP": ends(0.35)}),
+                "cycles": Run({**SHRINKING, "UZSTOP": ends(0.01, 0.35, period=30)}, ("rest", "HB", 1)),
+            },
+        )
+        for p2 in (14, 18)
+    },
+    # demo abc: PAR(1) is d; beta = 1.55, B = 8, sigma = .04
+    "abc": Study(
+        3,
+        "S = EXP(U(3)); F(1) = -U(1) + PAR(1)*(1 - U(1))*S; F(2) = -U(2) + PAR(1)*S*(1 - U(1) - 0.04D0*U(2));"
+        "F(3) = -U(3) - 1.55D0*U(3) + PAR(1)*8*S*(1 - U(1) + 0.04D0*U(2))",
+        "PAR(1) = 0; U = 0",
+        {
+            "rest": Run({**EQUILIBRIA, "UZSTOP": ends(0.4)}),
+            **{f"cycles {n}": Run({**SHRINKING, "UZSTOP": ends(0.1, 0.4, period=30)}, ("rest", "HB", n)) for n in (1, 2, 3, 4)},
+        },
+    ),
+    # demos lor and lrz: PAR(1) is rho; sigma = 10, beta = 8/3
+    "lor": Study(
+        3,
+        LORENZ,
+        "PAR(1) = 280; PAR(11) = 0.43325D0; U = (/ -4.0674614D0, -24.183805D0, 219.00338D0 /); CALL ADVANCE(NDIM,U,PAR,T)",
+        {
+            "first": Run({**CYCLES, "DS": -0.5, "DSMAX": 5.0, "UZSTOP": ends(200, 400)}),
+            "double": Run({**CYCLES, "DS": -0.1, "DSMAX": 2.0, "ISW": -1, "UZSTOP": ends(200, 400)}, ("first", "PD", 1)),
+        },
+    ),
+    "lrz": Study(
+        3,
+        LORENZ,
+        "PAR(1) = 20; U = (/ SQRT(8D0/3*19), SQRT(8D0/3*19), 19D0 /)",
+        {
+            "rest": Run({**EQUILIBRIA, "UZSTOP": ends(15, 30)}),
+            "cycles": Run({**CYCLES, "DSMAX": 0.5, "UZSTOP": ends(10, 30, period=4)}, ("rest", "HB", 1)),
+        },
+    ),
+    # demo pp2: PAR(1) is p1; p2 = p4 = 3, p3 = 5
+    "pp2": Study(
+        2,
+        "S = EXP(-5*U(1)); F(1) = 3*U(1)*(1 - U(1)) - U(1)*U(2) - PAR(1)*(1 - S); F(2) = -U(2) + 3*U(1)*U(2)",
+        "PAR(1) = 0.5D0; U(1) = 1D0/3; U(2) = 2 - 1.5D0*(1 - EXP(-5D0/3))",
+        {
+            "rest": Run({**EQUILIBRIA, "UZSTOP": ends(0.1, 0.8)}),
+            "cycles": Run({**CYCLES, "UZSTOP": ends(0.1, 0.9, period=36)}, ("rest", "HB", 1)),
+        },
+    ),
+    # demos pp3 (p4 = 4) and ppp (p4 = 3): PAR(1) is p1; p2 = 1/4, p3 = 1/2, p5 = 3, p6 = 5
+    **{
+        name: Study(
+            3,
+            f"F(1) = U(1)*(1 - U(1)) - {p4}*U(1)*U(2); F(2) = -0.25D0*U(2) + {p4}*U(1)*U(2) - 3*U(2)*U(3)"
+            "- PAR(1)*(1 - EXP(-5*U(2))); F(3) = -0.5D0*U(3) + 3*U(2)*U(3)",
+            f"PAR(1) = 0; U(2) = 1D0/6; U(1) = 1 - {p4}*U(2); U(3) = ({p4}*U(1) - 0.25D0)/3",
+            {
+                "rest": Run({**EQUILIBRIA, "UZSTOP": ends(-0.1, 1.0)}),
+                "cycles": Run({**CYCLES, "SP": "['BP2']", "UZSTOP": ends(-0.1, 1.0, period=60)}, ("rest", "HB", 1)),
+            },
+        )
+        for name, p4 in (("pp3", 4),)
+    },
+    # demo tor: PAR(1) is rn
+    "tor": Study(
+        3,
+        "S = U(2) - U(1); F(1) = (-(0.5D0 + PAR(1))*U(1) + 0.5D0*U(2) - 0.328578D0*U(1)**3 + 0.933578D0*S**3)/0.6D0;"
+        "F(2) = 0.5D0*U(1) + 0.1D0*U(2) - U(3) - 0.933578D0*S**3; F(3) = U(2)",
+        "PAR(1) = -0.9D0; U = 0",
+        {
+            "rest": Run({**EQUILIBRIA, "UZSTOP": ends(-0.91, -0.4)}),
+            "cycles": Run({**CYCLES, **LOOSE, "UZSTOP": ends(-0.91, -0.4, period=30)}, ("rest", "HB", 1)),
+            "beside": Run({**CYCLES, **LOOSE, "ISW": -1, "UZSTOP": ends(-0.91, -0.4, period=30)}, ("cycles", "BP", 1)),
+        },
+    ),
+    # demo plp: PAR(1) is rho; S0 = 110, A0 = 500, alpha = .2, K = .1
+    "plp": Study(
+        2,
+        "S = PAR(1)*U(1)*U(2)/(1 + U(1) + 0.1D0*U(1)**2); F(1) = 110 - U(1) - S; F(2) = 0.2D0*(500 - U(2)) - S",
+        "PAR(1) = 2.021628D0; U(1) = 45.55974D0; U(2) = 177.7987D0",
+        {
+            "rest": Run({**EQUILIBRIA, "DSMAX": 3.0, "UZSTOP": ends(6.0)}),
+            **{
+                f"cycles {n}": Run(
+                    {**CYCLES, **LOOSE, "DS": 0.1, "DSMAX": 3, "SP": "['BP1']", "UZSTOP": ends(1, 6, period=30)},
+                    ("rest", "HB", n),
+                )
+                for n in (1, 2)
+            },
+        },
+    ),
 }
 
 
@@ -180,7 +298,8 @@ def main(names: list[str]) -> None:
     notes = json.loads(NOTES.read_text()) if NOTES.exists() else {}
     for name in names or STUDIES:
         notes[name] = run(STUDIES[name])
-        print(name, json.dumps(notes[name], indent=1))
+        for each, rows in notes[name].items():
+            print(name, each, *(f"{row['label']} {row['parameter']:.11g} {row['period']:.11g}" for row in rows[:20]), sep="; ")
     NOTES.write_text(json.dumps(notes, indent=1) + "\n")
 
 
