@@ -11,6 +11,7 @@ from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation, discretized
+from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
@@ -63,11 +64,13 @@ def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
     system: Any = point.system
     if point.label != "PD":
         raise ProblemError(f"start: a point with the label {point.label!r} is no period doubling")
+    adapted = system.adapted(point.x, MeshControl())  # the point is located on a mesh finer than the run needs
+    system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))
     mesh = np.concatenate([system.mesh, 1 + system.mesh[1:]]) / 2
     longer = PERIOD if system.problem.period is None else ROUNDS
     parameters = {**point.parameters, longer: 2 * point.parameters[longer]}
     twice: Any = discretized(system.problem, mesh, system.degree, system.free, parameters, system.scales)
-    states = system.states(point.x)
+    states = system.states(x)
     x = twice.pack(np.concatenate([states, states[1:]]), parameters)
     found = locate_branch_point(twice.with_reference(x), x)
     return twice.with_reference(found.x), found.x, _alternating(twice, found)

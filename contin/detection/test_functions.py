@@ -83,10 +83,19 @@ def own_end(system: Discretization, point: SpecialPoint) -> SpecialPoint:
 
 
 @own_end.register
+def _of_doubled_cycles(system: PeriodicCollocation, point: SpecialPoint) -> SpecialPoint:
+    """Where a cycle comes to go twice round one of half its period the branch ends: beyond it is itself, half a period on."""
+    if point.label != "BP" or not system.is_doubled(point.trial.x):
+        return point
+    stop = Stop("period doubling", "the cycles come to go twice round cycles of half the period, at a period doubling")
+    return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)
+
+
+@own_end.register
 def _of_shrunk_cycles(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
     """Where cycles shrink onto an equilibrium the branch ends: beyond the Hopf point it is itself, half a period later."""
     if not system.has_shrunk(point.trial.x):
-        return point
+        return _of_doubled_cycles(system, point)
     stop = Stop("Hopf", "the cycles shrink onto an equilibrium, a Hopf point")
     return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
 

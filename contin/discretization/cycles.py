@@ -56,6 +56,12 @@ class PeriodicCollocation(Collocation):
         """Return the period."""
         return self.problem.duration(dict(zip(self.problem.parameters, map(float, self.all_parameters(x)))))
 
+    def is_doubled(self, x: Array) -> bool:
+        """Return whether a cycle goes twice round one of half its period, up to the square root of round-off."""
+        states = self.states(x)
+        later = self.evaluate(x, (self.nodes + 0.5) % 1.0)
+        return bool(np.all(np.abs(states - later).max(axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+
     # --- columns -------------------------------------------------------------------------------------------------
 
     def functionals(self, x: Array) -> Array:

@@ -263,6 +263,21 @@ STUDIES = {
         )
         for name, p4 in (("pp3", 4),)
     },
+    # Roessler's equations, a = b = .2: PAR(1) is c; each run doubles the period
+    "roessler": Study(
+        3,
+        "F(1) = -U(2) - U(3); F(2) = U(1) + 0.2D0*U(2); F(3) = 0.2D0 + U(3)*(U(1) - PAR(1))",
+        "PAR(1) = 2; PAR(11) = 5.7098559D0; U = (/ -3.0860105D0, 0.0187698D0, 0.0452997D0 /); CALL ADVANCE(NDIM,U,PAR,T)",
+        {
+            "1": Run({**CYCLES, **LOOSE, "UZSTOP": ends(1, 4.3)}),
+            **{
+                str(2 * n): Run(
+                    {**CYCLES, **LOOSE, "NTST": 400 if n > 2 else 200, "ISW": -1, "UZSTOP": ends(1, 4.3)}, (str(n), "PD", 1)
+                )
+                for n in (1, 2, 4, 8)
+            },
+        },
+    ),
     # demo tor: PAR(1) is rn
     "tor": Study(
         3,

@@ -31,7 +31,7 @@ def test_lorenz_ends_beside_the_origin():
 
 
 def test_a_saddle_node_on_the_cycle():
-    """r' = r - r^3, angle' = 1 + mu - sin(angle): at small mu the cycle is slow at (0, 1), near no equilibrium: none is left."""
+    """r' = r - r^3, angle' = 1 + mu - sin(angle): at small mu the cycle is slow at (0, 1), where no equilibrium is left."""
 
     def field(u, p):
         s = u.x**2 + u.y**2
