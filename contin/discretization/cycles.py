@@ -155,7 +155,12 @@ class ForcedCollocation(PeriodicCollocation):
             raise ProblemError(f"free: {ROUNDS} must not be free, as it is a whole number")
         if not (rounds >= 1 and rounds == int(rounds)):
             raise ProblemError(f"parameters: {ROUNDS} = {checks.shown(rounds)} must be a whole number from 1")
+        self._rounds = int(rounds)
         problem.duration(values)
+
+    def is_doubled(self, x: Array) -> bool:
+        """Return whether a cycle goes twice round one of half its period, and that is a number of periods of the forcing."""
+        return self._rounds % 2 == 0 and super().is_doubled(x)
 
     def with_reference(self, x: Array) -> ForcedCollocation:
         """Return the same: nothing needs a reference."""
