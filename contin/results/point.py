@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +13,7 @@ from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
+from contin.results import portrait
 from contin.stepping.trial import Trial
 
 
@@ -86,6 +87,33 @@ class Point:
     def __getitem__(self, name: str) -> float:
         """Return a parameter or functional by name."""
         return self.parameters[name] if name in self.parameters else self.functionals[name]
+
+    def plot(self, what: str | None = None, states: Sequence[str] | None = None, axes: Any = None) -> Any:
+        """Draw the solution: its phase portrait, its states over time and, of a cycle, its Floquet multipliers.
+
+        Parameters
+        ----------
+        what : str, optional
+            ``"portrait"`` (the second state against the first), ``"series"`` (over time; a cycle over one period) or
+            ``"multipliers"`` (with the unit circle; outside of it distances from 0 are 1 + log10 of the absolute value). All of
+            them, side by side, without.
+        states : sequence of str, optional
+            Names of the states to draw, in order: the first two of them in the portrait.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw, an array of axes without ``what``; a figure of its own without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes, or an array of them
+
+        Raises
+        ------
+        ProblemError
+            The point is no solution over t, or there is no such picture or state.
+        ImportError
+            matplotlib is not installed.
+        """
+        return portrait.plot(self, what, states, axes)
 
     def floquet(self) -> Floquet:
         """Return the Floquet multipliers of a cycle, with estimates of their errors.
