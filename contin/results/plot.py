@@ -36,7 +36,7 @@ def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, ax
     x, columns, name = _columns(points, x, y)
     axes = new_axes() if axes is None else axes
     pieces = list(_pieces(points))
-    named: set[str | None] = set()
+    named: set[str | None] = set(axes.get_legend_handles_labels()[1])
     for column_name in columns:
         named |= _draw(points, (x, column_name), pieces, named, axes)
     axes.set(xlabel=x, ylabel=name)

@@ -36,6 +36,7 @@ def test_largest_and_smallest_values_with_their_stability(branch):
     assert np.array_equal(np.append(top.get_ydata(), inner_top.get_ydata()[1:]), branch.column("max_x"))
     assert np.array_equal(np.append(bottom.get_ydata(), inner_bottom.get_ydata()[1:]), branch.column("min_x"))
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["stable", "unstable", "EP", "LP"]
+    assert len(branch.plot(axes=axes).get_legend().get_texts()) == 4  # a second branch in the figure has the same legend
 
 
 def test_other_columns(branch):
