@@ -94,6 +94,7 @@ def _passages(done: Any, height: Callable[[Any], Any]) -> Iterator[float]:
     from scipy.optimize import brentq  # type: ignore[import-untyped]  # the integrator has loaded it
 
     values = height(done.t)
+    values[0] = 0.0  # where it begins, to the last digit
     for i in np.flatnonzero((values[:-1] < 0) & (values[1:] >= 0)):
         yield float(brentq(height, done.t[i], done.t[i + 1]))
 

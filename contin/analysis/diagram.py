@@ -15,6 +15,7 @@ from contin.continuation.cycle_starts import doubled, from_hopf
 from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
+from contin.detection.phase import in_phase
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.protocol import Discretization, inner
@@ -235,10 +236,10 @@ class _Explorer:
         if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
             return None
         for symmetry in self.symmetries:
-            gap = _image(a, symmetry, here) - there
+            image, (turned,) = in_phase(a, _image(a, symmetry, here), (_image(a, symmetry, ahead),), there)
+            gap = image - there
             if np.sqrt(inner(a, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(a, there, there))):
                 continue
-            turned = _image(a, symmetry, ahead)
             cosines = [inner(a, turned, tangent) for tangent in known.details.tangents]
             which = int(np.argmax(np.abs(cosines)))
             return which, int(np.sign(cosines[which]) or 1)
@@ -249,10 +250,10 @@ class _Explorer:
         system, result = point.system, []
         here, direction = _seen(system, point.x), _seen(system, direction)
         for symmetry in self.symmetries:
-            gap = _image(system, symmetry, here) - here
+            image, (turned,) = in_phase(system, _image(system, symmetry, here), (_image(system, symmetry, direction),), here)
+            gap = image - here
             if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, here, here))):
                 continue
-            turned = _image(system, symmetry, direction)
             cosines = [inner(system, turned, tangent) for tangent in point.details.tangents]
             which = int(np.argmax(np.abs(cosines)))
             result.append((which, int(np.sign(cosines[which]) or 1)))
@@ -299,8 +300,8 @@ def diagram(
         Largest number of those points between ``start``'s branch and the others: 0 follows that branch alone.
     symmetries : sequence of callable
         Maps ``s(t, states) -> states`` of solutions to solutions (nodes t, states (K, n), same parameters), for states whose
-        parameters they leave alone: images of a branch count as that branch. Those of a `VariationalProblem` map the states x,
-        without multipliers; the ones that it declares count, too.
+        parameters they leave alone: images of a branch count as that branch. Of autonomous cycles, shifts in time need no map.
+        Those of a `VariationalProblem` map the states x, without multipliers; the ones that it declares count, too.
     tolerance : float
         Relative distance below which two branch points are one.
 

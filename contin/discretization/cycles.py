@@ -62,6 +62,10 @@ class PeriodicCollocation(Collocation):
         later = self.evaluate(x, (self.nodes + 0.5) % 1.0)
         return bool(np.all(np.abs(states - later).max(axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
 
+    def evaluate_scaled(self, x: Array, times: Array) -> Array:
+        """Return the states divided by their sizes at ``times`` (m,), shape (m, n); of perturbations, too."""
+        return self._interpolated(x, times)
+
     # --- columns -------------------------------------------------------------------------------------------------
 
     def functionals(self, x: Array) -> Array:

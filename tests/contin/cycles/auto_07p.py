@@ -263,6 +263,16 @@ STUDIES = {
         )
         for name, p4 in (("pp3", 4),)
     },
+    # demo plp at S0 = 111: the cycles are an isola, from the one at rho = 4 each way to its fold
+    "plp isola": Study(
+        2,
+        "S = PAR(1)*U(1)*U(2)/(1 + U(1) + 0.1D0*U(1)**2); F(1) = 111 - U(1) - S; F(2) = 0.2D0*(500 - U(2)) - S",
+        "PAR(1) = 4; PAR(11) = 6.90214397D0; U = (/ 42.692845D0, 91.853585D0 /); CALL ADVANCE(NDIM,U,PAR,T)",
+        {
+            "up": Run({**CYCLES, **LOOSE, "DS": 0.1, "DSMAX": 2, "SP": "['LP1']"}),
+            "down": Run({**CYCLES, **LOOSE, "DS": -0.1, "DSMAX": 2, "SP": "['LP1']"}),
+        },
+    ),
     # Roessler's equations, a = b = .2: PAR(1) is c; each run doubles the period
     "roessler": Study(
         3,

@@ -8,7 +8,7 @@ import functools
 import math
 
 import pytest
-from cycles.noted import check_unstable, compare, worst_trivial
+from cycles.noted import NOTES, check_unstable, compare, worst_trivial
 
 import contin
 from contin import AlgebraicProblem, CycleProblem
@@ -117,6 +117,41 @@ def test_the_middle_family_of_abc():
         assert branch.labelled("LP")[0]["d"] == pytest.approx(0.22496206554, abs=1e-8)  # AUTO-07p, "abc", "cycles 2"
         check_unstable(branch)
         assert worst_trivial(branch) < 1e-9
+
+
+def test_the_isola_of_plp():
+    """At S0 = 111 the cycles have parted from both Hopf points: their branch closes, at another phase than it began."""
+
+    def isola(u, p):
+        rate = p.rho * u.x * u.y / (1 + u.x + 0.1 * u.x**2)
+        return 111 - u.x - rate, 0.2 * (500 - u.y) - rate
+
+    problem = CycleProblem(isola, ["x", "y"], {"rho": 4.0}, functionals={"square": square2})
+    branch = contin.trace(contin.cycle(problem, [5.0, 50.0], settle=300), free=["rho"], limits={"rho": (1, 8)})
+    assert [point.label for point in branch if point.label] == ["EP", "LP", "LP", "EP"] and branch.stop.reason == "closed"
+    for point, way in zip(branch.labelled("LP"), ("up", "down")):
+        (known,) = NOTES["plp isola"][way]
+        assert (known["label"], point["rho"]) == ("LP", pytest.approx(known["parameter"], abs=1e-8))
+        assert point["square"] == pytest.approx(known["square"], rel=1e-8)
+    assert branch.points[-1]["square"] == pytest.approx(branch.points[0]["square"], rel=1e-9)
+    check_unstable(branch)
+    assert worst_trivial(branch) < 1e-9
+
+
+def test_a_closed_branch_in_closed_form():
+    """Growth 1/4 - mu^2 - (s - 1)^2, s the squared distance from (.3 mu, .2 mu): a circle in mu and s, folds at mu = +-1/2."""
+
+    def field(u, p):
+        x, y = u.x - 0.3 * p.mu, u.y - 0.2 * p.mu
+        s = x * x + y * y
+        growth, turn = 0.25 - (s - 1) ** 2 - p.mu**2, 1 + 0.3 * x + 0.2 * y * p.mu
+        return growth * x - turn * y, turn * x + growth * y
+
+    orbit = contin.cycle(CycleProblem(field, ["x", "y"], {"mu": 0.0}), [1.2, 0.0])
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (-1, 1)})
+    assert branch.stop.reason == "closed"
+    assert [point["mu"] for point in branch.labelled("LP")] == pytest.approx([0.5, -0.5], abs=1e-11)
+    assert [point["max_x"] for point in branch.labelled("LP")] == pytest.approx([1.15, 0.85], abs=1e-6)
 
 
 def test_lor():

@@ -87,3 +87,16 @@ def test_five_doublings_by_one_command():
     graph = found.graph()
     for deeper in range(1, 5):
         assert graph.has_edge(f"PD{deeper}", f"PD{deeper + 1}")
+
+
+@pytest.mark.full
+def test_images_under_a_symmetry_count_once():
+    """Two branches leave where the symmetry of AUTO's demo ``tor`` breaks: each is the other's image, half a period later."""
+    from cycles.test_demos import tor
+
+    rest = contin.solve(AlgebraicProblem(tor, ["x", "y", "z"], {"rn": -0.9}), [0, 0, 0])
+    for symmetries, count in (([], 5), ([lambda t, u: -u], 4)):
+        found = contin.diagram(
+            rest, free=["rn"], depth=2, limits={"rn": (-0.91, -0.52), "period": (0, 12)}, symmetries=symmetries
+        )
+        assert len(found.branches) == count
