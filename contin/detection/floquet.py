@@ -8,6 +8,7 @@ stays on it, as in a conservative system, passes nothing.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
@@ -29,6 +30,9 @@ _PARTS = 4
 #: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
 #: to this part. Ten times smaller, two period doublings that nearly meet are passed.
 _DEEPER = 0.5
+#: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. At the tails
+#: of homoclinic orbits it grows from 1e-4 to 1 within a few turns; ten times smaller, one doubling less of ``tor`` is certain.
+_MEANINGLESS = 1e-2
 #: Part of a step before and behind a torus bifurcation where its pair must lie on different sides of the circle.
 _BESIDE = 1e-3
 
@@ -138,7 +142,7 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     knots = sorted([*knots, *_below(segment, knots, test)], key=lambda place: place[0])
     pieces = [(left, right) for left, right in itertools.pairwise(knots)
               if sign_changed(left[1].value(test), right[1].value(test))]  # fmt: skip
-    return [segment.locate(test, left, right) for left, right in pieces]
+    return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
 
 
 def _dips(places: list[Place], values: list[float]) -> list[tuple[float, float]]:
@@ -210,7 +214,17 @@ def torus() -> TestFunction:
 
 def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
-    return [point for point in hopf_points(segment, knots) if _passes(segment, point)]
+    return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
+
+
+def _doubtful(point: SpecialPoint) -> SpecialPoint:
+    """Return a special point, named "possible" where the multiplier that is 1 has such an error that others mean little."""
+    system: Any = point.trial.system
+    trivial = _trivial(system, point.trial.x)
+    if trivial is None or point.name.startswith("possible"):
+        return point
+    error = abs(np.expm1(system.eigenvalues(point.trial.x)[trivial]))
+    return dataclasses.replace(point, name=f"possible {point.name}") if error > _MEANINGLESS else point
 
 
 def _passes(segment: Segment, point: SpecialPoint) -> bool:

@@ -145,7 +145,7 @@ EQUILIBRIA = {"IPS": 1, "ICP": [1]}
 CYCLES = {"IPS": 2, "ICP": [1, 11]}
 #: Tolerances at which special points are found that AUTO-07p gives up at tighter ones, in silence.
 LOOSE = {"EPSL": 1e-10, "EPSU": 1e-10, "EPSS": 1e-7, "DS": 0.001, "DSMAX": 0.02}
-#: A branch that shrinks onto a Hopf point passes it, labelled BP and misplaced, and comes back: it is stopped there.
+#: A branch that shrinks onto a Hopf point passes it, labelled BP (in ``ppp`` LP) and misplaced, and comes back: it is stopped.
 SHRINKING = {**CYCLES, "SP": "['BP1']"}
 
 LORENZ = "F(1) = 10*(U(2) - U(1)); F(2) = PAR(1)*U(1) - U(2) - U(1)*U(3); F(3) = U(1)*U(2) - 8D0/3*U(3)"
@@ -271,6 +271,19 @@ STUDIES = {
         {
             "up": Run({**CYCLES, **LOOSE, "DS": 0.1, "DSMAX": 2, "SP": "['LP1']"}),
             "down": Run({**CYCLES, **LOOSE, "DS": -0.1, "DSMAX": 2, "SP": "['LP1']"}),
+        },
+    ),
+    # demo ppp: as pp3 with p4 = 3, from the equilibrium without U(3)
+    "ppp": Study(
+        3,
+        "F(1) = U(1)*(1 - U(1)) - 3*U(1)*U(2); F(2) = -0.25D0*U(2) + 3*U(1)*U(2) - 3*U(2)*U(3)"
+        "- PAR(1)*(1 - EXP(-5*U(2))); F(3) = -0.5D0*U(3) + 3*U(2)*U(3)",
+        "PAR(1) = 0; U(1) = 1D0/12; U(2) = 11D0/36; U(3) = 0",
+        {
+            "rest": Run({**EQUILIBRIA, "UZSTOP": ends(0.36)}),
+            "cycles": Run(
+                {**CYCLES, **LOOSE, "DSMAX": 0.1, "SP": "['LP1']", "UZSTOP": ends(-0.1, 0.6, period=60)}, ("rest", "HB", 1)
+            ),
         },
     ),
     # Roessler's equations, a = b = .2: PAR(1) is c; each run doubles the period

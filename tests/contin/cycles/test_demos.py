@@ -43,6 +43,14 @@ def pp3(u, p):
     )
 
 
+def ppp(u, p):
+    return (
+        u.x * (1 - u.x) - 3 * u.x * u.y,
+        -u.y / 4 + 3 * u.x * u.y - 3 * u.y * u.z - p.p1 * (1 - math.exp(-5 * u.y)),
+        -u.z / 2 + 3 * u.y * u.z,
+    )
+
+
 def tor(u, p):
     apart = u.y - u.x
     return (
@@ -86,6 +94,7 @@ FAMILIES = [
     ("lrz", "cycles", (lorenz, "rho", 20.0, (SIDE, SIDE, 19.0), (15, 30)), 0, (10, 30, 4), False, 1e-8),
     ("pp2", "cycles", (pp2, "p1", 0.5, (1 / 3, 0.78331), (0.1, 0.8)), 0, (0.1, 0.9, 36), False, 1e-9),
     ("pp3", "cycles", (pp3, "p1", 0.0, (1 / 3, 1 / 6, 13 / 36), (-0.1, 1)), 0, (-0.1, 1, 60), True, 1e-9),
+    ("ppp", "cycles", (ppp, "p1", 0.0, (1 / 12, 11 / 36, 0.0), (0, 0.36)), 0, (-0.1, 0.6, 60), True, 1e-9),
     ("plp", "cycles 1", (plp, "rho", 2.021628, (45.55974, 177.7987), (1, 6)), 0, (1, 6, 30), True, 1e-9),
     ("plp", "cycles 2", (plp, "rho", 2.021628, (45.55974, 177.7987), (1, 6)), 1, (1, 6, 30), True, 1e-9),
 ]  # fmt: skip
