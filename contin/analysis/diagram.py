@@ -23,6 +23,7 @@ from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.problems.variational import VariationalProblem
+from contin.results import plot
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of
 from contin.stepping.settings import Settings, settings_with
@@ -56,6 +57,28 @@ class Diagram:
 
     branches: list[Branch] = field(default_factory=list)
     junctions: list[Junction] = field(default_factory=list)
+
+    def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+        """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
+
+        Parameters
+        ----------
+        x, y : str, optional
+            As in `contin.Branch.plot`. Where cycles are among the branches, ``y`` is a state, the first one by default.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; a figure of its own without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        drawn = [branch.points for branch in self.branches if branch.points]
+        cycles = [points[0].system for points in drawn if isinstance(points[0].system, PeriodicCollocation)]
+        if cycles and y is None:
+            y = cycles[0].problem.state_names[0]
+        for points in drawn:
+            axes = plot.plot(points, x, y, axes, dynamics=True)
+        return axes
 
     def graph(self) -> Any:
         """Return the diagram as a ``networkx.MultiGraph``.

@@ -30,8 +30,8 @@ _PARTS = 4
 #: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
 #: to this part. Ten times smaller, two period doublings that nearly meet are passed.
 _DEEPER = 0.5
-#: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. At the tails
-#: of homoclinic orbits it grows from 1e-4 to 1 within a few turns; ten times smaller, one doubling less of ``tor`` is certain.
+#: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. In the tail of
+#: AUTO's demo ``tor`` the doublings to the period 49 are certain, those from 54 on are not.
 _MEANINGLESS = 1e-2
 #: Part of a step before and behind a torus bifurcation where its pair must lie on different sides of the circle.
 _BESIDE = 1e-3

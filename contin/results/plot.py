@@ -12,6 +12,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.detection.floquet import unstable
+from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
 from contin.errors import ProblemError
 from contin.results.axes import new_axes
@@ -31,11 +32,14 @@ _LINES = {True: ("-", "stable"), False: ((0, (3, 2)), "unstable"), None: ("-", N
 _AREA = {"*": 90, "": 30}
 
 
-def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
-    """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`."""
+def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Any = None, dynamics: bool = False) -> Any:
+    """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`.
+
+    With ``dynamics`` the stability of equilibria is drawn, too.
+    """
     x, columns, name = _columns(points, x, y)
     axes = new_axes() if axes is None else axes
-    pieces = list(_pieces(points))
+    pieces = list(_pieces(points, dynamics))
     named: set[str | None] = set(axes.get_legend_handles_labels()[1])
     for column_name in columns:
         named |= _draw(points, (x, column_name), pieces, named, axes)
@@ -67,7 +71,7 @@ def _draw(
     return named
 
 
-def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
+def _pieces(points: Sequence[Point], dynamics: bool) -> Iterator[tuple[bool | None, slice]]:
     """Cut a branch where its stability changes; without any index, there is one piece.
 
     Yields
@@ -77,28 +81,42 @@ def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
     piece : slice
         Points of the piece; its ends belong to the pieces beside it too.
     """
-    cycles = any(isinstance(point.system, PeriodicCollocation) for point in points)
-    if len(points) < 2 or (not cycles and all(point.index is None for point in points)):
+    moving = bool(points) and (_is_cycle(points[0]) or (dynamics and _is_equilibrium(points[0])))
+    if len(points) < 2 or (not moving and all(point.index is None for point in points)):
         yield None, slice(None)
         return
     first = 0
-    for stable, steps in groupby(_of_cycles(points) if cycles else map(_stable, *zip(*pairwise(points)))):
+    for stable, steps in groupby(_of_motions(points) if moving else map(_stable, *zip(*pairwise(points)))):
         last = first + len(list(steps))
         yield stable, slice(first, last + 1)
         first = last
 
 
-def _of_cycles(points: Sequence[Point]) -> list[bool | None]:
-    """Return whether the cycles between two points are stable, for each step.
+def _is_cycle(point: Point) -> bool:
+    return isinstance(point.system, PeriodicCollocation)
+
+
+def _is_equilibrium(point: Point) -> bool:
+    return isinstance(point.system, Algebraic) and point.system.problem.dynamics
+
+
+def _of_motions(points: Sequence[Point]) -> list[bool | None]:
+    """Return whether the cycles, or the equilibria, between two points are stable, for each step.
 
     The regular point at one end decides; between two special points, the step before.
     """
-    counts = [None if point.label in _CRITICAL else unstable(point.system, point.x) for point in points]  # type: ignore[arg-type]
+    counts = [None if point.label in _CRITICAL else _unstable(point) for point in points]
     found: list[bool | None] = []
     for a, b in pairwise(counts):
         count = b if a is None else a
         found.append((found[-1] if found else None) if count is None else count == 0)
     return found
+
+
+def _unstable(point: Point) -> int:
+    """Return the number of unstable multipliers, or eigenvalues."""
+    system: Any = point.system
+    return unstable(system, point.x) if _is_cycle(point) else int(np.count_nonzero(system.eigenvalues(point.x).real > 0))
 
 
 def _stable(a: Point, b: Point) -> bool | None:
@@ -126,15 +144,23 @@ def picture(points: Sequence[Point]) -> str:
 
 
 def column(points: Sequence[Point], name: str) -> Array:
-    """Return a parameter, a functional, ``"arclength"`` or ``"norm"`` over all points.
+    """Return a parameter, a functional, a state of equilibria, ``"arclength"`` or ``"norm"`` over all points.
 
     The norm is the root mean square of the states over the nodes.
     """
     if points and (name in points[0].parameters or name in points[0].functionals):
         return np.array([point[name] for point in points])
+    if points and name in _states(points[0]):
+        at = _states(points[0]).index(name)
+        return np.array([point.system.states(point.x).ravel()[at] for point in points])
     if name == "arclength":
         return np.array([point.arclength for point in points])
     return np.array([np.sqrt(np.mean(np.sum(point.system.states(point.x) ** 2, axis=1))) for point in points])
+
+
+def _states(point: Point) -> tuple[str, ...]:
+    """Return the states that are columns: those of an algebraic problem."""
+    return point.system.problem.state_names if isinstance(point.system, Algebraic) else ()
 
 
 def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str, list[str], str]:
@@ -142,7 +168,7 @@ def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str
     if not points:
         raise ProblemError("the branch has no points to draw")
     first = points[0]
-    known = [*first.parameters, *first.functionals, "arclength", "norm"]
+    known = [*first.parameters, *first.functionals, "arclength", "norm", *_states(first)]
     x = first.system.free[0] if x is None else x
     states = first.system.problem.state_names if isinstance(first.system, PeriodicCollocation) else ()
     y = (states[0] if states else next(iter(first.functionals), "norm")) if y is None else y

@@ -47,6 +47,22 @@ def test_other_columns(branch):
         branch.plot(y="z")
 
 
+def test_a_diagram():
+    """Brusselator, a = 1: equilibria x = 1 lose their stability at b = 2, where cycles begin."""
+    equations = AlgebraicProblem(
+        lambda u, p: (1 - (p.b + 1) * u.x + u.x**2 * u.y, p.b * u.x - u.x**2 * u.y), ["x", "y"], {"b": 1}
+    )
+    found = contin.diagram(contin.solve(equations, [1, 1]), free=["b"], depth=1, limits={"b": (1, 3)})
+    axes = found.plot(axes=Figure().subplots())
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("b", "x, largest and smallest")
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["stable", "unstable", "EP", "HB"]
+    before, behind, top, bottom = axes.lines[:2] + axes.lines[-2:]
+    assert [line.get_linestyle() for line in (before, behind, top, bottom)] == ["-", "--", "-", "-"]
+    assert before.get_ydata() == pytest.approx(1.0) and before.get_xdata()[-1] == pytest.approx(2.0)
+    assert top.get_xdata()[0] == pytest.approx(2.0) and top.get_ydata()[-1] > 3 > 1 > bottom.get_ydata()[-1]
+    assert found.plot(y="y", axes=Figure().subplots()).get_ylabel() == "y, largest and smallest"
+
+
 def test_one_cycle(branch):
     first, last = branch.points[0], branch.points[-1]
     portrait, series, multipliers = last.plot(axes=Figure().subplots(1, 3))
