@@ -73,16 +73,8 @@ def _liveliness(trial: Trial) -> float:
 
 def _speeds(system: Any, x: Array) -> Array:
     """Return the speeds of a cycle at the Gauss points, scaled, shape (N d,)."""
-    speeds: Array = np.linalg.norm(_field(system, x, system.at_gauss_points(x))[0], axis=1)
+    speeds: Array = np.linalg.norm(system.rates(x, system.at_gauss_points(x)), axis=1)
     return speeds
-
-
-def _field(system: Any, x: Array, points: Array) -> tuple[Array, Array]:
-    """Return T F and its derivatives by the states at any points (K, n), scaled: shapes (K, n) and (K, n, n)."""
-    n, times = points.shape[1], np.zeros(len(points))
-    colours = system.problem.batch("field").colouring([])
-    values, jacobian = system._field.jacobian(times, points, np.empty((0, n)), system._scaled_parameters(x), colours)
-    return values[:, :n], jacobian[:, :n, :n]
 
 
 def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
@@ -94,9 +86,8 @@ def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
     size = np.where(size > 0, size, 1.0)
     states = points[speeds.argmin()].copy()
     for _ in range(_UPDATES):
-        values, jacobian = _field(system, x, states[None])
         try:
-            update = np.linalg.solve(jacobian[0], values[0])
+            update = np.linalg.solve(system.rates_by_states(x, states[None])[0], system.rates(x, states[None])[0])
         except np.linalg.LinAlgError:
             return None
         states -= update
@@ -109,7 +100,7 @@ def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
     if share < _MOSTLY:
         return None
     scales = np.ones(len(states)) if system.scales is None else system.scales.states
-    eigenvalues: ComplexArray = np.linalg.eigvals(_field(system, x, states[None])[1][0]).astype(complex)
+    eigenvalues: ComplexArray = np.linalg.eigvals(system.rates_by_states(x, states[None])[0]).astype(complex)
     eigenvalues = eigenvalues / system.duration(x)
     states = np.where(np.abs(states) > _NOTHING * size, states, 0.0)
     return RestingPlace(states * scales, eigenvalues[np.argsort(-eigenvalues.real)], share)

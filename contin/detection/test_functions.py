@@ -85,7 +85,7 @@ def own_end(system: Discretization, point: SpecialPoint) -> SpecialPoint:
 @own_end.register
 def _of_doubled_cycles(system: PeriodicCollocation, point: SpecialPoint) -> SpecialPoint:
     """Where a cycle comes to go twice round one of half its period the branch ends: beyond it is itself, half a period on."""
-    if point.label != "BP" or not system.is_doubled(point.trial.x):
+    if point.label != "BP" or point.name == "start" or not system.is_doubled(point.trial.x):
         return point
     stop = Stop("period doubling", "the cycles come to go twice round cycles of half the period, at a period doubling")
     return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)

@@ -251,6 +251,20 @@ class CycleCollocation(PeriodicCollocation):
         trivial = float(np.abs(np.expm1(self.eigenvalues(x))).min())
         return None if frequency**2 < _SPLIT * trivial or _is_opposite(frequency) else ("TR", "torus")
 
+    def rates(self, x: Array, points: Array) -> Array:
+        """Return T F at any states (K, n) divided by their sizes, likewise scaled, shape (K, n)."""
+        n, times = self._n, np.zeros(len(points))
+        rates: Array = self._field.values(times, points, np.empty((0, n)), self._scaled_parameters(x))[:, :n]
+        return rates
+
+    def rates_by_states(self, x: Array, points: Array) -> Array:
+        """Return the derivatives of `rates` by the states, shape (K, n, n)."""
+        n, times = self._n, np.zeros(len(points))
+        colours = self.problem.batch("field").colouring([])
+        none, p = np.empty((0, n)), self._scaled_parameters(x)
+        derivatives: Array = self._field.jacobian(times, points, none, p, colours)[1][:, :n, :n]
+        return derivatives
+
     def has_shrunk(self, x: Array) -> bool:
         """Return whether an orbit is an equilibrium, up to the square root of round-off."""
         states = self._scaled_states(x)

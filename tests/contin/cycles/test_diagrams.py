@@ -64,8 +64,8 @@ def test_a_doubled_branch_comes_back_to_the_cycles_it_left():
     found = contin.diagram(orbit, free=["mu"], depth=1, limits={"mu": (-0.6, 1.5)}, zeros={"mu": [0.5]})
     assert [junction.point.label for junction in found.junctions] == ["PD", "PD"]
     assert [junction.point["mu"] for junction in found.junctions] == pytest.approx([0, 1], abs=1e-9)
-    (doubled,) = [branch for branch in found.branches if branch.points[0].label == "PD"]
-    assert [point.label for point in doubled if point.label] == ["PD", "UZ", "PD"]
+    (doubled,) = [branch for branch in found.branches if branch.points[0].label == "BP"]
+    assert [point.label for point in doubled if point.label] == ["BP", "UZ", "PD"]
     assert doubled.stop.reason == "period doubling" and doubled.points[-1]["mu"] == pytest.approx(1, abs=1e-9)
     (middle,) = doubled.labelled("UZ")
     assert middle["period"] == pytest.approx(4 * math.pi, abs=1e-9) and middle["max_a"] == pytest.approx(0.5, abs=1e-9)

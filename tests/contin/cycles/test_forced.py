@@ -129,6 +129,21 @@ def test_a_doubled_cycle_closes_after_two_periods():
     assert settled["rounds"] == 2 and settled["max_x"] == pytest.approx(stable["max_x"], abs=1e-9)
 
 
+@pytest.mark.full
+def test_a_stored_doubled_branch_goes_on(tmp_path):
+    problem = CycleProblem(two_wells, ["x", "v"], {"w": 1.0, "g": 0.0}, period=around)
+    branch = contin.trace(contin.solve(problem, [1.0, 0]), free=["g"], limits={"g": (0, 0.5)})
+    contin.save(branch, tmp_path / "single.npz")
+    (first,) = contin.load(problem, tmp_path / "single.npz").labelled("PD")
+    double = contin.trace(first, branch=1, limits={"g": (0, 0.19)})
+    contin.save(double, tmp_path / "double.npz")
+    again = contin.load(problem, tmp_path / "double.npz")
+    (second,) = again.labelled("PD")
+    assert second["rounds"] == 2 and second.floquet().unstable == double.labelled("PD")[0].floquet().unstable
+    fourfold = contin.trace(second, branch=1, limits={"g": (0, 0.19)})
+    assert fourfold.points[0]["rounds"] == 4 and fourfold.points[0]["period"] == pytest.approx(8 * math.pi, abs=1e-12)
+
+
 def test_the_demo_frc_against_auto():
     """FitzHugh and Nagumo's equations with a forcing, AUTO's demo ``frc``: first its amplitude, then its period to 5."""
 
