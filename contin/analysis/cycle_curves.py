@@ -1,6 +1,6 @@
 """The extended systems of curves of period doublings and of torus bifurcations of cycles in two parameters.
 
-A perturbation of the Poincare map (`contin.discretization.floquet`) that is multiplied by -1, or by exp(i theta), in a round:
+A perturbation of the Poincare map (`contin.discretization.round`) that is multiplied by -1, or by exp(i theta), in a round:
 v(1) = -v(0), or, with v = v_1 + i sin(theta) v_2 and kappa = cos(theta),
 
     [ v_1 ]       [ kappa   kappa^2 - 1 ]  [ v_1 ]
@@ -29,7 +29,7 @@ from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.lyapunov import Coefficient
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.cycles import CycleCollocation
-from contin.discretization.floquet import Round
+from contin.discretization.round import Round
 from contin.discretization.system import System
 from contin.problems.cycle import PERIOD
 from contin.stepping.trial import TestFunction, Trial

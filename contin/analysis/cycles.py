@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import namedtuple
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -11,13 +13,16 @@ from contin import checks
 from contin.analysis.solving import solve
 from contin.arrays import Array
 from contin.errors import ProblemError
-from contin.problems.cycle import PERIOD, CycleProblem
+from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
 #: Tolerance of the integration; the motion is at rest below this part of 1 + its size, and back within this part of its size.
 _ACCURATE, _RESTS, _BACK = 1e-9, 1e-6, 1e-2
 #: Places of the round that is the guess.
 _SAMPLES = 1000
+#: A forced motion closes after at most so many periods of the forcing, where it comes back within this part of its size: ten
+#: times larger, a doubled cycle close to its bifurcation would be taken for one period.
+_MOST_ROUNDS, _CLOSED = 16, 1e-3
 
 
 def cycle(
@@ -49,10 +54,13 @@ def cycle(
     values = {**problem.parameters, **checks.mapping("parameters", parameters or {}, "numbers")}
     first = _numbers(start, len(problem.state_names))
     field = _vector_field(problem, values)
-    settled = _integrated(field, first, settle).y[:, -1]
-    times, states = _one_round(field, settled, settle)
-    guess = times / times[-1], states
-    return solve(problem, guess, {**values, PERIOD: float(times[-1])}, intervals=intervals, degree=degree)
+    if problem.period is None:
+        settled = _integrated(field, first, settle).y[:, -1]
+        times, states = _one_round(field, settled, settle)
+        values[PERIOD] = float(times[-1])
+    else:
+        (times, states), values[ROUNDS] = _forced_rounds(problem, field, (first, settle), values)
+    return solve(problem, (times / times[-1], states), values, intervals=intervals, degree=degree)
 
 
 def _numbers(start: Any, count: int) -> Array:
@@ -67,7 +75,9 @@ def _vector_field(problem: CycleProblem, values: Any) -> Any:
     of_state: Any = namedtuple("U", problem.state_names)  # type: ignore[misc]  # noqa: PYI024
     of_parameters: Any = namedtuple("P", tuple(values))  # type: ignore[misc]  # noqa: PYI024
     p, field = of_parameters(**values), problem.field
-    return lambda t, u: field(of_state(*u), p)
+    if problem.period is None:
+        return lambda t, u: field(of_state(*u), p)
+    return lambda t, u: field(t, of_state(*u), p)
 
 
 def _integrated(field: Any, start: Array, time: float, **options: Any) -> Any:
@@ -77,6 +87,41 @@ def _integrated(field: Any, start: Array, time: float, **options: Any) -> Any:
     if not done.success or not np.all(np.isfinite(done.y)):
         raise ProblemError(f"start: the motion from there has no finite value after t = {done.t[-1]:.6g}")
     return done
+
+
+def _passages(done: Any, height: Callable[[Any], Any]) -> Iterator[float]:
+    """Yield the times at which a height along a motion passes zero upwards; SciPy's own events fail at ends of its steps."""
+    from scipy.optimize import brentq  # type: ignore[import-untyped]  # the integrator has loaded it
+
+    values = height(done.t)
+    values[0] = 0.0  # where it begins, to the last digit
+    for i in np.flatnonzero((values[:-1] < 0) & (values[1:] >= 0)):
+        yield float(brentq(height, done.t[i], done.t[i + 1]))
+
+
+def _forced_rounds(
+    problem: CycleProblem, field: Any, start: tuple[Array, float], values: Any
+) -> tuple[tuple[Array, Array], int]:
+    """Return times (K,), from 0, and states (K, n) of a forced motion that has settled, and after how many periods it closes.
+
+    ``start`` holds the states and the time in which the motion settles, which is made a whole number of periods.
+
+    Raises
+    ------
+    ProblemError
+    """
+    period = problem.duration({**values, ROUNDS: 1.0})
+    settled = _integrated(field, start[0], period * math.ceil(start[1] / period)).y[:, -1]
+    done = _integrated(field, settled, period * _MOST_ROUNDS, dense_output=True)
+    size = float(np.ptp(done.y, axis=1).max()) or 1.0
+    for rounds in range(1, _MOST_ROUNDS + 1):
+        if np.abs(done.sol(rounds * period) - settled).max() <= _CLOSED * size:
+            times = np.linspace(0.0, rounds * period, _SAMPLES)
+            return (times, done.sol(times).T), rounds
+    raise ProblemError(
+        f"start: the motion does not close within {_MOST_ROUNDS} periods of the forcing; give a larger settle, or a start "
+        "nearer to the cycle (it may be unstable, or the motion not periodic)"
+    )
 
 
 def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
@@ -89,18 +134,12 @@ def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
     ProblemError
     """
     across = np.asarray(field(0.0, start), dtype=float)
-    beside = float(_RESTS * np.linalg.norm(across) * (1 + np.abs(start).max()))  # the integrator finds no zero right at t = 0
-
-    def plane(t: float, u: Array) -> float:
-        return float(across @ (u - start)) + beside
-
-    plane.direction = 1.0  # type: ignore[attr-defined]
-    done = _integrated(field, start, longest, events=plane, dense_output=True)
+    done = _integrated(field, start, longest, dense_output=True)
     size = float(np.ptp(done.y, axis=1).max())
     if size <= _RESTS * (1 + np.abs(start).max()):
         raise ProblemError(f"start: the motion from there comes to rest near {', '.join(f'{value:.6g}' for value in start)}")
-    for t in done.t_events[0]:
-        if t > 0 and np.abs(done.sol(t) - start).max() <= _BACK * size:
+    for t in _passages(done, lambda t: across @ (done.sol(t).T - start).T):
+        if np.abs(done.sol(t) - start).max() <= _BACK * size:
             times = np.linspace(0.0, t, _SAMPLES)
             return times, done.sol(times).T
     raise ProblemError(

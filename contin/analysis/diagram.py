@@ -11,12 +11,19 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.continuation.cycle_starts import doubled, from_hopf
 from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
+from contin.detection.phase import in_phase
+from contin.discretization.algebraic import Algebraic
+from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.protocol import Discretization, inner
-from contin.errors import ConvergenceError
+from contin.errors import ConvergenceError, ProblemError
+from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.problems.variational import VariationalProblem
+from contin.results import plot
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of
 from contin.stepping.settings import Settings, settings_with
@@ -24,11 +31,15 @@ from contin.stepping.state import Stop
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
+#: Special points where a branch of another kind begins, by label: cycles at Hopf points, doubled ones at period doublings.
+_SWITCHES = {"HB": from_hopf, "PD": doubled}
+
 
 @dataclass
 class Junction:
-    """A branch point of a diagram: the point, its depth, and which of its half-branches have been followed.
+    """A branch point, Hopf point or period doubling of a diagram: the point, its depth, and which half-branches were followed.
 
+    At Hopf points and period doublings the second branch has one half: the other one is the same cycles, half a period later.
     ``taken[i]`` maps +1 and -1 to the number of the branch that runs along tangent i that way. ``failed`` lists the switches
     that did not work, as (tangent, way, reason); ``also`` the points of other branches at the same place.
     """
@@ -47,6 +58,28 @@ class Diagram:
     branches: list[Branch] = field(default_factory=list)
     junctions: list[Junction] = field(default_factory=list)
 
+    def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+        """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
+
+        Parameters
+        ----------
+        x, y : str, optional
+            As in `contin.Branch.plot`. Where cycles are among the branches, ``y`` is a state, the first one by default.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; a figure of its own without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        drawn = [branch.points for branch in self.branches if branch.points]
+        cycles = [points[0].system for points in drawn if isinstance(points[0].system, PeriodicCollocation)]
+        if cycles and y is None:
+            y = cycles[0].problem.state_names[0]
+        for points in drawn:
+            axes = plot.plot(points, x, y, axes, dynamics=True)
+        return axes
+
     def graph(self) -> Any:
         """Return the diagram as a ``networkx.MultiGraph``.
 
@@ -57,7 +90,7 @@ class Diagram:
 
         graph = networkx.MultiGraph()
         for number, junction in enumerate(self.junctions):
-            graph.add_node(f"BP{number}", label="BP", depth=junction.depth, **_values(junction.point))
+            graph.add_node(_name(junction, number), label=junction.point.label, depth=junction.depth, **_values(junction.point))
         for number, branch in enumerate(self.branches):
             last, since = None, []
             for place, point in enumerate(branch.points):
@@ -76,8 +109,20 @@ class Diagram:
     def _node(self, point: Point) -> str | None:
         for number, junction in enumerate(self.junctions):
             if any(point is other for other in (junction.point, *junction.also)):
-                return f"BP{number}"
+                return _name(junction, number)
         return None
+
+
+def _name(junction: Junction, number: int) -> str:
+    return f"{junction.point.label}{number}"
+
+
+def _is_end(point: Point) -> bool:
+    """Return whether a Hopf point or period doubling is where a branch of cycles ends that begins there."""
+    system = point.system
+    if point.label == "HB":
+        return isinstance(system, PeriodicCollocation)
+    return isinstance(system, PeriodicCollocation) and system.is_doubled(point.x)
 
 
 def _values(point: Point) -> dict[str, float]:
@@ -96,12 +141,15 @@ class _Explorer:
         """Follow both ways from the start, then leave every junction of less than ``depth``."""
         for direction in (1, -1):
             settings = dataclasses.replace(self.settings, direction=direction)
-            self._follow(Continuation(system, x, settings), 0)
+            self._follow(self._run(system, x, settings), 0)
         done = 0
         while done < len(self.result.junctions):
             junction = self.result.junctions[done]
             done += 1
             if junction.depth >= depth:
+                continue
+            if junction.point.label in _SWITCHES:
+                self._switch(junction)
                 continue
             for which, tangent in enumerate(junction.point.details.tangents):
                 for way in (1, -1):
@@ -114,9 +162,26 @@ class _Explorer:
         for place, side in ((which, way), *self._images(point, way * tangent)):
             junction.taken[place].setdefault(side, number)
         try:
-            self._follow(Continuation(point.system, point.x, self.settings, way * tangent), junction.depth + 1, junction)
+            self._follow(self._run(point.system, point.x, self.settings, way * tangent), junction.depth + 1, junction)
         except ConvergenceError as error:
             junction.failed.append((which, way, str(error)))
+
+    def _switch(self, junction: Junction) -> None:
+        """Follow the cycles that begin at a Hopf point or period doubling."""
+        if junction.taken[1]:
+            return
+        junction.taken[1][1] = len(self.result.branches)
+        try:
+            system, x, tangent = _SWITCHES[junction.point.label](junction.point)
+            self._follow(self._run(system, x, self.settings, tangent), junction.depth + 1, junction)
+        except ConvergenceError as error:
+            junction.failed.append((1, 1, str(error)))
+
+    def _run(self, system: Discretization, x: Array, settings: Settings, tangent: Array | None = None) -> Continuation:
+        """Return a run; settings that name columns of the other kind of branch (equilibria, cycles) do not count."""
+        known = (*system.problem.parameters, *system.problem.functionals)
+        limits, zeros = ({name: given[name] for name in given if name in known} for given in (settings.limits, settings.zeros))
+        return Continuation(system, x, dataclasses.replace(settings, limits=limits, zeros=zeros), tangent)
 
     def _follow(self, run: Continuation, depth: int, origin: Junction | None = None) -> None:
         """Follow one run to its end, or to a known branch. Half-branches that it passes at junctions count as taken."""
@@ -126,14 +191,47 @@ class _Explorer:
             branch.points.append(point)
             if place == 0 and origin is not None:
                 origin.also.append(point)
-            elif (
-                isinstance(point.details, (BranchPoint, MultiplePoint))
-                and point.details.tangents
-                and self._arrived(point, number, depth)
-            ):
+            elif self._is_known(point, number, depth) and run.stop is None:
                 branch.stop = Stop("known branch", "came to a branch that was followed before")
                 break
         branch.stop = branch.stop or run.stop
+
+    def _is_known(self, point: Point, number: int, depth: int) -> bool:
+        """Note a point that a run passes, if it is one to leave a branch at; return True if the way ahead was followed."""
+        if isinstance(point.details, (BranchPoint, MultiplePoint)) and point.label not in _SWITCHES:
+            return bool(point.details.tangents) and self._arrived(point, number, depth)
+        return point.label in _SWITCHES and self._met(point, number, depth)
+
+    def _met(self, point: Point, number: int, depth: int) -> bool:
+        """Note a Hopf point or period doubling on a run; return True if it is known already."""
+        for junction in self.result.junctions:
+            if junction.point.label == point.label and self._same(junction.point, point):
+                junction.also.append(point)
+                if point.system.size != junction.point.system.size or type(point.system) is not type(junction.point.system):
+                    junction.taken[1].setdefault(1, number)
+                return True
+        if _is_end(point):
+            return False
+        self.result.junctions.append(Junction(point, depth, [{1: number, -1: number}, {}]))
+        return False
+
+    def _same(self, known: Point, point: Point) -> bool:
+        """Return whether two points with one label are one: in all columns or, at the end of the branch begun there, in some.
+
+        A cycle that has shrunk has the coordinates of the Hopf point, one that goes twice round the columns of the period
+        doubling, but for the period.
+        """
+        ours, theirs = _values(known), _values(point)
+        if isinstance(known.system, Algebraic) and isinstance(point.system, CycleCollocation):
+            states = known.system.states(known.x).ravel()
+            ours |= {f"max_{name}": value for name, value in zip(known.system.problem.state_names, states)}
+        names = [name for name in ours if name in theirs and name != ROUNDS]
+        factor = 2.0 if _is_end(point) and point.label == "PD" else 1.0
+        for name in names:
+            mine = ours[name] * (factor if name == PERIOD else 1.0)
+            if abs(mine - theirs[name]) > self.tolerance * (1 + abs(mine)):
+                return False
+        return True
 
     def _arrived(self, point: Point, number: int, depth: int) -> bool:
         """Note a branch point that a run passes; return True if the way ahead was followed before."""
@@ -161,10 +259,10 @@ class _Explorer:
         if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
             return None
         for symmetry in self.symmetries:
-            gap = _image(a, symmetry, here) - there
+            image, (turned,) = in_phase(a, _image(a, symmetry, here), (_image(a, symmetry, ahead),), there)
+            gap = image - there
             if np.sqrt(inner(a, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(a, there, there))):
                 continue
-            turned = _image(a, symmetry, ahead)
             cosines = [inner(a, turned, tangent) for tangent in known.details.tangents]
             which = int(np.argmax(np.abs(cosines)))
             return which, int(np.sign(cosines[which]) or 1)
@@ -175,10 +273,10 @@ class _Explorer:
         system, result = point.system, []
         here, direction = _seen(system, point.x), _seen(system, direction)
         for symmetry in self.symmetries:
-            gap = _image(system, symmetry, here) - here
+            image, (turned,) = in_phase(system, _image(system, symmetry, here), (_image(system, symmetry, direction),), here)
+            gap = image - here
             if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, here, here))):
                 continue
-            turned = _image(system, symmetry, direction)
             cosines = [inner(system, turned, tangent) for tangent in point.details.tangents]
             which = int(np.argmax(np.abs(cosines)))
             result.append((which, int(np.sign(cosines[which]) or 1)))
@@ -209,21 +307,24 @@ def diagram(
     start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
     symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, **options: Any,
 ) -> Diagram:  # fmt: skip
-    """Follow every branch that can be reached from a solution by leaving branch points, to a given depth.
+    """Follow every branch that can be reached from a solution, to a given depth.
+
+    Branches are left at branch points, and at Hopf points and period doublings, where cycles begin.
 
     Parameters
     ----------
     start : Point
     settings : Settings, optional
-        Or any of its fields by name. Give limits: they end branches that go off.
+        Or any of its fields by name. Give limits: they end branches that go off. From equilibria, ``limits`` and ``zeros`` may
+        name columns of cycles, too.
     free : sequence of str, optional
         Free parameters, if they shall differ from those of ``start``.
     depth : int
-        Largest number of branch points between ``start``'s branch and the others: 0 follows that branch alone.
+        Largest number of those points between ``start``'s branch and the others: 0 follows that branch alone.
     symmetries : sequence of callable
         Maps ``s(t, states) -> states`` of solutions to solutions (nodes t, states (K, n), same parameters), for states whose
-        parameters they leave alone: images of a branch count as that branch. Those of a `VariationalProblem` map the states x,
-        without multipliers; the ones that it declares count, too.
+        parameters they leave alone: images of a branch count as that branch. Of autonomous cycles, shifts in time need no map.
+        Those of a `VariationalProblem` map the states x, without multipliers; the ones that it declares count, too.
     tolerance : float
         Relative distance below which two branch points are one.
 
@@ -242,4 +343,16 @@ def diagram(
     system, x = (
         (start.system, start.x) if free is None else system_of(start, "start").with_free(checks.names("free", free), start.x)
     )
+    _check_columns(system.problem, settings)
     return _Explorer(settings, symmetries, tolerance).run(system, x, depth)
+
+
+def _check_columns(problem: Any, settings: Settings) -> None:
+    """Require that limits and zeros name columns of the problem or, of equilibria, of the cycles that begin there."""
+    known = [*problem.parameters, *problem.functionals]
+    if isinstance(problem, AlgebraicProblem) and problem.dynamics:
+        cycles = CycleProblem.of(problem)
+        known += [name for name in (*cycles.parameters, *cycles.functionals) if name not in known]
+    for name in (*settings.limits, *settings.zeros):
+        if name not in known:
+            raise ProblemError(f"{name!r} is neither a parameter nor a functional ({', '.join(known)})")

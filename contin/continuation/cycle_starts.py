@@ -11,9 +11,11 @@ from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.detection.lyapunov import critical_pair
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.discretization.kinds import discretized
+from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
-from contin.problems.cycle import PERIOD, CycleProblem
+from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
 #: First mesh of a branch from a Hopf point.
@@ -52,7 +54,7 @@ def frequency_of(point: Point) -> float | None:
     return float(point.details["frequency"]) if known else None
 
 
-def doubled(point: Point) -> tuple[CycleCollocation, Array, Array]:
+def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
     """Return the system of orbits of twice the period, a period-doubling point as such an orbit, and the tangent there.
 
     The orbit, traversed twice, is a branch point of that system; the new branch leaves along perturbations that change their
@@ -68,16 +70,19 @@ def doubled(point: Point) -> tuple[CycleCollocation, Array, Array]:
     system: Any = point.system
     if point.label != "PD":
         raise ProblemError(f"start: a point with the label {point.label!r} is no period doubling")
+    adapted = system.adapted(point.x, MeshControl())  # the point is located on a mesh finer than the run needs
+    system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))
     mesh = np.concatenate([system.mesh, 1 + system.mesh[1:]]) / 2
-    parameters = {**point.parameters, PERIOD: 2 * point.parameters[PERIOD]}
-    twice = CycleCollocation(system.problem, mesh, system.degree, system.free, parameters)
-    states = system.states(point.x)
+    longer = PERIOD if system.problem.period is None else ROUNDS
+    parameters = {**point.parameters, longer: 2 * point.parameters[longer]}
+    twice: Any = discretized(system.problem, mesh, system.degree, system.free, parameters, system.scales)
+    states = system.states(x)
     x = twice.pack(np.concatenate([states, states[1:]]), parameters)
     found = locate_branch_point(twice.with_reference(x), x)
     return twice.with_reference(found.x), found.x, _alternating(twice, found)
 
 
-def _alternating(twice: CycleCollocation, found: BranchPoint) -> Array:
+def _alternating(twice: PeriodicCollocation, found: BranchPoint) -> Array:
     """Return the tangent that changes most from one round to the next."""
     half = twice.nodes.size // 2
 

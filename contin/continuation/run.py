@@ -30,6 +30,7 @@ from contin.detection.test_functions import (
     limits,
     own_end,
     own_normal_form,
+    own_stop,
     own_test_functions,
     user_zeros,
     with_normal_form,
@@ -55,7 +56,8 @@ _DOUBT = 0.2
 #: A component above this is never in doubt: tangents are better known than that.
 _STEEP = 0.3
 #: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
-_ASIDE = 0.01
+#: The next one is taken where the equations are still too nearly singular for Newton's method.
+_ASIDE = (0.01, 0.1, 0.5)
 #: A start this far outside a limit (relative to 1 + its size) still lies on it: it was located there, to round-off.
 _SLACK = 1e-9
 #: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
@@ -126,7 +128,7 @@ class Continuation:
         self.primary = settings.primary or system.free[0]
         self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
         self._fold = fold(self.primary) if settings.folds else None
-        self._own = own_test_functions(self.state.system)
+        self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
         self._at_start: dict[str, float] = {}
         general = self._general_test_functions()
         self._tests = [*general, *self._own]
@@ -240,13 +242,14 @@ class Continuation:
         try:
             segment, inspection, distance = self._step(self.state)
         except ConvergenceError as error:
-            self.stop = self._failure(error)
+            self.stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
         special = [own_end(segment.trial.system, point) for point in inspection.special_points(self._tests)]
         changes = self._index_changes(segment, special)
         for point, change in zip(special, changes):
-            self.stop = point.stop
+            if point.stop is not None:
+                self.stop = own_stop(point.trial.system, point.trial, point.stop)
             yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return
@@ -348,11 +351,20 @@ class Continuation:
             if self._end is None:
                 self._end = Trial(state.system, state.x, Linearization(state.tangent, state.sign))
             return 0.0, self._end
-        low = _ASIDE * step
-        aside = located(state, state.x + low * state.tangent, low, self.settings.newton)
+        low, aside = self._aside(state, step)
         if turn(state, aside) > self.settings.angle:
             raise ConvergenceError("another branch was met right beside the branch point")
         return low, aside
+
+    def _aside(self, state: State, step: float) -> Place:
+        """Return the nearest point beside a branch point that Newton's method finds."""
+        for share in _ASIDE:
+            try:
+                return share * step, located(state, state.x + share * step * state.tangent, share * step, self.settings.newton)
+            except ConvergenceError:
+                if share == _ASIDE[-1]:
+                    raise
+        raise AssertionError
 
     def _may_turn(self, trial: Trial, residual: Array) -> bool:
         """Return whether the primary parameter is so near to a fold that an approximate tangent may have the wrong sign."""

@@ -34,7 +34,7 @@ from contin.arrays import Array
 from contin.detection.lyapunov import Coefficient
 from contin.discretization.bends import bends
 from contin.discretization.cycles import CycleCollocation
-from contin.discretization.floquet import Round
+from contin.discretization.round import Round
 from contin.problems.cycle import PERIOD
 
 #: Rounds of inverse iteration for null vectors, from random borders; the first leaves an error of the size of the multiplier's.
@@ -56,14 +56,15 @@ class NormalForms:
         self.system, self.x = system, x
         self.plain, self.phased = Round(system, x, phased=False), Round(system, x, phased=True)
         self.points = system.at_gauss_points(x)
-        self.jacobian = system.jacobians_of_field(x, self.points)
+        self.jacobian = system.rates_by_states(x, self.points)
         self.h = np.repeat(np.diff(system.mesh), system.degree)[:, None]
         self.period = float(x[system.parameter_index(PERIOD)])
 
     def fold(self) -> Coefficient:
         """Return the absolute value of b."""
         v, w = self._null_vectors(self.phased, 1.0)
-        along = self.system.rates(self.x)
+        states = np.ascontiguousarray(self.x[: self.system.state_size].reshape(self.system.nodes.size, -1))
+        along = self.system.rates(self.x, states).ravel()
         v[: along.size] -= self._mean(v, along) / self._mean(along, along) * along
         v = v / np.sqrt(self._mean(v, v))
         here, alpha = self._at_points(v), v[-1] / self.period
@@ -151,7 +152,7 @@ class NormalForms:
     # --- derivatives ---------------------------------------------------------------------------------------------
 
     def _bends(self, v: Array) -> tuple[Array, Array]:
-        return bends(lambda states: self.system.jacobians_of_field(self.x, states), self.points, v)
+        return bends(lambda states: self.system.rates_by_states(self.x, states), self.points, v)
 
     @staticmethod
     def _apply(matrices: Array, v: Array) -> Array:

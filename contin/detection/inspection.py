@@ -18,6 +18,7 @@ from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint
 from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
+from contin.detection.phase import in_phase
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
 from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
@@ -290,11 +291,12 @@ class Inspection:
         size = state.system.state_size
         if np.max(np.abs(x[size:] - trial.x[size:])) > 2 * step:
             return None
-        passed = [inner(state.system, end - x, tangent) for end in (state.x, trial.x)]
-        if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, tangent) < _SAME_WAY:
+        first, (leaving,) = in_phase(state.system, x, (tangent,), trial.x)
+        passed = [inner(state.system, end - first, leaving) for end in (state.x, trial.x)]
+        if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, leaving) < _SAME_WAY:
             return None
         at = step * passed[0] / (passed[0] - passed[1])
-        off = segment.guess(at) - x
+        off = segment.guess(at) - first
         if np.sqrt(inner(state.system, off, off)) > _BACK * step:
             return None
         there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)

@@ -9,18 +9,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contin.detection.cycle_normal_forms import NormalForms
+from contin.detection.floquet import doubling, torus
+from contin.detection.homoclinic import homoclinic, resting_place
 from contin.detection.hopf import hopf
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.second_variation import legendre
 from contin.detection.segment import SpecialPoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
 from contin.problems.variational import VariationalProblem
 from contin.stepping.state import Stop
-from contin.stepping.trial import TestFunction
+from contin.stepping.trial import TestFunction, Trial
 
 
 def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
@@ -69,8 +71,8 @@ def _of_boundary_value(system: Collocation) -> list[TestFunction]:
 
 
 @own_test_functions.register
-def _of_cycles(system: CycleCollocation) -> list[TestFunction]:
-    return [hopf()]
+def _of_cycles(system: PeriodicCollocation) -> list[TestFunction]:
+    return [doubling(), torus(), homoclinic()] if isinstance(system, CycleCollocation) else [doubling(), torus()]
 
 
 @own_test_functions.register
@@ -130,9 +132,33 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
 
 
 @own_end.register
+def _of_doubled_cycles(system: PeriodicCollocation, point: SpecialPoint) -> SpecialPoint:
+    """Where a cycle comes to go twice round one of half its period the branch ends: beyond it is itself, half a period on."""
+    if point.label != "BP" or point.name == "start" or not system.is_doubled(point.trial.x):
+        return point
+    stop = Stop("period doubling", "the cycles come to go twice round cycles of half the period, at a period doubling")
+    return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)
+
+
+@own_end.register
 def _of_shrunk_cycles(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
     """Where cycles shrink onto an equilibrium the branch ends: beyond the Hopf point it is itself, half a period later."""
     if not system.has_shrunk(point.trial.x):
-        return point
+        return _of_doubled_cycles(system, point)
     stop = Stop("Hopf", "the cycles shrink onto an equilibrium, a Hopf point")
     return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
+
+
+@functools.singledispatch
+def own_stop(system: Discretization, trial: Trial, stop: Stop) -> Stop:
+    """Return the reason why a run ends, with what a kind of problem knows of its last point. Each kind registers its own."""
+    return stop
+
+
+@own_stop.register
+def _of_slow_cycles(system: CycleCollocation, trial: Trial, stop: Stop) -> Stop:
+    """Where the period runs away: the equilibrium near which the cycle spends its time."""
+    place = resting_place(trial.system, trial.x)  # type: ignore[arg-type]
+    if place is None:
+        return stop
+    return dataclasses.replace(stop, message=f"{stop.message}; {place.describe(trial.system.problem.states)}")

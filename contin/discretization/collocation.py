@@ -126,6 +126,12 @@ class Collocation(System):
         """Values of t at all Gauss points, shape (N d,)."""
         return self._times
 
+    @property
+    def gauss_weights(self) -> Array:
+        """Weights of the quadrature at the Gauss points, shape (N d,)."""
+        weights: Array = self._quadrature
+        return weights
+
     def states(self, x: Array) -> Array:
         """Return the states at the nodes, shape (N d + 1, n)."""
         states = self._scaled_states(x)

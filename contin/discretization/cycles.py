@@ -1,13 +1,15 @@
-"""Collocation of periodic orbits: a phase condition with a moving reference, and Floquet multipliers."""
+"""Collocation of periodic orbits: Floquet multipliers, and without forcing a phase condition with a moving reference."""
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Array, ComplexArray, Indices
 from contin.discretization.collocation import Collocation
 from contin.discretization.mesh import MeshControl, adapted_mesh
@@ -17,22 +19,171 @@ from contin.errors import ProblemError
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.periodic import log_eigenvalues
-from contin.problems.cycle import CycleProblem
+from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 
-#: A multiplier on the unit circle that is this near to -1, as an angle, is -1: round-off of a double one is its square root.
+#: A pair on the unit circle that is this near to -1, as an angle, is no torus bifurcation: round-off of a double one is its
+#: square root.
 _OPPOSITE = 1e-6
 #: A pair at an angle whose square is below so many times the error of the multiplier 1 may be a double one.
 _SPLIT = 100.0
 #: Logarithms of multipliers that differ by less are those of a pair; multipliers of so many orbits are kept.
 _EQUAL, _KEPT = 1e-9, 50
+#: A pair whose logarithm has a smaller real part lies on the unit circle: in a conservative system pairs stay there, up to
+#: round-off of their product. Ten times larger, a torus bifurcation is located as much worse.
+_ON_CIRCLE = 1e-12
 #: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
 _SHRUNK = 1e-7
+#: Parabolas through three places near the largest value of a state: the error falls with the sixth power of their distance.
+_PARABOLAS = 2
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
 _MOVED = 1e-6
 
 
-class CycleCollocation(Collocation):
-    """A `CycleProblem` on a mesh.
+class PeriodicCollocation(Collocation):
+    """A `CycleProblem` on a mesh: what forced and autonomous ones share."""
+
+    problem: CycleProblem
+
+    def __init__(
+        self, problem: CycleProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        parameters: Mapping[str, float], scales: Scales | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, mesh, degree, free, parameters, scales)
+        self._known: dict[bytes, ComplexArray] = {}
+
+    def duration(self, x: Array) -> float:
+        """Return the period."""
+        return self.problem.duration(dict(zip(self.problem.parameters, map(float, self.all_parameters(x)))))
+
+    def is_doubled(self, x: Array) -> bool:
+        """Return whether a cycle goes twice round one of half its period, up to the square root of round-off."""
+        states = self.states(x)
+        later = self.evaluate(x, (self.nodes + 0.5) % 1.0)
+        return bool(np.all(np.abs(states - later).max(axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+
+    def evaluate_scaled(self, x: Array, times: Array) -> Array:
+        """Return the states divided by their sizes at ``times`` (m,), shape (m, n); of perturbations, too."""
+        return self._interpolated(x, times)
+
+    # --- columns -------------------------------------------------------------------------------------------------
+
+    def functionals(self, x: Array) -> Array:
+        """Return the largest and smallest values of each state, and the means of the user's functionals."""
+        extremes = np.stack([self._largest(x, 1.0), -self._largest(x, -1.0)], axis=1).ravel()
+        own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
+        means = super().functionals(x) if self.problem.means else np.empty(0)
+        return np.concatenate([extremes, own, means])
+
+    def _largest(self, x: Array, sign: float) -> Array:
+        """Return the largest values of the states times a sign, shape (n,)."""
+        parts = 4 * self.degree
+        t = (self.mesh[:-1, None] + self._h[:, None] * np.linspace(0, 1, parts, endpoint=False)).ravel()
+        values = sign * self.evaluate(x, t)
+        known = values.max(axis=0)
+        at, apart = t[values.argmax(axis=0)], np.repeat(self._h / parts, parts)[values.argmax(axis=0)]
+        for _ in range(_PARABOLAS):
+            near = np.concatenate([at - apart, at, at + apart]) % 1.0
+            before, here, behind = sign * np.diagonal(self.evaluate(x, near).reshape(3, at.size, -1), axis1=1, axis2=2)
+            bend = before - 2 * here + behind
+            move = np.where(bend < 0, (before - behind) / (2 * np.where(bend < 0, bend, 1.0)), 0.0)
+            at, apart = at + apart * np.clip(move, -1, 1), apart / 10
+        found: Array = np.maximum(sign * np.diagonal(self.evaluate(x, at % 1.0)), known)
+        return found
+
+    # --- stability -----------------------------------------------------------------------------------------------
+
+    def _jacobian_of_field(self, x: Array) -> Array:
+        """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N, d, n, n)."""
+        n = self._n
+        p, points = self._scaled_parameters(x), self.at_gauss_points(x)
+        colours = self.problem.batch("field").colouring([])
+        jacobian: Array = self._field.jacobian(self._times, points, np.empty((0, n)), p, colours)[1][:, :n, :n]
+        return jacobian.reshape(self.intervals, self._d, n, n)
+
+    def interval_matrices(self, x: Array) -> Array:
+        """Return the linearized collocation equations of each interval, shape (N, d n, (d + 1) n)."""
+        return self._interval_matrices(self._jacobian_of_field(x))
+
+    def _interval_matrices(self, jacobian: Array) -> Array:
+        n, d, N = self._n, self._d, self.intervals
+        matrix: Array = np.einsum("qm,ab->qamb", self.basis.slope, np.eye(n))[None] - np.einsum(
+            "j,qm,jqab->jqamb", self._h, self.basis.value, jacobian
+        )
+        return matrix.reshape(N, d * n, (d + 1) * n)
+
+    def _transitions(self, jacobian: Array) -> Array:
+        """Return the matrix that takes a perturbation over each interval, shape (N, n, n), from `_jacobian_of_field`."""
+        n = self._n
+        matrix: Any = self._interval_matrices(jacobian)
+        result: Array = np.linalg.solve(matrix[:, :, n:], -matrix[:, :, :n])[:, -n:]
+        return result
+
+    def eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable.
+
+        That of a pair on the unit circle, to round-off, has the real part zero.
+        """
+        key = x.tobytes()
+        if key not in self._known:
+            if len(self._known) > _KEPT:
+                self._known.clear()
+            jacobian = self._jacobian_of_field(x)
+            values = log_eigenvalues(self._transitions(jacobian))
+            total = float(self._quadrature @ np.trace(jacobian, axis1=2, axis2=3).ravel())
+            least = values.real <= values.real.min() + _EQUAL
+            if not self._is_own_error(values, least):
+                # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
+                values[least] += (total - values.real.sum()) / np.count_nonzero(least)
+            self._known[key] = _on_circle(values)
+        return self._known[key]
+
+    def _is_own_error(self, values: ComplexArray, least: Array) -> bool:
+        """Return whether the smallest multipliers are those whose error shall show."""
+        return False
+
+    @abstractmethod
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle; None where none do."""
+
+
+class ForcedCollocation(PeriodicCollocation):
+    """A `CycleProblem` with a forcing, on a mesh. There is no phase condition, and no multiplier is 1 by itself.
+
+    Raises
+    ------
+    ProblemError
+        ``rounds`` is no whole number, or free; the period is no positive number.
+    """
+
+    def __init__(
+        self, problem: CycleProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
+        parameters: Mapping[str, float], scales: Scales | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(problem, mesh, degree, free, parameters, scales)
+        values = dict(zip(self.problem.parameters, map(float, self.parameters)))
+        rounds = values[ROUNDS]
+        if ROUNDS in self.free:
+            raise ProblemError(f"free: {ROUNDS} must not be free, as it is a whole number")
+        if not (rounds >= 1 and rounds == int(rounds)):
+            raise ProblemError(f"parameters: {ROUNDS} = {checks.shown(rounds)} must be a whole number from 1")
+        self._rounds = int(rounds)
+        problem.duration(values)
+
+    def is_doubled(self, x: Array) -> bool:
+        """Return whether a cycle goes twice round one of half its period, and that is a number of periods of the forcing."""
+        return self._rounds % 2 == 0 and super().is_doubled(x)
+
+    def with_reference(self, x: Array) -> ForcedCollocation:
+        """Return the same: nothing needs a reference."""
+        return self
+
+    def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
+        """Return label and name of a torus bifurcation; None near a double multiplier -1."""
+        return None if _is_opposite(frequency) else ("TR", "torus")
+
+
+class CycleCollocation(PeriodicCollocation):
+    """An autonomous `CycleProblem` on a mesh.
 
     The phase condition, the integral of u . v' over that of v' . v', is linear: one row beside the collocation equations,
 
@@ -46,15 +197,12 @@ class CycleCollocation(Collocation):
         The states of v at the nodes, in the user's units; zero where `with_reference` has not set it.
     """
 
-    problem: CycleProblem
-
     def __init__(
         self, problem: CycleProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         self.equations = self._conditions + 1
-        self._known: dict[bytes, ComplexArray] = {}
         self._set_reference(np.zeros((self.nodes.size, self._n)))
 
     def _set_reference(self, reference: Array) -> None:
@@ -95,38 +243,7 @@ class CycleCollocation(Collocation):
         product: Array = super().transposed_product(x, w[:-1]) + w[-1] * self._phase
         return product
 
-    # --- columns -------------------------------------------------------------------------------------------------
-
-    def functionals(self, x: Array) -> Array:
-        """Return the largest and smallest values of each state, then the means of the user's functionals."""
-        states = self._dense(x)
-        extremes = np.stack([states.max(axis=0), states.min(axis=0)], axis=1).ravel()
-        return np.concatenate([extremes, super().functionals(x)]) if self.problem.means else extremes
-
-    def _dense(self, x: Array) -> Array:
-        """Return the states at places close to each other."""
-        parts = 4 * self.degree
-        t = (self.mesh[:-1, None] + self._h[:, None] * np.linspace(0, 1, parts, endpoint=False)).ravel()
-        return self.evaluate(x, t)
-
     # --- stability -----------------------------------------------------------------------------------------------
-
-    def jacobians_of_field(self, x: Array, states: Array) -> Array:
-        """Return the derivatives of T F by the states, at scaled states (K, n) with the parameters of x; shape (K, n, n)."""
-        n, colours = self._n, self.problem.batch("field").colouring([])
-        times, p = np.zeros(len(states)), self._scaled_parameters(x)
-        jacobians: Array = self._field.jacobian(times, states, np.empty((0, n)), p, colours)[1][:, :n, :n]
-        return jacobians
-
-    def _jacobian_of_field(self, x: Array) -> Array:
-        """Return the same at the Gauss points, shape (N, d, n, n)."""
-        return self.jacobians_of_field(x, self.at_gauss_points(x)).reshape(self.intervals, self._d, self._n, self._n)
-
-    def rates(self, x: Array) -> Array:
-        """Return u' at the nodes, scaled, shape (state_size,): the field there, which the collocated u' follows."""
-        p, states = self._scaled_parameters(x), np.ascontiguousarray(self._scaled_states(x))
-        values = self._field.values(np.zeros(len(states)), states, np.empty((0, self._n)), p)[:, : self._n]
-        return np.asarray(values.ravel(), dtype=float)
 
     @property
     def by_interval(self) -> Indices:
@@ -141,49 +258,32 @@ class CycleCollocation(Collocation):
             first /= self.scales.states
         return np.asarray(first / np.linalg.norm(first), dtype=float)
 
-    def interval_matrices(self, x: Array) -> Array:
-        """Return the linearized collocation equations of each interval, shape (N, d n, (d + 1) n)."""
-        return self._interval_matrices(self._jacobian_of_field(x))
-
-    def _interval_matrices(self, jacobian: Array) -> Array:
-        n, d, N = self._n, self._d, self.intervals
-        matrix: Array = np.einsum("qm,ab->qamb", self.basis.slope, np.eye(n))[None] - np.einsum(
-            "j,qm,jqab->jqamb", self._h, self.basis.value, jacobian
-        )
-        return matrix.reshape(N, d * n, (d + 1) * n)
-
-    def _transitions(self, jacobian: Array) -> Array:
-        """Return the matrix that takes a perturbation over each interval, shape (N, n, n), from `_jacobian_of_field`."""
-        n = self._n
-        matrix: Any = self._interval_matrices(jacobian)
-        result: Array = np.linalg.solve(matrix[:, :, n:], -matrix[:, :, :n])[:, -n:]
-        return result
-
-    def eigenvalues(self, x: Array) -> ComplexArray:
-        """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable."""
-        key = x.tobytes()
-        if key not in self._known:
-            if len(self._known) > _KEPT:
-                self._known.clear()
-            jacobian = self._jacobian_of_field(x)
-            values = log_eigenvalues(self._transitions(jacobian))
-            total = float(self._quadrature @ np.trace(jacobian, axis1=2, axis2=3).ravel())
-            least = values.real <= values.real.min() + _EQUAL
-            if not least[np.abs(values).argmin()]:  # where the smallest is 1, its error shall show
-                # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
-                values[least] += (total - values.real.sum()) / np.count_nonzero(least)
-            self._known[key] = values
-        return self._known[key]
+    def _is_own_error(self, values: ComplexArray, least: Array) -> bool:
+        """Return whether the smallest multiplier is the one that is 1: its error shall show."""
+        return bool(least[np.abs(values).argmin()])
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
-        """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle.
+        """Return label and name of a torus bifurcation; None near a double multiplier -1.
 
-        None where the pair may be a double multiplier 1 (at a fold): an error e of the one that is 1 splits it by sqrt(e).
+        None, too, where the pair may be a double multiplier 1 (at a fold): an error e of the one that is 1 splits it by
+        sqrt(e).
         """
         trivial = float(np.abs(np.expm1(self.eigenvalues(x))).min())
-        if frequency**2 < _SPLIT * trivial:
-            return None
-        return ("PD", "period doubling") if abs(frequency - math.pi) < _OPPOSITE else ("TR", "torus")
+        return None if frequency**2 < _SPLIT * trivial or _is_opposite(frequency) else ("TR", "torus")
+
+    def rates(self, x: Array, points: Array) -> Array:
+        """Return T F at any states (K, n) divided by their sizes, likewise scaled, shape (K, n)."""
+        n, times = self._n, np.zeros(len(points))
+        rates: Array = self._field.values(times, points, np.empty((0, n)), self._scaled_parameters(x))[:, :n]
+        return rates
+
+    def rates_by_states(self, x: Array, points: Array) -> Array:
+        """Return the derivatives of `rates` by the states, shape (K, n, n)."""
+        n, times = self._n, np.zeros(len(points))
+        colours = self.problem.batch("field").colouring([])
+        none, p = np.empty((0, n)), self._scaled_parameters(x)
+        derivatives: Array = self._field.jacobian(times, points, none, p, colours)[1][:, :n, :n]
+        return derivatives
 
     def has_shrunk(self, x: Array) -> bool:
         """Return whether an orbit is an equilibrium, up to the square root of round-off."""
@@ -240,3 +340,13 @@ class CycleCollocation(Collocation):
         other = self._with(mesh=self.mesh if mesh is None else mesh)
         other._set_reference(self._between(self.states(x), other.nodes))
         return other, self.carrier(other)
+
+
+def _is_opposite(frequency: float) -> bool:
+    return abs(frequency - math.pi) < _OPPOSITE
+
+
+def _on_circle(values: ComplexArray) -> ComplexArray:
+    """Return logarithms of multipliers, those of pairs on the unit circle with the real part zero."""
+    pairs = (values.imag != 0) & (np.abs(values.imag) != math.pi)
+    return np.where(pairs & (np.abs(values.real) < _ON_CIRCLE), 1j * values.imag, values)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from contin.arrays import Array
 from contin.discretization.collocation import Collocation
 from contin.discretization.connections import ConnectionCollocation
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import CycleCollocation, ForcedCollocation
 from contin.discretization.scales import Scales
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.connection import ConnectionProblem
@@ -20,7 +20,8 @@ def discretized(
 ) -> Collocation:  # fmt: skip
     """Return a boundary value problem on a mesh: the system of its kind."""
     if isinstance(problem, CycleProblem):
-        return CycleCollocation(problem, mesh, degree, free, parameters, scales)
+        kind = CycleCollocation if problem.period is None else ForcedCollocation
+        return kind(problem, mesh, degree, free, parameters, scales)
     if isinstance(problem, ConnectionProblem):
         return ConnectionCollocation(problem, mesh, degree, free, parameters, scales)
     return Collocation(problem, mesh, degree, free, parameters, scales)

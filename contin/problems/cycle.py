@@ -1,8 +1,10 @@
-"""Periodic orbits as the user states them: an autonomous vector field."""
+"""Periodic orbits as the user states them: a vector field, autonomous or with a forcing of known period."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections import namedtuple
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from contin import checks
@@ -14,31 +16,43 @@ from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
 
-#: The name of the period among the parameters.
+#: The name of the period: of an autonomous field a parameter, of a forced one a column.
 PERIOD = "period"
+#: Of a forced field, the parameter that says after how many periods of the forcing the cycle closes.
+ROUNDS = "rounds"
+
+#: The period of a forcing: a number, the name of a parameter, or a function of the parameters.
+Period = float | str | Callable[[Any], Any]
 
 
 class CycleProblem(BoundaryValueProblem):
-    """Periodic orbits of u' = F(u, p), on the unit interval: u' = T F(u, p), u(0) = u(1), with a phase condition.
+    """Periodic orbits of u' = F(u, p), or of u' = F(t, u, p) where F has a known period in t.
 
-    The phase condition, the integral of u . v' = 0 with an earlier orbit v of the run, keeps the orbit from sliding along
-    itself. The period T is the parameter ``period``; it is free on every curve and need not be named.
+    On the unit interval: u' = T F(u, p), u(0) = u(1). Of an autonomous field, the period T is the parameter ``period``; it is
+    free on every curve and need not be named. The phase condition, the integral of u . v' = 0 with an earlier orbit v of the
+    run, keeps the orbit from sliding along itself.
+
+    Of a forced field there is no phase condition, and the period is a column: that of the forcing times the parameter
+    ``rounds``, the number of periods of the forcing after which the cycle closes.
 
     Parameters
     ----------
     field : callable
-        ``field(u, p)`` returns the rates of the states, as for an `AlgebraicProblem` whose equilibria are looked for.
+        ``field(u, p)`` returns the rates of the states, as for an `AlgebraicProblem` whose equilibria are looked for;
+        ``field(t, u, p)`` with ``period``.
     states : sequence of str
     parameters : mapping of str to float
         Names and default values.
     functionals : mapping of str to callable, optional
-        ``f(u, p)``: means over the period, columns of every point. The largest and the smallest value of each state are
-        columns by themselves: ``max_`` and ``min_`` + name.
+        ``f(u, p)``, of a forced field ``f(t, u, p)``: means over the period, columns of every point. The largest and the
+        smallest value of each state are columns by themselves: ``max_`` and ``min_`` + name.
+    period : float, str or callable, optional
+        The period of a forced field: a number, the name of a parameter, or a function ``period(p)``.
 
     Raises
     ------
     ProblemError
-        A name or function that cannot be used.
+        A name, a period or a function that cannot be used.
 
     Examples
     --------
@@ -54,31 +68,42 @@ class CycleProblem(BoundaryValueProblem):
     >>> orbit = contin.solve(problem, guess, {"period": 6})
     >>> print(round(orbit["period"] / math.pi, 10), round(orbit["max_x"], 10))
     2.0 0.5
+
+    A forced linear oscillator, x" + x = a cos(w t) with x = a cos(w t) / (1 - w^2):
+
+    >>> def forced(t, u, p):
+    ...     return u.v, -u.x + p.a * math.cos(p.w * t)
+    >>> problem = CycleProblem(forced, ["x", "v"], {"a": 3.0, "w": 2.0}, period=lambda p: 2 * math.pi / p.w)
+    >>> print(round(contin.solve(problem, [0.0, 0.0], degree=7)["max_x"], 10))
+    1.0
     """
 
     field: Function
     means: Mapping[str, Function]
+    period: Function | None
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *,
-        functionals: Mapping[str, Function] | None = None,
+        functionals: Mapping[str, Function] | None = None, period: Period | None = None,
     ) -> None:  # fmt: skip
         means = dict(checks.mapping("functionals", functionals or {}, "functions"))
         names = check_statement(states, parameters, means)
+        forced = period is not None
         extremes = [f"{kind}_{name}" for name in names for kind in ("max", "min")]
-        for name in (PERIOD, *extremes):
+        for name in (PERIOD, *extremes, *([ROUNDS] if forced else [])):
             if name in parameters or name in means:
                 raise ProblemError(f"parameters: {name} is a column of every cycle by itself")
-        signature = Signature(names, tuple(parameters), times=False)
-        if argument_count(checks.function("field", field)) != 2:
-            raise ProblemError("field: must be a function of (u, p)")
-        count = result_count(field, signature.arguments, "field")
+        count = _field_size(field, Signature(names, tuple(parameters), times=forced))
         if count != len(names):
             raise ProblemError(f"field returns {count} values for the {len(names)} states {', '.join(names)}")
+        found = None if period is None else _period_function(period, parameters)
+        rhs = _scaled_by_period(field, count) if found is None else _scaled_by_forcing(field, found, count)
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "means", means)
-        super().__init__(_scaled_by_period(field, count), _periodic(count), names, {**parameters, PERIOD: 1.0})
-        object.__setattr__(self, "functionals", {**dict.fromkeys(extremes, _found_elsewhere), **means})
+        object.__setattr__(self, "period", found)
+        super().__init__(rhs, _periodic(count), names, {**parameters, **({ROUNDS: 1.0} if forced else {PERIOD: 1.0})})
+        columns = [*extremes, PERIOD] if forced else extremes
+        object.__setattr__(self, "functionals", {**dict.fromkeys(columns, _found_elsewhere), **means})
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:
@@ -88,18 +113,70 @@ class CycleProblem(BoundaryValueProblem):
     @property
     def multipliers(self) -> tuple[str, ...]:
         """Names of the parameters that are free on every curve."""
-        return (PERIOD,)
+        return (PERIOD,) if self.period is None else ()
 
     @property
     def free_size(self) -> int:
-        """Number of free parameters on a curve: one, and the period, for which there is the phase condition."""
-        return 2
+        """Number of free parameters on a curve: one and, of an autonomous field, the period with the phase condition."""
+        return 2 if self.period is None else 1
+
+    def duration(self, parameters: Mapping[str, float]) -> float:
+        """Return the period of a cycle with these parameters.
+
+        Raises
+        ------
+        ProblemError
+            The period of a forced field is no positive number there.
+        """
+        if self.period is None:
+            return parameters[PERIOD]
+        values: Any = namedtuple("P", tuple(parameters))  # type: ignore[misc]  # noqa: PYI024
+        value = self.period(values(**parameters))
+        if not checks.is_number(value) or not 0 < value < math.inf:
+            raise ProblemError(f"period: {checks.shown(value)} must be a positive number")
+        return float(value * parameters[ROUNDS])
 
     def _compiled(self, name: str) -> Batch:
         if name != "functionals":
             return super()._compiled(name)
-        functions = [_of_time(f) for f in self.means.values()]
+        functions = [_of_time(f) if self.period is None else _of_forcing(f, self.period) for f in self.means.values()]
         return Batch(functions, [0] * len(functions), self.state_names, tuple(self.parameters))
+
+
+def _field_size(field: Function, signature: Signature) -> int:
+    """Return how many values a field has.
+
+    Raises
+    ------
+    ProblemError
+        It takes other arguments.
+    """
+    found = argument_count(checks.function("field", field))
+    if found != len(signature.arguments):
+        if signature.times:
+            raise ProblemError("field: must be a function of (t, u, p), as a period is given")
+        raise ProblemError("field: must be a function of (u, p); one of (t, u, p) needs a period")
+    return result_count(field, signature.arguments, "field")
+
+
+def _period_function(period: Period, parameters: Mapping[str, float]) -> Function:
+    """Return the period of a forcing as a function of the parameters.
+
+    Raises
+    ------
+    ProblemError
+        It is no positive number, parameter or function of one argument.
+    """
+    if isinstance(period, str):
+        if period not in parameters:
+            raise ProblemError(f"period: {checks.shown(period)} is no parameter; there are {', '.join(parameters) or 'none'}")
+        return _generated("period", f"def period(p):\n    return p.{period}\n", {})
+    if callable(period):
+        if argument_count(period) != 1:
+            raise ProblemError("period: must be a function of p alone")
+        return period
+    checks.number("period", period, 0)
+    return _generated("period", f"def period(p):\n    return {float(period)!r}\n", {})
 
 
 def _found_elsewhere(u: Any, p: Any) -> Any:
@@ -107,25 +184,41 @@ def _found_elsewhere(u: Any, p: Any) -> Any:
     raise NotImplementedError
 
 
-def _scaled_by_period(field: Function, count: int) -> Function:
-    """Return the field times the period; the text is generated because compiled code has tuples of fixed sizes."""
-    scope: dict[str, Any] = {"field": field, "__name__": __name__}
-    values = "".join(f"p.period * r[{i}], " for i in range(count))
-    exec(f"def rhs(t, u, p):\n    r = field(u, p)\n    return ({values})", scope)
-    found: Function = scope["rhs"]
+def _generated(name: str, source: str, names: Mapping[str, Any]) -> Function:
+    """Return a function from its text, which is generated because compiled code has tuples of fixed sizes."""
+    scope: dict[str, Any] = {**names, "__name__": __name__}
+    exec(source, scope)
+    found: Function = scope[name]
     return found
+
+
+def _scaled_by_period(field: Function, count: int) -> Function:
+    """Return the field times the period."""
+    values = "".join(f"p.period * r[{i}], " for i in range(count))
+    return _generated("rhs", f"def rhs(t, u, p):\n    r = field(u, p)\n    return ({values})", {"field": field})
+
+
+def _scaled_by_forcing(field: Function, period: Function, count: int) -> Function:
+    """Return a forced field times the period, at the time from 0 to 1."""
+    values = "".join(f"T * r[{i}], " for i in range(count))
+    source = f"def rhs(t, u, p):\n    T = p.rounds * period(p)\n    r = field(T * t, u, p)\n    return ({values})"
+    return _generated("rhs", source, {"field": field, "period": period})
 
 
 def _periodic(count: int) -> Function:
-    scope: dict[str, Any] = {"__name__": __name__}
     values = "".join(f"a[{i}] - b[{i}], " for i in range(count))
-    exec(f"def boundary(a, b, p):\n    return ({values})", scope)
-    found: Function = scope["boundary"]
-    return found
+    return _generated("boundary", f"def boundary(a, b, p):\n    return ({values})", {})
 
 
 def _of_time(function: Function) -> Function:
     def mean(t: Any, u: Any, p: Any) -> Any:
         return function(u, p)
+
+    return mean
+
+
+def _of_forcing(function: Function, period: Function) -> Function:
+    def mean(t: Any, u: Any, p: Any) -> Any:
+        return function(p.rounds * period(p) * t, u, p)
 
     return mean

@@ -63,13 +63,15 @@ class Branch:
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
         """Draw one column against another, with marks at labelled points.
 
-        Where the index is known (`VariationalProblem`), stable parts are solid and unstable ones dashed.
+        Where the index is known (`VariationalProblem`), and of cycles, stable parts are solid and unstable ones dashed.
 
         Parameters
         ----------
         x, y : str, optional
             A parameter, a functional, ``"arclength"`` or ``"norm"`` (root mean square of the states over the nodes). By default
-            the first free parameter, and the first functional (``"norm"`` where there is none).
+            the first free parameter, and the first functional (``"norm"`` where there is none). Of algebraic problems they
+            may be states. Of cycles ``y`` may be one: its largest and its smallest value are drawn; by default those of the
+            first state.
         axes : matplotlib.axes.Axes, optional
             Where to draw; a figure of its own without.
 

@@ -11,7 +11,11 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.detection.floquet import unstable
+from contin.discretization.algebraic import Algebraic
+from contin.discretization.cycles import PeriodicCollocation
 from contin.errors import ProblemError
+from contin.results.axes import new_axes
 from contin.results.point import Point
 
 #: Marks of labelled points: matplotlib's symbol and colour (Okabe-Ito: told apart by the colour-blind).
@@ -22,41 +26,54 @@ _MARKS = {
     "R1": ("p", "#E69F00"), "R2": ("p", "#CC79A7"), "R3": ("p", "#0072B2"), "R4": ("p", "#009E73"),
 }  # fmt: skip
 _OTHER_MARK = (".", "#000000")
+#: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.
+_CRITICAL = ("LP", "BP", "PD", "TR", "HB")
 #: Dashes and legend of pieces, by whether they are stable; None: not known.
 _LINES = {True: ("-", "stable"), False: ((0, (3, 2)), "unstable"), None: ("-", None)}
 #: Areas of the marks in points squared: a star needs a larger one to look as large.
 _AREA = {"*": 90, "": 30}
 
 
-def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
-    """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`."""
-    x, y = _columns(points, x, y)
-    across, up = column(points, x), column(points, y)
-    if axes is None:
-        try:
-            from matplotlib import pyplot
-        except ImportError as error:
-            raise ImportError("plot needs matplotlib, which is not installed: pip install matplotlib") from error
-        axes = pyplot.subplots(layout="constrained")[1]
-    named = set()
-    for stable, piece in _pieces(points):
+def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Any = None, dynamics: bool = False) -> Any:
+    """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`.
+
+    With ``dynamics`` the stability of equilibria is drawn, too.
+    """
+    x, columns, name = _columns(points, x, y)
+    axes = new_axes() if axes is None else axes
+    pieces = list(_pieces(points, dynamics))
+    named: set[str | None] = set(axes.get_legend_handles_labels()[1])
+    for column_name in columns:
+        named |= _draw(points, (x, column_name), pieces, named, axes)
+    axes.set(xlabel=x, ylabel=name)
+    if any(point.label for point in points) or named - {None}:
+        axes.legend(frameon=False)
+    return axes
+
+
+def _draw(
+    points: Sequence[Point], names: tuple[str, str], pieces: Sequence[tuple[bool | None, slice]], known: set[str | None],
+    axes: Any,
+) -> set[str | None]:  # fmt: skip
+    """Draw one column over another, and return the names for the legend; those that are ``known`` are not given again."""
+    across, up = column(points, names[0]), column(points, names[1])
+    named: set[str | None] = set()
+    for stable, piece in pieces:
         dashes, name = _LINES[stable]
-        label = None if name in named else name
+        label = None if name in known | named else name
         named.add(name)
         axes.plot(across[piece], up[piece], lw=1.5, color="#0072B2", ls=dashes, label=label, zorder=1)
     labels = [point.label for point in points]
     for label in dict.fromkeys(filter(None, labels)):
         here = [i for i, other in enumerate(labels) if other == label]
         marker, colour = _MARKS.get(label, _OTHER_MARK)
-        area = _AREA.get(marker, _AREA[""])
-        axes.scatter(across[here], up[here], s=area, marker=marker, color=colour, label=label, zorder=2)
-    axes.set(xlabel=x, ylabel=y)
-    if any(labels) or named - {None}:
-        axes.legend(frameon=False)
-    return axes
+        area, again = _AREA.get(marker, _AREA[""]), label in known
+        axes.scatter(across[here], up[here], s=area, marker=marker, color=colour, label=None if again else label, zorder=2)
+        named.add(label)
+    return named
 
 
-def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
+def _pieces(points: Sequence[Point], dynamics: bool) -> Iterator[tuple[bool | None, slice]]:
     """Cut a branch where its stability changes; without any index, there is one piece.
 
     Yields
@@ -66,14 +83,42 @@ def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
     piece : slice
         Points of the piece; its ends belong to the pieces beside it too.
     """
-    if len(points) < 2 or all(point.index is None for point in points):
+    moving = bool(points) and (_is_cycle(points[0]) or (dynamics and _is_equilibrium(points[0])))
+    if len(points) < 2 or (not moving and all(point.index is None for point in points)):
         yield None, slice(None)
         return
     first = 0
-    for stable, steps in groupby(map(_stable, *zip(*pairwise(points)))):
+    for stable, steps in groupby(_of_motions(points) if moving else map(_stable, *zip(*pairwise(points)))):
         last = first + len(list(steps))
         yield stable, slice(first, last + 1)
         first = last
+
+
+def _is_cycle(point: Point) -> bool:
+    return isinstance(point.system, PeriodicCollocation)
+
+
+def _is_equilibrium(point: Point) -> bool:
+    return isinstance(point.system, Algebraic) and point.system.problem.dynamics
+
+
+def _of_motions(points: Sequence[Point]) -> list[bool | None]:
+    """Return whether the cycles, or the equilibria, between two points are stable, for each step.
+
+    The regular point at one end decides; between two special points, the step before.
+    """
+    counts = [None if point.label in _CRITICAL else _unstable(point) for point in points]
+    found: list[bool | None] = []
+    for a, b in pairwise(counts):
+        count = b if a is None else a
+        found.append((found[-1] if found else None) if count is None else count == 0)
+    return found
+
+
+def _unstable(point: Point) -> int:
+    """Return the number of unstable multipliers, or eigenvalues."""
+    system: Any = point.system
+    return unstable(system, point.x) if _is_cycle(point) else int(np.count_nonzero(system.eigenvalues(point.x).real > 0))
 
 
 def _stable(a: Point, b: Point) -> bool | None:
@@ -101,26 +146,37 @@ def picture(points: Sequence[Point]) -> str:
 
 
 def column(points: Sequence[Point], name: str) -> Array:
-    """Return a parameter, a functional, ``"arclength"`` or ``"norm"`` over all points.
+    """Return a parameter, a functional, a state of equilibria, ``"arclength"`` or ``"norm"`` over all points.
 
     The norm is the root mean square of the states over the nodes.
     """
     if points and (name in points[0].parameters or name in points[0].functionals):
         return np.array([point[name] for point in points])
+    if points and name in _states(points[0]):
+        at = _states(points[0]).index(name)
+        return np.array([point.system.states(point.x).ravel()[at] for point in points])
     if name == "arclength":
         return np.array([point.arclength for point in points])
     return np.array([np.sqrt(np.mean(np.sum(point.system.states(point.x) ** 2, axis=1))) for point in points])
 
 
-def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str, str]:
-    """Return the names of the two columns to draw, with the defaults of `plot`."""
+def _states(point: Point) -> tuple[str, ...]:
+    """Return the states that are columns: those of an algebraic problem."""
+    return point.system.problem.state_names if isinstance(point.system, Algebraic) else ()
+
+
+def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str, list[str], str]:
+    """Return the names of the columns to draw and of the second axis, with the defaults of `plot`."""
     if not points:
         raise ProblemError("the branch has no points to draw")
     first = points[0]
-    known = [*first.parameters, *first.functionals, "arclength", "norm"]
+    known = [*first.parameters, *first.functionals, "arclength", "norm", *_states(first)]
     x = first.system.free[0] if x is None else x
-    y = next(iter(first.functionals), "norm") if y is None else y
+    states = first.system.problem.state_names if isinstance(first.system, PeriodicCollocation) else ()
+    y = (states[0] if states else next(iter(first.functionals), "norm")) if y is None else y
+    if x in known and y in states:
+        return x, [f"max_{y}", f"min_{y}"], f"{y}, largest and smallest"
     for argument, name in (("x", x), ("y", y)):
         if name not in known:
-            raise ProblemError(f"{argument}: {checks.shown(name)} is no column; there are {', '.join(known)}")
-    return x, y
+            raise ProblemError(f"{argument}: {checks.shown(name)} is no column; there are {', '.join((*known, *states))}")
+    return x, [y], y

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from contin.arrays import Array
+from contin.detection.floquet import Floquet, floquet
 from contin.detection.second_variation import SecondVariation, index_of, second_variation
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
+from contin.results import portrait
 from contin.stepping.trial import Trial
 
 
@@ -94,6 +97,45 @@ class Point:
         which is zero at a cusp. Its estimated error is ``details["normal_form_error"]``.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
+
+    def plot(self, what: str | None = None, states: Sequence[str] | None = None, axes: Any = None) -> Any:
+        """Draw the solution: its phase portrait, its states over time and, of a cycle, its Floquet multipliers.
+
+        Parameters
+        ----------
+        what : str, optional
+            ``"portrait"`` (the second state against the first), ``"series"`` (over time; a cycle over one period) or
+            ``"multipliers"`` (with the unit circle; outside of it distances from 0 are 1 + log10 of the absolute value). All of
+            them, side by side, without.
+        states : sequence of str, optional
+            Names of the states to draw, in order: the first two of them in the portrait.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw, an array of axes without ``what``; a figure of its own without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes, or an array of them
+
+        Raises
+        ------
+        ProblemError
+            The point is no solution over t, or there is no such picture or state.
+        ImportError
+            matplotlib is not installed.
+        """
+        return portrait.plot(self, what, states, axes)
+
+    def floquet(self) -> Floquet:
+        """Return the Floquet multipliers of a cycle, with estimates of their errors.
+
+        Raises
+        ------
+        ProblemError
+            The point is no cycle.
+        """
+        if not isinstance(self.system, PeriodicCollocation):
+            raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem")
+        return floquet(self.system, self.x, self.tangent)
 
     def second_variation(self) -> SecondVariation:
         """Return the second variation of the energy there: its eigenvalues, and its modes as functions.

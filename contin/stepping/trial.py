@@ -171,6 +171,8 @@ class TestFunction:
         sign does not tell them all.
     looks : int
         Number of places inside a step where the sign is looked at, too: two zeros in one step leave it as it was at the ends.
+    unless : str
+        A column; where the user has given a limit for it, the function is not used.
 
     Examples
     --------
@@ -191,6 +193,7 @@ class TestFunction:
     limit: bool = False
     search: Callable[..., Any] | None = None
     looks: int = 0
+    unless: str = ""
 
     def passed(self, before: float, after: float) -> bool:
         """Return whether there is a zero between two neighbouring points where the function has these values."""

@@ -71,8 +71,10 @@ def test_van_der_pol_to_a_multiplier_that_no_number_holds():
     branch = contin.trace(orbit, free=["mu"], limits={"mu": (0.5, 10)}, mesh=MeshControl(max_intervals=1000))
     end = branch.points[-1]
     assert end["period"] == pytest.approx(19.0783695, abs=1e-7)
-    trivial, small = end.system.eigenvalues(end.x)
-    assert abs(trivial) < 1e-9 and small.real < -240
+    found = end.floquet()
+    trivial, small = found.logarithms
+    assert abs(trivial) < 1e-9 and small.real < -240 and found.errors[0] == abs(trivial) and found.errors[1] < 1e-6
+    assert found.unstable == 0
 
 
 def test_from_a_hopf_point():
@@ -133,6 +135,7 @@ def test_doublings_of_roessler():
         (lambda: contin.cycle(CycleProblem(circle, ["x", "y"], {"mu": -0.5}), [0.1, 0.0]), "comes to rest near"),
         (lambda: contin.cycle(CycleProblem(circle, ["x", "y"], {"mu": 0.5}), [0.1]), "must be 2 finite numbers"),
         (lambda: contin.cycle(CycleProblem(lambda u, p: (1.0 + 0 * u.x,), ["x"], {}), [0.0]), "does not come back"),
+        (lambda: contin.solve(AlgebraicProblem(circle, ["x", "y"], {"mu": 0.5})).floquet(), "floquet: the point is no cycle"),
         (lambda: contin.solve(CycleProblem(circle, ["x", "y"], {"mu": 0.5}), [0.1, 0.0]), "goes round"),
     ],
 )

@@ -1,0 +1,236 @@
+"""Special points of cycles that their Floquet multipliers show: period doublings and torus bifurcations.
+
+Each kind has a function of its own. Period doublings are zeros of det(M + I), M the monodromy matrix: a sign decides, also
+where two multipliers meet at -1. Two of them in one step leave the sign as it was and show as a dip of the function, which is
+followed to its lowest place. At a torus bifurcation a complex pair passes the unit circle (`contin.detection.hopf`); one that
+stays on it, as in a conservative system, passes nothing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.detection.hopf import hopf, hopf_points
+from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.errors import ConvergenceError
+from contin.stepping.newton import correct
+from contin.stepping.trial import TestFunction, Trial, sign_changed
+
+#: Into how many parts a step is divided to look inside it, on the cubic.
+_PARTS = 4
+#: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
+#: to this part. Ten times smaller, two period doublings that nearly meet are passed.
+_DEEPER = 0.5
+#: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. In the tail of
+#: AUTO's demo ``tor`` the doublings to the period 49 are certain, those from 54 on are not.
+_MEANINGLESS = 1e-2
+#: Part of a step before and behind a torus bifurcation where its pair must lie on different sides of the circle.
+_BESIDE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Floquet:
+    """The Floquet multipliers of a cycle, which may be larger or smaller than numbers can be.
+
+    Attributes
+    ----------
+    logarithms : ndarray of complex, shape (n,)
+        Natural logarithms of the multipliers, the largest first; a multiplier with a positive real part is unstable.
+    errors : ndarray, shape (n,)
+        Estimated errors of the logarithms: their change on a mesh halved and, for the multiplier of an autonomous system that
+        is 1, its own. NaN where the cycle is not found on that mesh.
+    unstable : int
+        Number of unstable multipliers, without the one that is 1.
+    """
+
+    logarithms: ComplexArray
+    errors: Array
+    unstable: int
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """The multipliers, shape (n,): infinite or zero where no number holds them."""
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            found: ComplexArray = np.exp(self.logarithms.real) * np.exp(1j * self.logarithms.imag)
+        return found
+
+
+def floquet(system: PeriodicCollocation, x: Array, tangent: Array) -> Floquet:
+    """Return the Floquet multipliers of a cycle with their errors; the tangent is NaN where it is not known."""
+    values, trivial = system.eigenvalues(x), _trivial(system, x)
+    finer: Any
+    finer, carry = system.refined()
+    try:
+        again = finer.eigenvalues(_corrected(finer, carry(x), carry(tangent)))
+        errors = _apart(values, again)
+    except ConvergenceError:
+        errors = np.full(values.shape, np.nan)
+    if trivial is not None:
+        errors[trivial] = abs(values[trivial])
+    return Floquet(values, errors, unstable(system, x))
+
+
+def _corrected(system: PeriodicCollocation, x: Array, tangent: Array) -> Array:
+    """Return a cycle corrected; as it is where F_x is singular there and no tangent is known."""
+    if system.size == system.equations:
+        return correct(system, x).x
+    if not np.all(np.isfinite(tangent)):
+        return x
+    row = system.weights * tangent
+    return correct(system, x, row, row @ x).x
+
+
+def _apart(values: ComplexArray, others: ComplexArray) -> Array:
+    """Return how far each of some logarithms is from its counterpart: angles are alike up to full turns."""
+    from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]  # takes .1 s; only this needs it
+
+    gaps = values[:, None] - others
+    gaps = np.abs(gaps.real + 1j * ((gaps.imag + math.pi) % (2 * math.pi) - math.pi))
+    distances: Array = gaps[linear_sum_assignment(gaps)]
+    return distances
+
+
+def _trivial(system: PeriodicCollocation, x: Array) -> int | None:
+    """Return the place of the multiplier that is 1 along every autonomous cycle; None of a forced one."""
+    return int(np.abs(system.eigenvalues(x)).argmin()) if isinstance(system, CycleCollocation) else None
+
+
+def unstable(system: PeriodicCollocation, x: Array) -> int:
+    """Return the number of unstable multipliers, without the one that is 1."""
+    outside, trivial = system.eigenvalues(x).real > 0, _trivial(system, x)
+    if trivial is not None:
+        outside[trivial] = False
+    return int(np.count_nonzero(outside))
+
+
+def doubling() -> TestFunction:
+    """Return the test function of period doublings: det(M + I), each factor divided by 1 + |multiplier|."""
+    return TestFunction("PD", "period doubling", _antiperiodic, search=_doublings, describe=_of_doubling)
+
+
+def _antiperiodic(trial: Trial) -> float:
+    system: Any = trial.system
+    values = system.eigenvalues(trial.x)
+    size = np.exp(-np.abs(values.real))
+    ahead = np.exp(1j * values.imag)
+    factors = np.where(values.real > 0, size + ahead, 1 + size * ahead) / (1 + size)
+    return float(np.prod(factors).real)
+
+
+def _of_doubling(trial: Trial) -> dict[str, float]:
+    return {"frequency": math.pi, "pairs": 1}
+
+
+def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
+    """Return the period doublings between places of a step, in order."""
+    test = doubling()
+    inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
+    looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
+    values = [test.function(trial) for _, trial in looked]
+    if not np.all(np.isfinite(values)) or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
+        return []
+    knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda place: place[0])
+    knots = sorted([*knots, *_below(segment, knots, test)], key=lambda place: place[0])
+    pieces = [(left, right) for left, right in itertools.pairwise(knots)
+              if sign_changed(left[1].value(test), right[1].value(test))]  # fmt: skip
+    return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
+
+
+def _dips(places: list[Place], values: list[float]) -> list[tuple[float, float]]:
+    """Return where, between three places of the same sign, a parabola through the values comes near zero or passes it.
+
+    With half its second derivative.
+    """
+    found = []
+    for three, at_three in zip(zip(places, places[1:], places[2:]), zip(values, values[1:], values[2:])):
+        if len(set(np.sign(at_three))) > 1:
+            continue
+        at, square, lowest = _parabola([s for s, _ in three], at_three)
+        if square > 0 and three[0][0] < at < three[2][0] and lowest < _DEEPER * min(map(abs, at_three)):
+            found.append((at, square))
+    return found
+
+
+def _parabola(places: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
+    """Return vertex, half the second derivative and value at the vertex of the parabola through three absolute values."""
+    (a, b, c), (first, middle, last) = places, map(abs, values)
+    if not a < b < c:
+        return math.nan, 0.0, math.nan
+    before, behind = (middle - first) / (b - a), (last - middle) / (c - b)
+    square = (behind - before) / (c - a)
+    linear = before + square * (b - a)  # the slope at b
+    if not square > 0:
+        return math.nan, square, math.nan
+    return b - linear / (2 * square), square, middle - linear**2 / (4 * square)
+
+
+def _below(segment: Segment, knots: list[Place], test: TestFunction) -> list[Place]:
+    """Return places of the other sign, found by following the dips between places of one sign."""
+    dips = _dips(knots, [trial.value(test) for _, trial in knots])
+    found = (_followed(segment, at, square, test) for at, square in dips)
+    return [place for place in found if place is not None]
+
+
+def _followed(segment: Segment, at: float, square: float, test: TestFunction) -> Place | None:
+    """Return a place near ``at`` where a function that dips towards zero has passed it; None where it turns before.
+
+    ``square`` is about half its second derivative: by that and the value, the lowest place is no further off than the places
+    on both sides that are looked at.
+    """
+    sign, lowest = np.sign(segment.before.value(test)), math.inf
+    while True:
+        here = at, segment.near(at)
+        value = sign * here[1].value(test)
+        if value < 0:
+            return here
+        if not value < _DEEPER * lowest:
+            return None
+        lowest = value
+        apart = math.sqrt(value / square)
+        if not 0 < at - apart < at + apart < segment.step:
+            return None
+        sides = [(s, segment.near(s)) for s in (at - apart, at + apart)]
+        values = [sign * trial.value(test) for _, trial in sides]
+        if min(values) < 0:
+            return sides[int(np.argmin(values))]
+        at, square, _ = _parabola((at - apart, at, at + apart), (values[0], value, values[1]))
+        if not square > 0 or not 0 < at < segment.step:
+            return None
+
+
+def torus() -> TestFunction:
+    """Return the test function of torus bifurcations: the largest real part of the logarithm of a complex multiplier."""
+    return TestFunction("TR", "torus", hopf().function, search=_tori)
+
+
+def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
+    """Return the torus bifurcations between places of a step, in order."""
+    return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
+
+
+def _doubtful(point: SpecialPoint) -> SpecialPoint:
+    """Return a special point, named "possible" where the multiplier that is 1 has such an error that others mean little."""
+    system: Any = point.trial.system
+    trivial = _trivial(system, point.trial.x)
+    if trivial is None or point.name.startswith("possible"):
+        return point
+    error = abs(np.expm1(system.eigenvalues(point.trial.x)[trivial]))
+    return dataclasses.replace(point, name=f"possible {point.name}") if error > _MEANINGLESS else point
+
+
+def _passes(segment: Segment, point: SpecialPoint) -> bool:
+    """Return whether the pair of a torus bifurcation lies inside the circle on one side of it, and outside on the other."""
+    if point.name.startswith("possible") or point.test is None:
+        return True
+    sides = [segment.near(point.at + way * _BESIDE * segment.step) for way in (-1, 1)]
+    before, behind = (point.test.function(trial) for trial in sides)
+    return bool(before * behind < 0)

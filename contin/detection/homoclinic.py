@@ -1,0 +1,106 @@
+"""Cycles whose period runs away: the equilibrium near which such a cycle spends its time, and the end of its branch.
+
+Near an equilibrium a cycle is slow. On its way to a homoclinic orbit, or to a saddle-node on it, the least speed falls without
+bound; where its square is round-off, the parameter no longer tells the cycle from the homoclinic orbit, and special points of
+longer cycles mean nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.discretization.cycles import CycleCollocation
+from contin.problems.cycle import PERIOD
+from contin.stepping.trial import TestFunction, Trial
+
+#: A branch ends where the least speed of a cycle is below this part of the largest: the square root of round-off. Ten times
+#: larger, homoclinic points are known to 1e-14 and not to the last digit.
+_STILL = 1e-8
+#: A cycle is looked at where its least speed is below this part of the largest, ...
+_SLOW = 0.05
+#: ... and is near an equilibrium while it is closer than this part of its size, ...
+_NEAR = 0.1
+#: ... which counts where that takes at least this part of the period.
+_MOSTLY = 0.5
+#: A coordinate of the equilibrium below this part of the cycle's size is zero: round-off of Newton's method.
+_NOTHING = 1e-13
+#: Newton's method for the equilibrium: updates at most, and the size of the last one relative to 1 + the states.
+_UPDATES, _CONVERGED = 30, 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class RestingPlace:
+    """The equilibrium near which a cycle spends most of its time.
+
+    Attributes
+    ----------
+    states : ndarray, shape (n,)
+    eigenvalues : ndarray of complex, shape (n,)
+        Those of the equilibrium, the largest real part first.
+    share : float
+        Part of the period that the cycle is near.
+    """
+
+    states: Array
+    eigenvalues: ComplexArray
+    share: float
+
+    def describe(self, names: tuple[str, ...]) -> str:
+        """Return all that as a sentence."""
+        place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, self.states))
+        values = ", ".join(_number(value) for value in self.eigenvalues if value.imag >= 0)
+        return f"the cycle spends {100 * self.share:.3g} % of its time near the equilibrium {place}, eigenvalues {values}"
+
+
+def _number(value: complex) -> str:
+    return f"{value.real:.6g} +- {value.imag:.6g} i" if value.imag else f"{value.real:.6g}"
+
+
+def homoclinic() -> TestFunction:
+    """Return the test function that ends a branch of cycles at a homoclinic orbit, unless the user has limited the period."""
+    return TestFunction("EP", "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD)
+
+
+def _liveliness(trial: Trial) -> float:
+    """Return a number that is positive where the least speed of a cycle can be told from zero."""
+    speeds = _speeds(trial.system, trial.x)
+    return float(np.log10(speeds.min() / speeds.max() / _STILL)) if speeds.min() > 0 else 1.0
+
+
+def _speeds(system: Any, x: Array) -> Array:
+    """Return the speeds of a cycle at the Gauss points, scaled, shape (N d,)."""
+    speeds: Array = np.linalg.norm(system.rates(x, system.at_gauss_points(x)), axis=1)
+    return speeds
+
+
+def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
+    """Return the equilibrium near which a cycle spends most of its time; None where there is none."""
+    points, speeds = system.at_gauss_points(x), _speeds(system, x)
+    if not speeds.min() < _SLOW * speeds.max():
+        return None
+    size = np.ptp(points, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    states = points[speeds.argmin()].copy()
+    for _ in range(_UPDATES):
+        try:
+            update = np.linalg.solve(system.rates_by_states(x, states[None])[0], system.rates(x, states[None])[0])
+        except np.linalg.LinAlgError:
+            return None
+        states -= update
+        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(states).max()):
+            break
+    else:
+        return None
+    near = np.abs((points - states) / size).max(axis=1) < _NEAR
+    share = float(system.gauss_weights @ near)
+    if share < _MOSTLY:
+        return None
+    scales = np.ones(len(states)) if system.scales is None else system.scales.states
+    eigenvalues: ComplexArray = np.linalg.eigvals(system.rates_by_states(x, states[None])[0]).astype(complex)
+    eigenvalues = eigenvalues / system.duration(x)
+    states = np.where(np.abs(states) > _NOTHING * size, states, 0.0)
+    return RestingPlace(states * scales, eigenvalues[np.argsort(-eigenvalues.real)], share)

@@ -1,0 +1,50 @@
+"""Cycles in phase: along a branch the phase condition keeps a cycle from sliding, but after a round it may have slid."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.discretization.cycles import CycleCollocation
+from contin.discretization.protocol import Discretization
+
+#: Places at which two cycles are compared: a power of two for the Fourier transform, more than any cycle needs.
+_PLACES = 2048
+#: Newton's steps from the best of these places to the best shift; the distance between places is small, three would do.
+_STEPS = 5
+
+
+@functools.singledispatch
+def in_phase(system: Discretization, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+    """Return a solution and vectors at it as they are; an autonomous cycle shifted in time to lie closest to another one."""
+    return x, list(vectors)
+
+
+@in_phase.register
+def _of_cycles(system: CycleCollocation, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+    times = (system.nodes + _shift(system, x, reference)) % 1.0
+    size = system.state_size
+
+    def moved(vector: Array) -> Array:
+        return np.concatenate([system.evaluate_scaled(vector, times).ravel(), vector[size:]])
+
+    return moved(x), [moved(vector) for vector in vectors]
+
+
+def _shift(system: CycleCollocation, x: Array, reference: Array) -> float:
+    """Return the s at which the integral of u(t + s) . v(t) is largest, v the reference."""
+    t = np.arange(_PLACES) / _PLACES
+    ours, theirs = (np.fft.fft(system.evaluate_scaled(z, t), axis=0) for z in (x, reference))
+    products = np.sum(ours * theirs.conj(), axis=1)
+    frequencies = 2 * np.pi * np.fft.fftfreq(_PLACES, 1 / _PLACES)
+    s = float(np.fft.ifft(products).real.argmax()) / _PLACES
+    for _ in range(_STEPS):
+        waves = products * np.exp(1j * frequencies * s)
+        slope, bend = float((1j * frequencies * waves).sum().real), float((-(frequencies**2) * waves).sum().real)
+        if not bend < 0:
+            break
+        s -= slope / bend
+    return s

@@ -1,0 +1,137 @@
+"""Pictures of one point, drawn by matplotlib: its phase portrait, its states over time, its Floquet multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.detection.floquet import floquet
+from contin.discretization.collocation import Collocation
+from contin.discretization.cycles import PeriodicCollocation
+from contin.errors import ProblemError
+from contin.results.axes import new_axes
+
+#: Places at which a solution is drawn, for each interval of its mesh, and at least.
+_PER_INTERVAL, _FEWEST = 8, 400
+#: Colours of states (Okabe-Ito: told apart by the colour-blind), in order; more states begin anew.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+#: States in a picture over time: more cannot be told apart.
+_MOST_STATES = len(_COLOURS)
+#: Powers of ten of the circles that are drawn beyond the unit circle, at most.
+_MOST_RINGS = 6
+
+
+def plot(point: Any, what: str | None, states: Sequence[str] | None, axes: Any) -> Any:
+    """Draw one point; see `contin.Point.plot`."""
+    system = point.system
+    if not isinstance(system, Collocation):
+        raise ProblemError("plot: the point must be a solution over t, of a BoundaryValueProblem or CycleProblem")
+    drawings = _drawings(system)
+    if what is not None and what not in drawings:
+        raise ProblemError(f"what: {checks.shown(what)} must be one of {', '.join(drawings)}")
+    names = _chosen(system, states)
+    if what is not None:
+        axes = new_axes() if axes is None else axes
+        drawings[what](point, names, axes)
+        return axes
+    if axes is None:
+        axes = new_axes(len(drawings))
+    given = list(np.ravel(axes))
+    if len(given) != len(drawings):
+        raise ProblemError(f"axes: {len(given)} given, must be {len(drawings)}, or one with what = {', '.join(drawings)}")
+    for draw, panel in zip(drawings.values(), given):
+        draw(point, names, panel)
+    return axes
+
+
+def _drawings(system: Collocation) -> dict[str, Callable[[Any, tuple[str, ...], Any], None]]:
+    """Return the pictures that there are of a point, by name."""
+    found: dict[str, Callable[[Any, tuple[str, ...], Any], None]] = {}
+    if len(system.problem.state_names) > 1:
+        found["portrait"] = _portrait
+    found["series"] = _series
+    if isinstance(system, PeriodicCollocation):
+        found["multipliers"] = _multipliers
+    return found
+
+
+def _chosen(system: Collocation, states: Sequence[str] | None) -> tuple[str, ...]:
+    known = system.problem.state_names
+    if states is None:
+        return known
+    names = checks.names("states", states)
+    for name in names:
+        if name not in known:
+            raise ProblemError(f"states: {checks.shown(name)} is no state; there are {', '.join(known)}")
+    if len(names) < 2:
+        raise ProblemError("states: there must be two at least")
+    return names
+
+
+def _course(point: Any, names: Sequence[str]) -> tuple[Array, Array, str]:
+    """Return times in the user's units (K,), states (K, n), and the name of time."""
+    system = point.system
+    a, b = system.problem.domain
+    t = np.unique(np.concatenate([np.linspace(a, b, max(_FEWEST, _PER_INTERVAL * system.intervals)), system.mesh]))
+    which = [system.problem.state_names.index(name) for name in names]
+    states = system.evaluate(point.x, t)[:, which]
+    return (t * system.duration(point.x) if isinstance(system, PeriodicCollocation) else t), states, "t"
+
+
+def _portrait(point: Any, names: tuple[str, ...], axes: Any) -> None:
+    """Draw the second state against the first, with an arrow in the sense of time."""
+    _, states, _ = _course(point, names[:2])
+    x, y = states.T
+    axes.plot(x, y, lw=1.5, color=_COLOURS[0])
+    at = len(x) // 8
+    axes.annotate(
+        "", xy=(x[at + 1], y[at + 1]), xytext=(x[at], y[at]),
+        arrowprops={"arrowstyle": "-|>", "color": _COLOURS[0], "mutation_scale": 18, "shrinkA": 0, "shrinkB": 0},
+    )  # fmt: skip
+    axes.margins(0.08)
+    axes.set(xlabel=names[0], ylabel=names[1])
+
+
+def _series(point: Any, names: tuple[str, ...], axes: Any) -> None:
+    """Draw the states over time."""
+    t, states, time = _course(point, names[:_MOST_STATES])
+    for name, column, colour in zip(names, states.T, _COLOURS):
+        axes.plot(t, column, lw=1.5, color=colour, label=name)
+    axes.margins(x=0)
+    axes.set(xlabel=time)
+    if len(names) > 1:
+        axes.legend(frameon=False, ncols=min(len(names), 4), loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    else:
+        axes.set(ylabel=names[0])
+
+
+def _multipliers(point: Any, names: tuple[str, ...], axes: Any) -> None:
+    """Draw the Floquet multipliers and the unit circle; outside of it distances from 0 are 1 + log10 |multiplier|."""
+    found = floquet(point.system, point.x, point.tangent)
+    size = found.logarithms.real
+    radius = np.where(size > 0, 1 + size / np.log(10), np.exp(np.minimum(size, 0)))
+    places = radius * np.exp(1j * found.logarithms.imag)
+    outside = size > 0
+    if found.unstable < np.count_nonzero(outside):  # the multiplier that is 1 counts on no side
+        outside[np.abs(found.logarithms).argmin()] = False
+    rings = int(min(np.ceil(max(radius.max() - 1, 0)), _MOST_RINGS))
+    angle = np.linspace(0, 2 * np.pi, 400)
+    for ring in range(rings + 1):
+        style: dict[str, Any] = {"lw": 0.6, "color": "#BBBBBB", "ls": ":"} if ring else {"lw": 1.0, "color": "#000000"}
+        axes.plot((1 + ring) * np.cos(angle), (1 + ring) * np.sin(angle), zorder=1, **style)
+        if ring:
+            axes.annotate(f"$10^{ring}$", (0, 1 + ring), ha="center", va="center", fontsize=8, color="#666666",
+                          bbox={"fc": "white", "ec": "none", "pad": 0.5})  # fmt: skip
+    for which, colour, name in ((~outside, _COLOURS[0], "not outside"), (outside, _COLOURS[1], "outside")):
+        if np.any(which):
+            here = places[which]
+            axes.scatter(here.real, here.imag, s=40, color=colour, zorder=2, label=f"{len(here)} {name}")
+    width = 1.25 * max(1.0, min(radius.max(), 1 + _MOST_RINGS))
+    axes.set(xlim=(-width, width), ylim=(-width, width), aspect="equal", xlabel="real part", ylabel="imaginary part")
+    if rings:
+        axes.set(xticks=[], yticks=[], xlabel="real part (logarithmic outside)")
+    axes.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
