@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import math
 import time
 from pathlib import Path
@@ -20,7 +21,9 @@ from branches.job import Interruption, is_done, writing
 from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
 from branches.store import BranchWriter, Kind
-from contin import BranchPoint, Continuation, MeshControl, Point, ProblemError, Settings, Stop, exact_text
+from contin import BranchPoint, ContinError, Continuation, MeshControl, Point, ProblemError, Settings, Stop, exact_text
+from ribbon_model.changed_ends import with_ends
+from ribbon_model.ends import ANGLES, angles_of
 from ribbon_model.open_strip import REACTIONS, OpenStrip
 
 #: A state keeps a symmetry that moves it by less than this.
@@ -73,37 +76,67 @@ def _run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite
     began = time.perf_counter()
     if is_done(path, config, display, resume, overwrite):
         return "complete"
-    strip = config.strip()
     start = first_state(config)
-    with contextlib.closing(writer_of(config, strip, path)) as writer:
+    with contextlib.closing(writer_of(config, path)) as writer:
         display.begin_stages(config)
-        outcome, stop = _followed(config, strip, start, writer, display)
+        outcome, stop = _followed(config, start, writer, display)
         display.stages_summary(config, writer.events(), writer.count, time.perf_counter() - began, path, (outcome, stop))
     return outcome
 
 
-def writer_of(config: OpenConfig, strip: OpenStrip, path: Path | None) -> BranchWriter:
+def writer_of(config: OpenConfig, path: Path | None) -> BranchWriter:
     """Return the writer of the result file."""
     meaning = {
         name: f"{_WORDS[name.removeprefix('start_')[0]]} on the strip at its {'first' if name[0] == 's' else 'last'} end, "
         f"along the {name.rpartition('_')[2]} of the first one" for name in REACTIONS
     }  # fmt: skip
-    columns = (("stage", "i4", MEANINGS["stage"]), *((name, "f8", text) for name, text in meaning.items()))
+    columns = (("stage", "i4", MEANINGS["stage"]), ("potential", "f8", MEANINGS["potential"]))
+    columns += tuple((name, "f8", text) for name, text in meaning.items())
     length = "1" if config.dimensions is None else f"1 ({exact_text(config.dimensions.length)} m)"
     modulus = "1" if config.dimensions is None else f"1 ({config.dimensions.modulus:.12g} N m^2)"
-    kind = Kind(OPEN, f"bending modulus B = {modulus}, length L = {length}", columns, _Row(strip))
+    table = Table.of(config)
+    kind = Kind(OPEN, f"bending modulus B = {modulus}, length L = {length}", columns, _Row(config, table))
     followed = list(dict.fromkeys(stage.follow for stage in config.stages))
-    return BranchWriter(path, dump(config), strip.problem, followed, config.stride, watch=Watch(strip), kind=kind)
+    return BranchWriter(path, dump(config), table, followed, config.stride, watch=Watch(config.strip()), kind=kind)
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """Names of states and columns of all stages together, as `branches.store.BranchWriter` takes those of a problem."""
+
+    states: tuple[str, ...]
+    parameters: tuple[str, ...]
+    functionals: tuple[str, ...]
+    multipliers: tuple[str, ...]
+
+    @classmethod
+    def of(cls, config: OpenConfig) -> Table:
+        """Return those of a scene."""
+        problems = [config.strip(number).problem for number in range(1, len(config.stages) + 1)]
+        parameters, functionals, multipliers = (
+            tuple(dict.fromkeys(itertools.chain.from_iterable(getattr(problem, kind) for problem in problems)))
+            for kind in ("parameters", "functionals", "multipliers")
+        )
+        functionals = tuple(name for name in functionals if name not in parameters)
+        return cls(tuple(problems[0].states), parameters, functionals, multipliers)
 
 
 class _Row:
-    """The further columns of a point: its stage and the reactions. ``stage`` is set by the run."""
+    """The further columns of a point: its stage, the reactions, and numbers that its stage does not have.
 
-    def __init__(self, strip: OpenStrip):
-        self._strip, self.stage = strip, 1
+    Loads that do not act are zero; angles that are not prescribed are those of the last end. ``stage`` is set by the run.
+    """
+
+    def __init__(self, config: OpenConfig, table: Table):
+        self._config, self._names, self.stage = config, (*table.parameters, *table.functionals), 1
 
     def __call__(self, point: Point) -> dict:
-        return {"stage": self.stage, **self._strip.reactions(point)}
+        strip, states = self._config.strip(self.stage), point.system.states(point.x)
+        absent = {name: 0.0 for name in self._names if name not in point.parameters and name not in point.functionals}
+        if set(ANGLES) & set(absent):
+            absent |= dict(zip(ANGLES, angles_of(states[-1, :4])))
+        own = {"stage": self.stage, "potential": strip.potential(point), **strip.reactions_of(states)}
+        return absent | own
 
 
 def first_state(config: OpenConfig) -> Point:
@@ -134,14 +167,14 @@ def _mesh_control(config: OpenConfig) -> MeshControl:
     return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every)
 
 
-def _followed(config, strip, start: Point, writer: BranchWriter, display) -> tuple[str, Stop | None]:
+def _followed(config, start: Point, writer: BranchWriter, display) -> tuple[str, Stop | None]:
     """Follow all stages; return the outcome and the reason why the last one stopped."""
     labelled: list[list[Point]] = []
     run = None
     with Interruption() as interruption:
         for number, stage in enumerate(config.stages, 1):
             try:
-                following = _run(config, strip, stage, start if number == 1 else _origin(stage, labelled))
+                following = _run(config, number, start if number == 1 else _origin(stage, labelled))
             except ConfigError as error:
                 if run is None:
                     raise
@@ -163,7 +196,8 @@ def _followed(config, strip, start: Point, writer: BranchWriter, display) -> tup
                     return "interrupted", None
             writer.flush()
             if run.stop.reason == "no convergence" or run.stop.message.startswith("met "):
-                stop = dataclasses.replace(run.stop, message=f"stage {number}: {strip.explained(run)}", advice="")
+                why = config.strip(number).explained(run)
+                stop = dataclasses.replace(run.stop, message=f"stage {number}: {why}", advice="")
                 writer.checkpoint(run.start, "lost", stop)
                 return "lost", stop
         writer.checkpoint(run.start, "complete", run.stop)
@@ -191,35 +225,60 @@ def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
     return found[place - 1]
 
 
-def _run(config: OpenConfig, strip: OpenStrip, stage: StageConfig, origin: Point) -> Continuation:
+def _run(config: OpenConfig, number: int, origin: Point) -> Continuation:
     """Return the run of a stage."""
-    here, to = origin[stage.follow], stage.to / config.factor(stage.follow)
-    leaves = stage.start_at is not None and stage.start_at.startswith("BP")
-    switched = leaves and isinstance(origin.details, BranchPoint)
-    if leaves and not switched:
+    stage, strip = config.stages[number - 1], config.strip(number)
+    changed = origin.system.problem is not strip.problem or bool(stage.numbers)
+    if stage.start_at is not None and stage.start_at.startswith("BP"):
+        return Continuation(origin.system, origin.x, *_switched(config, number, origin, changed))
+    if not changed:
+        system, x = origin.system.with_free((stage.follow, *strip.problem.multipliers), origin.x)
+        return Continuation(system, x, _settings(config, number, origin[stage.follow]))
+    numbers = {name: value / config.factor(name) for name, value in stage.numbers.items()}
+    try:
+        system, x = with_ends(strip, origin, stage.follow, numbers)
+        return Continuation(system, x, _settings(config, number, system.parameter(x, stage.follow)))
+    except ValueError as error:
+        raise ConfigError(f"start, finish: {error}") from error
+    except ContinError as error:
+        raise ConfigError(f"numbers: no state was found near the one before ({error}); follow them in a stage") from error
+
+
+def _switched(config: OpenConfig, number: int, origin: Point, changed: bool) -> tuple[Settings, np.ndarray]:
+    """Return the settings and the first tangent of a stage that leaves a branch point.
+
+    Raises
+    ------
+    ConfigError
+        No single branch leaves it, or not in this stage.
+    """
+    stage = config.stages[number - 1]
+    if not isinstance(origin.details, BranchPoint):
         raise ConfigError(
             f"start_at: {stage.start_at!r}: {origin.nullity} modes are neutral there, and no single branch leaves it; a phase "
             "or an imperfection tells the modes apart"
         )
+    if changed:
+        raise ConfigError(f"start_at: {stage.start_at!r}: a branch point is left with the ends and the numbers that led to it")
+    if origin.system.free[0] != stage.follow:
+        raise ConfigError(
+            f"follow: {stage.follow!r}: a branch point is left with the number that led to it, {origin.system.free[0]}"
+        )
+    way = 1 if stage.way == "forward" else -1
+    settings = dataclasses.replace(_settings(config, number, origin[stage.follow]), direction=way)
+    return settings, way * origin.details.tangents[1]
+
+
+def _settings(config: OpenConfig, number: int, here: float) -> Settings:
+    """Return the settings of a stage that starts where its number has the value ``here``."""
+    stage, steps = config.stages[number - 1], config.steps
+    to = stage.to / config.factor(stage.follow)
     reach = abs(to - here) or 1.0
     limits = {stage.follow: (min(to, here - reach), max(to, here + reach))}
     limits |= {name: tuple(end / config.factor(name) for end in ends) for name, ends in stage.limits.items()}
     zeros = {name: [value / config.factor(name) for value in values] for name, values in stage.label.items()}
-    steps = config.steps
-    forward = 1 if stage.way == "forward" else -1
-    direction = forward if switched else int(np.sign(to - here)) or 1
-    settings = Settings(
-        primary=stage.follow, direction=direction, step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
-        max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits, zeros=zeros,
-        mesh=_mesh_control(config), test_functions=strip.domain_tests(),
+    return Settings(
+        primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
+        max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits, zeros=zeros,
+        mesh=_mesh_control(config), test_functions=config.strip(number).domain_tests(),
     )  # fmt: skip
-    free = (stage.follow, *strip.problem.multipliers)
-    if switched:
-        system, x = origin.system, origin.x
-        if system.free[0] != stage.follow:
-            raise ConfigError(
-                f"follow: {stage.follow!r}: a branch point is left with the number that led to it, {system.free[0]}"
-            )
-        return Continuation(system, x, settings, forward * origin.details.tangents[1])
-    system, x = origin.system.with_free(free, origin.x)
-    return Continuation(system, x, settings)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -123,9 +124,7 @@ class OpenStrip:
     @property
     def known(self) -> tuple[str, ...]:
         """Names of the numbers that can be given here, besides those of the material."""
-        forces = tuple(
-            name for name, axis in zip(FORCES, DIRECTIONS.values()) if not _spanned(axis, self.finish.held)
-        )  # fmt: skip
+        forces = forces_of(self.finish)
         along = np.array(self.finish.held).reshape(-1, 3) @ self.stroke_direction
         stroke = (STROKE,) if np.any(abs(along) > _LOOSE) else ()
         return (*ends.numbers_of(self.finish), *stroke, *forces, *(name for name in LOADS if name not in FORCES))
@@ -420,13 +419,24 @@ class OpenStrip:
 
     def reactions(self, point: Point) -> dict[str, float]:
         """Return the force and the moment on the strip at the last end, then at the first one, on the lab axes."""
-        states = point.system.states(point.x)
+        return self.reactions_of(point.system.states(point.x))
+
+    def reactions_of(self, states: np.ndarray) -> dict[str, float]:
+        """Return the same from the states (K, 2n) at the nodes."""
         n = self.problem.dimension
         values = []
         for row, sign in ((states[-1], 1.0), (states[0], -1.0)):
             q, lam = row[:4], row[n : n + 7]
             values += [*(sign * lam[4:7]), *(sign * _moment(q, lam[:4]))]
         return dict(zip(REACTIONS, map(float, values)))
+
+    def potential(self, point: Point) -> float:
+        """Return the energy with the potential of the dead loads at the last end: that of which the index is."""
+        loads = self._end_energy()
+        if loads is None:
+            return point["energy"]
+        last = point.system.states(point.x)[-1]
+        return point["energy"] + float(loads(None, _LastEnd(*last[:7]), _Numbers(point.parameters)))
 
     def strains(self, system: Collocation, x: np.ndarray) -> np.ndarray:
         """Return omega_1, omega_2 and omega_3 (K, 3) at the nodes of a discretized state."""
@@ -468,6 +478,10 @@ def _together(names: tuple[str, ...]) -> Callable:
         return lambda t, x, lam: 0
     rest, last, place = _together(names[:-1]), PHASES[names[-1]], len(names) - 1
     return lambda t, x, lam: rest(t, x, lam) + lam[place] * last(t, x)
+
+
+#: States of the last end, as the potential of its loads takes them.
+_LastEnd = namedtuple("_LastEnd", (*FRAME, *CENTRELINE))
 
 
 class _Numbers:
@@ -520,6 +534,16 @@ def _moved(state, k: int, n: int) -> np.ndarray:
         change[:4] = ends.product((0, *axis / 2), state[:4])
         change[4:7] = np.cross(axis, state[4:7])
     return change
+
+
+def forces_of(finish: End) -> tuple[str, ...]:
+    """Return the names of the dead forces that can act on the last end: along directions in which its place is not held."""
+    return tuple(name for name, axis in zip(FORCES, DIRECTIONS.values()) if not _spanned(axis, finish.held))
+
+
+def replacing_loads(finish: End) -> tuple[str, ...]:
+    """Return the names of the dead loads that can replace reactions of the last end: forces, and the moment of a hinge."""
+    return (*forces_of(finish), *(("moment",) if finish.rotation in (HINGED, JOINT) else ()))
 
 
 def _spanned(axis, held) -> bool:

@@ -33,6 +33,9 @@ MISTAKES = {
     TIP.replace("to: -6", "too: -6"): "the field 'stages.0.to' is missing",
     TIP.replace("force_width", "force"): "stage 1: follow: 'force' must be one of the numbers here",
     TIP.replace("-6}", "-6, start_at: BP}"): "stage 1: start_at: the first stage starts from the first state",
+    TIP.replace("-6}", "-6, finish: clamped}"): "stage 1: start, finish, numbers: those of the scene are the first stage's",
+    TIP.replace("-6}", "-6}, {follow: force_width, to: 0, finish: clamped}"): "stage 2: follow: 'force_width' must be one of",
+    TIP.replace("-6}", "-6}, {follow: force_width, to: 0, numbers: {bend: 1}}"): "stage 2: numbers: 'bend' must be one of",
     TIP + "closed: {half_twists: 1}\n": "closed: must not be given together with start or finish",
     TIP + "numbers: {distance: 1}\n": "numbers: distance is used by nothing here",
     TIP + "along: {kappa_n: 'exp(x)'}\n": "along: kappa_n: 'exp(x)': 'x' is not allowed",
@@ -184,6 +187,34 @@ def test_points_that_later_stages_miss(tmp_path):
         assert run_stages(parse(ring + stages % start_at, "scene"), path, Display(silent=True)) == "lost"
         branch = read_branch(path)
         assert sentence in branch.stop and set(branch.points["stage"]) == {1}
+
+
+@pytest.mark.full
+def test_ends_that_change(root, tmp_path):
+    """States agree whether a number or its conjugate is prescribed, and the fold is that of the moment."""
+    path = tmp_path / "release.h5"
+    assert run_stages(load(root / "configs" / "open_release.yaml"), path, Display(silent=True)) == "complete"
+    branch = read_branch(path)
+    stages = [branch.points[branch.points["stage"] == number] for number in (1, 2, 3, 4)]
+    for before, after in ((stages[0], stages[1]), (stages[2], stages[3])):
+        for name in ("distance", "energy", "F_tangent", "M_width", "F_normal"):
+            assert after[0][name] == pytest.approx(before[-1][name], rel=1e-8, abs=1e-8)
+    assert stages[1][0]["force_tangent"] == pytest.approx(stages[0][-1]["F_tangent"], rel=1e-8)
+    assert stages[3][0]["moment"] == pytest.approx(stages[2][-1]["M_width"], rel=1e-8)
+    assert stages[0][0]["moment"] == 0 and stages[3][0]["distance"] == pytest.approx(0.9)
+    (fold,) = branch.events[branch.events["label"] == b"LP"]
+    assert (fold["stage"], fold["index_before"], fold["index_after"]) == (4, 0, 1)
+    assert branch.plot(3).axes and len(branch.strains(len(branch.points) - 1))
+
+
+def test_ends_that_let_go_of_a_moment(tmp_path):
+    """The run ends with what is not carried, and keeps what was computed."""
+    text = "material: {law: rod, B1: 1, B2: 4, C: 0.8}\nnumbers: {distance: 0.98}\nbegin: arch\n"
+    text += "stages: [{follow: distance, to: 0.97}, {follow: distance, to: 0.9, finish: ball joint}]\n"
+    path = tmp_path / "arch.h5"
+    assert run_stages(parse(text, "scene"), path, Display(silent=True)) == "lost"
+    branch = read_branch(path)
+    assert branch.stop.startswith("stage 2: start, finish: they let go of what no load replaces") and len(branch.points) > 2
 
 
 @pytest.mark.full
