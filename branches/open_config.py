@@ -19,6 +19,7 @@ from contin import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH
 from ribbon_model.material import Material
+from ribbon_model.plate import RIGIDITIES
 
 #: Ends in one word or two.
 _WORDS: dict[str, dict] = {
@@ -41,6 +42,8 @@ MEANINGS = {
     "force_tangent": "along the tangent; negative compresses", "moment": "dead moment about the hinge of the last end",
     "weight": "weight per length", "foundation": "stiffness per length of the foundation",
     "kappa_n": "natural curvature about the width", "kappa_2": "natural curvature about the normal", "tau_n": "natural twist",
+    "D11": "bending stiffness of the plate along the strip, times the width", "D12": "its coupling",
+    "D22": "bending stiffness across the strip", "D66": "twisting stiffness",
     "nu": "Poisson's ratio", "Gamma": "w^2/(h L) of the law finite width", "softness": "compliance about the normal",
     "energy": "elastic energy, zero in the natural state, and potential of weight and foundation",
     "potential": "energy and the potential of dead loads at the last end: the one of which the index is",
@@ -268,7 +271,7 @@ class OpenConfig(Strict):
         law = values.pop("law", None)
         if self.dimensions is not None:
             d = self.dimensions
-            given = [name for name in ("nu", "Gamma") if name in values]
+            given = [name for name in ("nu", "Gamma", *RIGIDITIES) if name in values]
             if given or law not in (None, FINITE_WIDTH.name):
                 raise ValueError(f"material: {(given or ['law'])[0]} must not be given together with dimensions")
             law = FINITE_WIDTH.name

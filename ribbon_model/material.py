@@ -16,7 +16,10 @@ import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, LAWS, Law
+from ribbon_model import plate
+from ribbon_model.finite_width import isotropic, section_energy
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, LAWS, RIBBON, Law
+from ribbon_model.plate import RIGIDITIES
 
 #: The general Kirchhoff rod, which is no law of the paper.
 ROD = "rod"
@@ -26,6 +29,8 @@ STIFFNESSES = ("B1", "B2", "C")
 NATURAL = ("kappa_n", "kappa_2", "tau_n")
 #: Laws that may have a natural twist: quadratic ones. For the others the energy with one is another function.
 _TWISTED = (ROD, FLAT_ROD.name, ISOTROPIC_ROD.name)
+#: Laws of strips of a plate, which may be orthotropic, with their Hamiltonians then.
+_ORTHOTROPIC = {FLAT_ROD.name: plate.flat_rod, RIBBON.name: plate.ribbon, FINITE_WIDTH.name: plate.finite_width}
 #: Functions in expressions along the strip; all can be differentiated.
 _FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "sqrt", "sinh", "cosh", "tanh", "atan")
 #: Longest expression. A longer one is a table that should be shorter: each is compiled as one formula.
@@ -47,7 +52,8 @@ class Material:
     law : str
         A law of the paper ('ribbon', 'flat rod', 'isotropic rod', 'finite width'), or 'rod'.
     numbers : mapping of str to float
-        Values by name: ``nu``, ``Gamma``, or ``B1``, ``B2``, ``C``, natural strains ``kappa_n``, ``kappa_2``, ``tau_n``, and
+        Values by name: ``nu``, ``Gamma``, or ``B1``, ``B2``, ``C``; for a strip of an orthotropic plate ``D11``, ``D12``,
+        ``D22``, ``D66`` instead of ``nu`` (`ribbon_model.plate`); natural strains ``kappa_n``, ``kappa_2``, ``tau_n``, and
         further names that expressions use. An infinite ``B2`` is a strip that does not bend in its plane.
     along : mapping of str to str
         Expressions in s (from 0 to 1) and numbers, for a natural strain, ``width`` or ``thickness`` (relative to s = 0).
@@ -104,24 +110,34 @@ class Material:
                 raise ValueError(f"along: {name}: its value at s = {step / _STEPS:g} must be {allowed}")
 
     def _check(self, numbers: Mapping[str, float]) -> None:
-        own = (*self.needed, *NATURAL, "softness", "Gamma", *STIFFNESSES)
+        own = (*self.needed, *NATURAL, "softness", "Gamma", "nu", *STIFFNESSES, *RIGIDITIES)
         for name, value in numbers.items():
             infinite = name == "B2" and value == math.inf
             if name in own and name not in (*self.needed, *self.natural, "softness"):
                 raise ValueError(f"{name}: is not a number of the law {self.law!r}")
             if not (math.isfinite(value) or infinite):
                 raise ValueError(f"{name}: {value:g} must be finite")
-            if name in STIFFNESSES and not value > 0:
+            if name in (*STIFFNESSES, "D11", "D22", "D66") and not value > 0:
                 raise ValueError(f"{name}: {value:g} must be positive")
             if name == "nu" and not -1 < value <= 0.5:
                 raise ValueError(f"nu: {value:g} must be greater than -1 and at most 0.5")
             if name in ("Gamma", "softness") and not value >= 0:
                 raise ValueError(f"{name}: {value:g} must not be negative")
+        if self.orthotropic and not numbers["D11"] * numbers["D22"] > numbers["D12"] ** 2:
+            raise ValueError(f"D12: {numbers['D12']:g} must be smaller than the square root of D11 D22")
 
     @property
     def needed(self) -> tuple[str, ...]:
         """Names of the numbers that must be given."""
-        return STIFFNESSES if self.law == ROD else LAWS[self.law].parameters
+        if self.law == ROD:
+            return STIFFNESSES
+        own = LAWS[self.law].parameters
+        return (*RIGIDITIES, *(name for name in own if name != "nu")) if self.orthotropic else own
+
+    @property
+    def orthotropic(self) -> bool:
+        """True if the stiffnesses of a plate stand in place of nu."""
+        return self.law in _ORTHOTROPIC and any(name in self.numbers for name in RIGIDITIES)
 
     @property
     def natural(self) -> tuple[str, ...]:
@@ -197,11 +213,37 @@ class Material:
 
             return rod
         complementary, width, thickness = law.hamiltonian, self.datum("width"), self.datum("thickness")
+        if self.orthotropic:
+            return self._orthotropic_section()
         if law.has_width:
             return lambda t, M1, M2, M3, kappa_n, p: (
                 complementary(M1, M2, M3, kappa_n, p.nu, p.Gamma * width(t, p) ** 2 / thickness(t, p)) - kappa_n * kappa_n / 2
             )
         return lambda t, M1, M2, M3, kappa_n, p: complementary(M1, M2, M3, kappa_n, p.nu) - kappa_n * kappa_n / 2
+
+    def _orthotropic_section(self) -> Callable[..., float]:
+        """Return the same for a strip of an orthotropic plate."""
+        section, width, thickness = _ORTHOTROPIC[self.law], self.datum("width"), self.datum("thickness")
+        if self.law == FINITE_WIDTH.name:
+            return lambda t, M1, M2, M3, kappa_n, p: section(
+                M1, M2, M3, kappa_n, p.D11, p.D12, p.D22, p.D66, p.Gamma * width(t, p) ** 2 / thickness(t, p)
+            )
+        return lambda t, M1, M2, M3, kappa_n, p: section(M1, M2, M3, kappa_n, p.D11, p.D12, p.D22, p.D66)
+
+    def other_side(self, p) -> float:
+        """Return k of a ribbon, for which bending to the other side lowers the energy where M1 + k kappa_n < 0.
+
+        There the H of omega_1 of either sign are equal. For an orthotropic plate that holds without kappa_n, or where D12 +
+        2 D66 = sqrt(D11 D22); otherwise it is an estimate.
+        """
+        return p.D11 + math.sqrt(p.D11 / p.D22) * p.D12 if self.orthotropic else 1 + p.nu
+
+    def curvatures(self, t: float, w1: float, w3: float, p) -> tuple[float, float, float]:
+        """Return U_11, U_13 and U_33 of the law of finite width at a place, up to a factor."""
+        Gamma = p.Gamma * self.datum("width")(t, p) ** 2 / self.datum("thickness")(t, p)
+        section = plate.wide_section_of(p.D11, p.D12, p.D22, p.D66, Gamma) if self.orthotropic else isotropic(p.nu, Gamma)
+        _, _, _, U11, U13, U33, *_ = section_energy(w1, w3, self.datum("kappa_n")(t, p), section)
+        return U11, U13, U33
 
 
 # --- expressions ------------------------------------------------------------------------------------------------------------

@@ -385,6 +385,8 @@ class OpenStrip:
     def _ribbon_margin(self, trial: Trial) -> float:
         """Return the least M1 + (1 + nu) kappa_n at the nodes, over the largest: the law holds where it is positive.
 
+        For an orthotropic plate see `Material.other_side`.
+
         With p and a of `ribbon_hamiltonian`, the two roots a belong to omega_1 of either sign, and their H differ by
         sqrt(p**2 + M3**2) (p + 2 nu kappa_n)/2. Where that is negative, bending to the other side lowers the energy at this
         moment: strips with an inflection of this kind need the width.
@@ -394,7 +396,7 @@ class OpenStrip:
         natural, n = self.material.datum("kappa_n"), self.problem.dimension
         kappa_n = np.array([natural(t, p) for t in system.nodes])
         moments = _components(states.T[:4], states.T[n : n + 4])[0]
-        values = moments + (1 + p.nu) * kappa_n
+        values = moments + self.material.other_side(p) * kappa_n
         return float(values.min() / max(abs(values).max(), _LOOSE))
 
     def _convexity(self, trial: Trial) -> float:
@@ -406,12 +408,9 @@ class OpenStrip:
             return -1.0
         places = np.concatenate([omega, (omega[1:] + omega[:-1]) / 2])
         t = np.concatenate([system.nodes, (system.nodes[1:] + system.nodes[:-1]) / 2])
-        data = [self.material.datum(name) for name in ("kappa_n", "width", "thickness")]
         least = math.inf
         for s, (w1, _, w3) in zip(t, places):
-            kappa_n, width, thickness = (datum(s, p) for datum in data)
-            here = _Numbers({"kappa_n": kappa_n, "nu": p.nu, "Gamma": p.Gamma * width**2 / thickness})
-            U11, U13, U33 = FINITE_WIDTH.curvatures_at(w1, w3, here)
+            U11, U13, U33 = self.material.curvatures(s, w1, w3, p)
             least = min(least, (U11 * U33 - U13**2) / (U11 * U33) if U11 > 0 and U33 > 0 else -1.0)
         return least
 
