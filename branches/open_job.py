@@ -1,8 +1,7 @@
 """Run the stages of an open strip, one after the other, into one result file.
 
-A stage starts from a labelled point of an earlier one, by default from its end. An interrupted run is computed again from its
-beginning by ``--resume``: a scene takes seconds, and later stages need branch points of earlier ones with all that was found
-there.
+A stage starts from a labelled point of an earlier one, by default from its end. An interrupted run goes on from its last point:
+the file keeps the state of its stage, and the labelled points of all stages with everything that a later stage needs of them.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import contextlib
 import dataclasses
 import itertools
 import math
+import tempfile
 import time
 from pathlib import Path
 
@@ -20,8 +20,21 @@ from branches.config import ConfigError, dump
 from branches.job import Interruption, is_done, writing
 from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
-from branches.store import BranchWriter, Kind
-from contin import BranchPoint, ContinError, Continuation, MeshControl, Point, ProblemError, Settings, Stop, exact_text
+from branches.store import BranchWriter, Kind, read_kept, read_state
+from contin import (
+    Branch,
+    BranchPoint,
+    ContinError,
+    Continuation,
+    MeshControl,
+    Point,
+    ProblemError,
+    Settings,
+    Stop,
+    exact_text,
+    load,
+    save,
+)  # fmt: skip
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, angles_of
 from ribbon_model.open_strip import REACTIONS, OpenStrip
@@ -76,16 +89,46 @@ def _run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite
     began = time.perf_counter()
     if is_done(path, config, display, resume, overwrite):
         return "complete"
-    start = first_state(config)
-    with contextlib.closing(writer_of(config, path)) as writer:
-        display.begin_stages(config)
-        outcome, stop = _followed(config, start, writer, display)
+    run, labelled, image = _resumed(config, path) if resume else (_run(config, 1, first_state(config)), [[]], None)
+    with contextlib.closing(writer_of(config, path, image)) as writer:
+        display.begin_stages(config, writer.count, len(writer.events()))
+        outcome, stop = _followed(config, (run, labelled), writer, display)
         display.stages_summary(config, writer.events(), writer.count, time.perf_counter() - began, path, (outcome, stop))
     return outcome
 
 
-def writer_of(config: OpenConfig, path: Path | None) -> BranchWriter:
-    """Return the writer of the result file."""
+def _resumed(config: OpenConfig, path: Path) -> tuple[Continuation, list[list[Point]], bytes | None]:
+    """Return the run that continues the file, the labelled points so far by stage, and the image of the file."""
+    rows, kept = read_kept(path)
+    if not len(rows):  # it was interrupted before its first step
+        return _run(config, 1, first_state(config)), [[]], None
+    number, labelled = int(rows["stage"][-1]), []
+    for stage in range(1, number + 1):
+        count = np.count_nonzero((rows["stage"] == stage) & (rows["label"] != b""))
+        labelled.append(_points(config.strip(stage).problem, kept[f"stage {stage}"])[:count])
+    strip, stage = config.strip(number), config.stages[number - 1]
+    state, start, _, image = read_state(path, strip.problem, (stage.follow, *strip.problem.multipliers))
+    here = start[0].parameter(start[1], stage.follow)
+    run = Continuation(state.system, state.x, _settings(config, number, here), state=state, start=start)
+    return run, labelled, image
+
+
+def _image(points: list[Point]) -> bytes:
+    """Return labelled points of a stage as a file of `contin.save`."""
+    with tempfile.TemporaryDirectory() as folder:
+        save(Branch(points), Path(folder, "points.npz"))
+        return Path(folder, "points.npz").read_bytes()
+
+
+def _points(problem, image: bytes) -> list[Point]:
+    """Return the points of an `_image`."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "points.npz").write_bytes(image)
+        return load(problem, Path(folder, "points.npz")).points
+
+
+def writer_of(config: OpenConfig, path: Path | None, image: bytes | None = None) -> BranchWriter:
+    """Return the writer of the result file; ``image`` is that of an unfinished one."""
     meaning = {
         name: f"{_WORDS[name.removeprefix('start_')[0]]} on the strip at its {'first' if name[0] == 's' else 'last'} end, "
         f"along the {name.rpartition('_')[2]} of the first one" for name in REACTIONS
@@ -97,7 +140,7 @@ def writer_of(config: OpenConfig, path: Path | None) -> BranchWriter:
     table = Table.of(config)
     kind = Kind(OPEN, f"bending modulus B = {modulus}, length L = {length}", columns, _Row(config, table))
     followed = list(dict.fromkeys(stage.follow for stage in config.stages))
-    return BranchWriter(path, dump(config), table, followed, config.stride, watch=Watch(config.strip()), kind=kind)
+    return BranchWriter(path, dump(config), table, followed, config.stride, image, Watch(config.strip()), kind)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,41 +210,71 @@ def _mesh_control(config: OpenConfig) -> MeshControl:
     return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every)
 
 
-def _followed(config, start: Point, writer: BranchWriter, display) -> tuple[str, Stop | None]:
-    """Follow all stages; return the outcome and the reason why the last one stopped."""
-    labelled: list[list[Point]] = []
-    run = None
+def _followed(config: OpenConfig, begun, writer: BranchWriter, display) -> tuple[str, Stop | None]:
+    """Follow a stage that has begun (its run, and the labelled points so far by stage), and all later ones.
+
+    Returns
+    -------
+    outcome, stop
+        The outcome, and the reason why the last stage stopped.
+    """
+    run, labelled = begun
+    writer.kept = _Kept(labelled)
     with Interruption() as interruption:
-        for number, stage in enumerate(config.stages, 1):
-            try:
-                following = _run(config, number, start if number == 1 else _origin(stage, labelled))
-            except ConfigError as error:
-                if run is None:
-                    raise
-                stop = Stop("scene", f"stage {number}: {error}")
-                writer.checkpoint(run.start, "lost", stop)
-                return "lost", stop
-            run = following
-            labelled.append([])
-            writer.kind.values.stage = number
-            display.stage(config, number)
-            for point in run:
-                display.stage_point(config, stage, point, writer.count)
-                writer.append(point)
-                labelled[-1] += [point] if point.label else []
-                if writer.due():
-                    writer.checkpoint(run.start, "running")
-                if interruption.asked:
-                    writer.checkpoint(run.start, "interrupted")
-                    return "interrupted", None
-            writer.flush()
-            if run.stop.reason == "no convergence" or run.stop.message.startswith("met "):
-                why = config.strip(number).explained(run)
-                stop = dataclasses.replace(run.stop, message=f"stage {number}: {why}", advice="")
-                writer.checkpoint(run.start, "lost", stop)
-                return "lost", stop
+        for number in range(len(labelled), len(config.stages) + 1):
+            if number > len(labelled):
+                try:
+                    run = _run(config, number, _origin(config.stages[number - 1], labelled))
+                except ConfigError as error:
+                    stop = Stop("scene", f"stage {number}: {error}")
+                    writer.checkpoint(run.start, "lost", stop)
+                    return "lost", stop
+                labelled.append([])
+            ended = _through(config, run, labelled, writer, (display, interruption))
+            if ended is not None:
+                return ended
         writer.checkpoint(run.start, "complete", run.stop)
     return "complete", run.stop
+
+
+class _Kept:
+    """The labelled points of all stages as the file keeps them for a resumed run; made anew where there are more."""
+
+    def __init__(self, labelled: list[list[Point]]):
+        self._labelled = labelled
+        self._images: dict[tuple[int, int], bytes] = {}
+
+    def __call__(self) -> dict[str, bytes]:
+        keys = [(number, len(points)) for number, points in enumerate(self._labelled, 1) if points]
+        self._images = {key: self._images.get(key) or _image(self._labelled[key[0] - 1]) for key in keys}
+        return {f"stage {number}": self._images[number, count] for number, count in keys}
+
+
+def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWriter, others) -> tuple[str, Stop | None] | None:
+    """Follow the last of the stages that have begun; return outcome and reason if that ends the run, otherwise None."""
+    (display, interruption), number = others, len(labelled)
+    writer.kind.values.stage = number
+    display.stage(config, number)
+    for point in run:
+        display.stage_point(config, config.stages[number - 1], point, writer.count)
+        writer.append(point)
+        labelled[-1] += [point] if point.label else []
+        if point.label and point.name != "start":
+            continue  # inside a step: a run cannot be resumed from here
+        if run.state.system.scales is None:  # states with scales are not stored; such a stage begins again
+            writer.mark(run.state)
+        if interruption.asked:
+            writer.checkpoint(run.start, "interrupted")
+            return "interrupted", None
+        if writer.due():
+            writer.checkpoint(run.start, "running")
+    writer.flush()
+    if run.stop.reason == "no convergence" or run.stop.message.startswith("met "):
+        why = config.strip(number).explained(run)
+        stop = dataclasses.replace(run.stop, message=f"stage {number}: {why}", advice="")
+        writer.checkpoint(run.start, "lost", stop)
+        return "lost", stop
+    return None
 
 
 def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:

@@ -158,21 +158,43 @@ def test_what_other_commands_say(tip, root, command, words, sentence):
     assert done.returncode == 2 and sentence in done.err and done.err.count("\n") == 1
 
 
-def test_interrupted_and_run_again(root, tmp_path):
-    """Ctrl-C keeps the points so far; --resume computes the scene again, to the same points."""
+def test_interrupted_and_run_again(tip, root, tmp_path, tables):
+    """Ctrl-C keeps the points so far; --resume goes on from there, in any stage, to the same bits."""
+    config, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
+    shown = []
 
     class Interrupts(Display):
+        def __init__(self, at):
+            super().__init__(silent=True)
+            self.at = at
+
         def stage_point(self, config, stage, point, number):
-            if number == 5:
+            shown.append(number)
+            if number == self.at:
                 signal.raise_signal(signal.SIGINT)
 
-    config, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
-    assert run_stages(config, path, Interrupts(silent=True)) == "interrupted"
-    assert read_branch(path).status == "interrupted" and len(read_branch(path).points) == 6
+    stage = read_branch(tip).points["stage"]
+    places = [0, 5, int(np.flatnonzero(stage == 2)[0]), len(stage) - 2]
+    for place in places:
+        assert run_stages(config, path, Interrupts(place), resume=place > 0) == "interrupted"
+        assert read_branch(path).status == "interrupted" and len(read_branch(path).points) == place + 1
     with pytest.raises(StoreError, match="unfinished run of this scene; --resume"):
         run_stages(config, path, Display(silent=True))
-    assert run_stages(config, path, Display(silent=True), resume=True) == "complete"
-    assert len(read_branch(path).points) > 20
+    assert run_stages(config, path, Interrupts(None), resume=True) == "complete"
+    assert shown == sorted(shown) and len(shown) < len(stage) + len(places)  # nothing is computed twice but ends inside a step
+    assert tables(path) == tables(tip)
+
+
+def test_a_scene_with_further_stages_goes_on(tip, root, tmp_path, tables):
+    """The file of the first stage alone becomes that of both."""
+    both, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
+    one = both.model_copy(update={"stages": both.stages[:1]})
+    assert run_stages(one, path, Display(silent=True)) == "complete"
+    assert run_stages(both, path, Display(silent=True), resume=True) == "complete"
+    assert tables(path) == tables(tip)
+    other = both.model_copy(update={"stages": [both.stages[1], both.stages[1]]})
+    with pytest.raises(StoreError, match="holds another scene"):
+        run_stages(other, path, Display(silent=True), resume=True)
 
 
 def test_points_that_later_stages_miss(tmp_path):
