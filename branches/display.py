@@ -182,6 +182,17 @@ class Display:
 
         self.clear()
         self.note(f"  {name_of(config)}: {'FAILED: ' + problem if problem else describe(nodes)}")
+        self._to_go(settled)
+
+    def sweep_done(self, lines: list[str], problem: str, settled: int) -> None:
+        """Show one of many open strips, as `branch_done`; ``lines`` are what it is, and its stages."""
+        if self._quiet:
+            return
+        self.clear()
+        self.note("\n".join(f"  {line}" for line in lines) + (f": FAILED: {problem}" if problem else ""))
+        self._to_go(settled)
+
+    def _to_go(self, settled: int) -> None:
         each = (time.monotonic() - self._began) / (settled - self._kept)
         self._line(f"{settled} of {self._total} branches, about {duration(each * (self._total - settled))} to go")
 

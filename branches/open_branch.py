@@ -146,11 +146,18 @@ class OpenBranch(StoredBranch):
             rows = np.flatnonzero(self.points["stage"] == stage)
             ends = sorted({rows[0], rows[-1], *(row for row in rows if row in special)})
             for first, last in pairwise(ends):
-                index = self._index(np.arange(first, last + 1))
+                index = self.index_on(np.arange(first, last + 1))
                 found.append(Piece(int(stage), np.arange(first, last + 1), None if index < 0 else index == 0))
         return found
 
-    def _index(self, rows: np.ndarray) -> int:
+    def origin(self, stage: int) -> int:
+        """Return the point of an earlier stage from which a stage starts."""
+        one = self.scene.stages[stage - 1]
+        events = self.events[self.events["stage"] == (one.stage or stage - 1)]
+        place = one.place_among([(event["label"].decode(), event["name"].decode()) for event in events])
+        return int(events["point"][place])
+
+    def index_on(self, rows: np.ndarray) -> int:
         """Return the index on a piece, that of its points which are not special; -1 if they differ or there are none."""
         regular = [row for row in rows if self.points["label"][row] not in (b"LP", b"BP")]
         values = set(self.points["index"][regular].tolist())

@@ -10,6 +10,7 @@ import functools
 import itertools
 import math
 import re
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -169,6 +170,14 @@ class StageConfig(Strict):
         if self.start_at is not None and not re.fullmatch(r"(EP|BP|LP|UZ)( [1-9][0-9]{0,2})?", self.start_at):
             raise ValueError(f"start_at: {self.start_at!r} must be a label with a number, as in BP 1, LP 2, UZ 1")
         return self
+
+    def place_among(self, labelled: Sequence[tuple[str, str]]) -> int | None:
+        """Return which of the labelled points (label, name) of a stage this one starts from; None if there is none."""
+        if self.start_at is None:
+            return len(labelled) - 1
+        label, _, count = self.start_at.partition(" ")
+        found = [place for place, (other, name) in enumerate(labelled) if other == label and name != "start"]
+        return found[int(count or 1) - 1] if int(count or 1) <= len(found) else None
 
 
 def _expression(value: Any) -> Any:

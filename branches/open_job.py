@@ -97,6 +97,19 @@ def _run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite
     return outcome
 
 
+def compute_stages(config: OpenConfig, display) -> tuple[bytes, str]:
+    """Return the image of the result file of a scene that is followed in memory, and the reason of a failure or ''.
+
+    Raises
+    ------
+    ConfigError
+    """
+    begun = _run(config, 1, first_state(config)), [[]]
+    with contextlib.closing(writer_of(config, None)) as writer:
+        outcome, stop = _followed(config, begun, writer, display)
+        return writer.image(), "" if outcome == "complete" else str(stop or outcome)
+
+
 def _resumed(config: OpenConfig, path: Path) -> tuple[Continuation, list[list[Point]], bytes | None]:
     """Return the run that continues the file, the labelled points so far by stage, and the image of the file."""
     rows, kept = read_kept(path)
@@ -287,15 +300,11 @@ def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
     """
     source = stage.stage or len(labelled)
     points = labelled[source - 1]
-    if stage.start_at is None:
-        return points[-1]
-    label, _, count = stage.start_at.partition(" ")
-    found = [point for point in points if point.label == label and point.name != "start"]
-    place = int(count or 1)
-    if place > len(found):
+    place = stage.place_among([(point.label, point.name) for point in points])
+    if place is None:
         there = ", ".join(point.label for point in points)
         raise ConfigError(f"start_at: {stage.start_at!r} is not among the points of stage {source}: {there}")
-    return found[place - 1]
+    return points[place]
 
 
 def _run(config: OpenConfig, number: int, origin: Point) -> Continuation:

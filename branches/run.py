@@ -61,11 +61,12 @@ def main(argv=None) -> int:
 
 
 def _run(options) -> int:
-    from branches.config import Config, ConfigError, DiagramConfig, load
+    from branches.config import Config, ConfigError, load
+    from branches.fields import Strict
 
     try:
         config = load(options.config, options.set)
-        if isinstance(config, DiagramConfig):
+        if not isinstance(config, Strict):
             return _run_diagram(config, options)
         path = output_path(options)
     except ConfigError as error:
@@ -107,16 +108,20 @@ def _run_diagram(config, options) -> int:
     folder = Path(options.out or Path(options.config).stem)
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
+    from branches.config import DiagramConfig
     from branches.progress import StartingDisplay
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
-    from branches.diagram import run_diagram
+    if isinstance(config, DiagramConfig):
+        from branches.diagram import run_diagram as run
+    else:
+        from branches.open_sweep import run_sweep as run
     from branches.executor import ExecutorError
     from branches.files import StoreError
     from contin import ContinError
 
     try:
-        outcome = run_diagram(
+        outcome = run(
             config, folder, display, scheduler=options.scheduler, workers=options.workers, time_limit=options.time_limit,
             overwrite=options.overwrite,
         )  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 from browser import CHROMIUM, Browser
 
 import contin
-from branches import export, run
+from branches import export, graph, open_graph, run
 from branches.config import ConfigError, dump, load, parse
 from branches.display import Display
 from branches.explore import __main__ as page
@@ -36,6 +36,10 @@ MISTAKES = {
     TIP.replace("-6}", "-6, finish: clamped}"): "stage 1: start, finish, numbers: those of the scene are the first stage's",
     TIP.replace("-6}", "-6}, {follow: force_width, to: 0, finish: clamped}"): "stage 2: follow: 'force_width' must be one of",
     TIP.replace("-6}", "-6}, {follow: force_width, to: 0, numbers: {bend: 1}}"): "stage 2: numbers: 'bend' must be one of",
+    TIP.replace("0.3", "[]"): "material.nu: must be a number, or a list of numbers, not []",
+    TIP.replace("0.3", "[0.3, 0.30]"): "the branch nu = 0.3 is listed twice",
+    TIP.replace("0.3", "[0.8, 0.9]"): "none of its branches can be run (nu: 0.8 must be",
+    TIP.replace("0.3", "[0.2, 0.3]").replace("to: -6", "too: -6"): "the field 'stages.0.to' is missing",
     TIP + "closed: {half_twists: 1}\n": "closed: must not be given together with start or finish",
     TIP + "numbers: {distance: 1}\n": "numbers: distance is used by nothing here",
     TIP + "along: {kappa_n: 'exp(x)'}\n": "along: kappa_n: 'exp(x)': 'x' is not allowed",
@@ -195,6 +199,43 @@ def test_a_scene_with_further_stages_goes_on(tip, root, tmp_path, tables):
     other = both.model_copy(update={"stages": [both.stages[1], both.stages[1]]})
     with pytest.raises(StoreError, match="holds another scene"):
         run_stages(other, path, Display(silent=True), resume=True)
+
+
+def test_a_scene_of_many_strips(call, tmp_path):
+    """Lists give one result for each combination, and one graph: the tip loads of Michell, 4.0126 sqrt(2/(1 + nu))."""
+    (tmp_path / "tip.yaml").write_text(TIP.replace("nu: 0.3", "nu: [0.2, 0.9, 0.5]").replace("to: -6", "to: [-5, -6]"))
+    done = call(run.main, "tip.yaml", "--out", "tips", "--workers", "1")
+    assert done.returncode == 0 and "4 branches" in done.out
+    assert "left out: nu = 0.9, stage 1 to = -5: nu: 0.9 must be" in done.out
+    assert sorted(path.name for path in (tmp_path / "tips").glob("*.h5")) == [
+        f"nu{nu}_stage_1_to{to}.h5" for nu in (0.2, 0.5) for to in (-5, -6)
+    ]  # fmt: skip
+    diagram = graph.read(tmp_path / "tips")
+    found = {data["nu"]: data["force_width"] for _, data in diagram.nodes(data=True) if data["kind"] == "branch point"}
+    for nu, force in found.items():
+        assert force == pytest.approx(-4.012599 * math.sqrt(2 / (1 + nu)), rel=1e-6)
+    assert len(found) == 2 and diagram.number_of_edges() == 7  # that of nu = 0.2 is beyond -5
+    listed = call(graph.main, "tips")
+    assert "nu = 0.2, stage 1 to = -5\n  stage 1, force_width: 0 -> -5\n" in listed.out
+    assert "nu = 0.5, stage 1 to = -5\n  stage 1, force_width: 0 -> branch point at -4.63" in listed.out
+    for words in (["tips", "--at", "3"], ["tips", "--folds", "0", "1"]):
+        refused = call(graph.main, *words)
+        assert refused.returncode == 2 and "without --where, --at and --folds" in refused.err
+    again = call(run.main, "tip.yaml", "--out", "tips")
+    assert again.returncode == 0 and "4 of them computed before" in again.out
+    (tmp_path / "tip.yaml").write_text(TIP.replace("nu: 0.3", "nu: [0.2, 0.4]"))
+    other = call(run.main, "tip.yaml", "--out", "tips")
+    assert other.returncode == 2 and "holds another scene" in other.err
+
+
+def test_a_stage_begins_at_the_node_of_the_one_before(tip):
+    """The graph of one result: the second stage leaves the branch point of the first one."""
+    one = open_graph.new_graph("")
+    open_graph.add_result(one, read_branch(tip), "tip.h5", {"nu": 0.3})
+    edges = [(data["ends"], data["stage"], data["index"]) for *_, data in one.edges(data=True)]
+    point = edges[0][0][1]
+    assert "stage 1, branch point" in point and [ends[0] for ends, stage, _ in edges if stage == 2] == [point]
+    assert [index for *_, index in edges] == [0, 1, 0]
 
 
 def test_points_that_later_stages_miss(tmp_path):
