@@ -183,7 +183,7 @@ class OpenBranch(StoredBranch):
 
     def _below(self, piece: Piece, row: int, name: str, value: float) -> dict[str, float] | None:
         """Return the columns of a stable piece where the followed number has a value, None if it does not get there."""
-        if self.followed(piece.stage) != name or not self._same_strip(piece.rows[0], row, name):
+        if self.followed(piece.stage) != name or not self.same_strip(piece.rows[0], row, name):
             return None
         x, conjugate = self.points[name][piece.rows], self.conjugate(name)
         for i in range(len(x) - 1):
@@ -197,8 +197,8 @@ class OpenBranch(StoredBranch):
         near = rows[max(i - 1, 0) : i + 3]
         return float(BarycentricInterpolator(self.points[name][near], column[near])(value))
 
-    def _same_strip(self, first: int, second: int, name: str) -> bool:
-        """Return whether two points agree in what is held, and in all prescribed numbers but the followed one."""
+    def same_strip(self, first: int, second: int, name: str = "") -> bool:
+        """Return whether two points agree in what is held, and in all prescribed numbers but the named one."""
         strip, same = (self.scene.strip(int(self.points["stage"][row])) for row in (first, second))
         if strip is not same:
             return False

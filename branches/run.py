@@ -87,7 +87,22 @@ def _run(options) -> int:
     except (ConfigError, StoreError, ContinError) as error:
         display.clear()
         return _refuse(error)
+    if outcome == "complete" and not isinstance(config, Config):
+        _tell_barriers(path, display, options.quiet)
     return {"complete": 0, "interrupted": interrupt.EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
+
+
+def _tell_barriers(path, display, quiet: bool) -> None:
+    """Print the barriers of the stable states of an open strip."""
+    from threadpoolctl import threadpool_limits
+
+    from branches.open_barriers import report
+    from branches.read import read_branch
+
+    with threadpool_limits(1, "blas"):  # the matrices are small
+        lines = report(read_branch(path), quiet)
+    if lines:
+        display.note("\n".join(lines))
 
 
 def _run_diagram(config, options) -> int:

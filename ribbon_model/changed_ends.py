@@ -16,7 +16,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contin import Collocation, Point
+from contin import Collocation, Point, correct, point_of
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, FREE, PLACE
 from ribbon_model.open_strip import FORCES, STROKE, OpenStrip
@@ -82,6 +82,20 @@ def angles_near(q, near) -> tuple[float, float, float]:
     return best[0], best[1], best[2]
 
 
+def corrected(strip: OpenStrip, near: Collocation, states: np.ndarray, values: Mapping[str, float]) -> Point:
+    """Return the state of a strip with these numbers next to given states (K, 2n) at the nodes of a system.
+
+    Raises
+    ------
+    ConvergenceError
+        There is none nearby.
+    """
+    multipliers = strip.problem.multipliers
+    values = _fitted(strip, states, dict(values), multipliers)[0]
+    system = Collocation(strip.problem, near.mesh, near.degree, multipliers, values)
+    return point_of(system, correct(system, system.pack(states, values)).x)
+
+
 def _balanced(strip: OpenStrip, states: np.ndarray, values: dict[str, float]) -> dict[str, float]:
     """Return the values with the loads and multipliers that replace the reactions.
 
@@ -90,21 +104,25 @@ def _balanced(strip: OpenStrip, states: np.ndarray, values: dict[str, float]) ->
     ValueError
     """
     problem, names = strip.problem, [name for name in (*FORCES, "moment") if name in strip.numbers]
-    unknown = [*names, *problem.multipliers]
-    order = list(problem.parameters)
-    p = np.array([values.get(name, problem.parameters[name]) for name in order])
-    places = np.array([order.index(name) for name in unknown], dtype=np.int64)
-    batch = problem.batch("boundary")
-    missed, slopes = batch.jacobian(np.zeros(1), states[:1], states[-1:], p, batch.colouring(places))
-    missed, by_loads = missed[0], slopes[0][:, 2 * states.shape[1] :]
-    change = np.linalg.lstsq(by_loads, -missed, rcond=None)[0]
-    left = np.abs(missed + by_loads @ change)
+    values, left = _fitted(strip, states, values, [*names, *problem.multipliers])
     conditions = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
     if left[:conditions].max(initial=0.0) > _HOLDS:
         raise ValueError("they hold a place or a rotation that the state does not have (the first end has moved or turned)")
     if left[conditions:].max(initial=0.0) > _HOLDS * (1 + np.abs(states[[0, -1], 7:]).max()):
         raise ValueError(_unbalanced(strip, states))
-    return values | dict(zip(unknown, (p[places] + change).tolist()))
+    return values
+
+
+def _fitted(strip: OpenStrip, states: np.ndarray, values: dict[str, float], unknown) -> tuple[dict[str, float], np.ndarray]:
+    """Return the values with those of the unknown numbers that fit the conditions at the ends best, and what is left."""
+    problem, order = strip.problem, list(strip.problem.parameters)
+    p = np.array([values.get(name, problem.parameters[name]) for name in order])
+    places = np.array([order.index(name) for name in unknown], dtype=np.int64)
+    batch = problem.batch("boundary")
+    missed, slopes = batch.jacobian(np.zeros(1), states[:1], states[-1:], p, batch.colouring(places))
+    missed, by_unknown = missed[0], slopes[0][:, 2 * states.shape[1] :]
+    change = np.linalg.lstsq(by_unknown, -missed, rcond=None)[0]
+    return values | dict(zip(unknown, (p[places] + change).tolist())), np.abs(missed + by_unknown @ change)
 
 
 def _unbalanced(strip: OpenStrip, states: np.ndarray) -> str:

@@ -11,10 +11,13 @@ a rod add M.omega_n. A section whose modulus is f times that of the first one ha
 from __future__ import annotations
 
 import ast
+import functools
 import math
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from ribbon_model import plate
 from ribbon_model.finite_width import isotropic, section_energy
@@ -230,6 +233,54 @@ class Material:
             )
         return lambda t, M1, M2, M3, kappa_n, p: section(M1, M2, M3, kappa_n, p.D11, p.D12, p.D22, p.D66)
 
+    def strain_energy(self, t: np.ndarray, strains: np.ndarray, p) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return U, zero in the natural state, the moment dU/d(omega) and the stiffness D2U at places t (K,).
+
+        Components of the strains (K, 3) that cannot change are ignored, and have no moment.
+        """
+        data, factor = [self.datum(name) for name in NATURAL], self._factor()
+        natural = np.array([[datum(s, p) for datum in data] for s in t])
+        modulus = np.array([factor(s, p) for s in t])
+        if self.law in (RIBBON.name, FINITE_WIDTH.name):
+            U, moment, stiffness = self._wide_energy(t, strains, natural[:, 0], p)
+        else:
+            moduli, change = self._moduli(p), strains - natural
+            U, moment = (moduli * change * change).sum(axis=1) / 2, moduli * change
+            stiffness = np.broadcast_to(np.diag(moduli), (len(t), 3, 3)).copy()
+        if self.constrained and p.softness > 0:
+            bent = strains[:, 1] - natural[:, 1]
+            U, moment[:, 1] = U + bent * bent / (2 * p.softness), bent / p.softness
+            stiffness[:, 1, 1] = 1 / p.softness
+        return modulus * U, modulus[:, None] * moment, modulus[:, None, None] * stiffness
+
+    def _moduli(self, p) -> np.ndarray:
+        """Return the three stiffnesses of a quadratic law; zero where omega_2 = 0."""
+        if self.law == ROD:
+            return np.array([p.B1, 0.0 if self.constrained else p.B2, p.C])
+        if self.orthotropic:
+            return np.array([p.D11 - p.D12**2 / p.D22, 0.0, 4 * p.D66])
+        twisting = 1 / (1 + p.nu)
+        return np.array([1.0, 1.0, twisting] if self.law == ISOTROPIC_ROD.name else [1.0, 0.0, 2 * twisting])
+
+    def _wide_energy(self, t: np.ndarray, strains: np.ndarray, kappa_n: np.ndarray, p) -> tuple[np.ndarray, ...]:
+        """Return `strain_energy` of a ribbon (infinite unless omega_1 > 0) or a strip of finite width."""
+        U, moment, stiffness = np.full(len(t), math.inf), np.zeros((len(t), 3)), np.zeros((len(t), 3, 3))
+        modulus = p.D22 if self.orthotropic else 1.0
+        for i, (w1, _, w3) in enumerate(strains):
+            if self.law == RIBBON.name and not w1 > 0:
+                continue
+            U[i], U1, U3, U11, U13, U33, *_ = section_energy(w1, w3, kappa_n[i], self._section_at(t[i], p))
+            moment[i, ::2], stiffness[i, ::2, ::2] = (U1, U3), ((U11, U13), (U13, U33))
+        return modulus * U, modulus * moment, modulus * stiffness
+
+    def _section_at(self, t: float, p) -> tuple:
+        """Return the section of a ribbon or a strip of finite width at a place, as `finite_width.isotropic`."""
+        rigidities = (p.D11, p.D12, p.D22, p.D66) if self.orthotropic else (1.0, p.nu, 1.0, (1 - p.nu) / 2)
+        if self.law == RIBBON.name:
+            return plate.section_of(*rigidities)
+        Gamma = p.Gamma * self.datum("width")(t, p) ** 2 / self.datum("thickness")(t, p)
+        return plate.wide_section_of(*rigidities, Gamma) if self.orthotropic else isotropic(p.nu, Gamma)
+
     def other_side(self, p) -> float:
         """Return k of a ribbon, for which bending to the other side lowers the energy where M1 + k kappa_n < 0.
 
@@ -240,9 +291,7 @@ class Material:
 
     def curvatures(self, t: float, w1: float, w3: float, p) -> tuple[float, float, float]:
         """Return U_11, U_13 and U_33 of the law of finite width at a place, up to a factor."""
-        Gamma = p.Gamma * self.datum("width")(t, p) ** 2 / self.datum("thickness")(t, p)
-        section = plate.wide_section_of(p.D11, p.D12, p.D22, p.D66, Gamma) if self.orthotropic else isotropic(p.nu, Gamma)
-        _, _, _, U11, U13, U33, *_ = section_energy(w1, w3, self.datum("kappa_n")(t, p), section)
+        _, _, _, U11, U13, U33, *_ = section_energy(w1, w3, self.datum("kappa_n")(t, p), self._section_at(t, p))
         return U11, U13, U33
 
 
@@ -257,6 +306,7 @@ def _zero(t, p):
     return 0.0
 
 
+@functools.lru_cache(maxsize=1000)  # a strip of segments asks for its data at every step downhill
 def compiled(text: str, names: tuple[str, ...]) -> Datum:
     """Return an expression in s, pi, functions and these names as a function of (t, p), with the names as fields of p.
 

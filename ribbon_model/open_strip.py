@@ -439,8 +439,11 @@ class OpenStrip:
 
     def strains(self, system: Collocation, x: np.ndarray) -> np.ndarray:
         """Return omega_1, omega_2 and omega_3 (K, 3) at the nodes of a discretized state."""
-        u = system.states(x)
-        return strains_of(u[:, :4], self.problem.batch("field").values(system.nodes, u, u[:0], system.all_parameters(x)))
+        return self.strains_at(system.nodes, system.states(x), system.all_parameters(x))
+
+    def strains_at(self, t: np.ndarray, states: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Return the same at places t (K,) with states (K, 2n) and the values of all parameters."""
+        return strains_of(states[:, :4], self.problem.batch("field").values(t, states, states[:0], p))
 
     def shape(self, point: Point) -> Shape:
         """Return the strip in space, of length 1."""
