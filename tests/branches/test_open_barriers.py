@@ -20,7 +20,7 @@ def twisted(tmp_path_factory, root):
 
 @pytest.mark.full
 def test_barriers_are_differences_of_the_potential(twisted):
-    """Of points that the run has located at this turn. The two states of 5.5 are beside one saddle; that of 3 and its image, too."""
+    """Of points that the run has located at this turn: two states beside a saddle at 5.5, one and its image at 3."""
     located = {}
     for event in twisted.events[twisted.events["label"] == b"UZ"]:
         located.setdefault((round(float(event["turn"]), 6), int(event["index"])), []).append(float(event["potential"]))
