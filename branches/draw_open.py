@@ -24,7 +24,8 @@ WORDS = {
     "force_tangent": "force along the tangent", "force_width": "force along the width",
     "force_normal": "force along the normal", "moment": "moment at the hinge", "weight": "weight per length",
     "foundation": "stiffness of the foundation", "kappa_n": "natural curvature", "tau_n": "natural twist",
-    "softness": "softness in the plane", "F_tangent": "force along the tangent", "F_width": "force along the width",
+    "roller": "place at the roller", "F_roller": "force of the roller", "softness": "softness in the plane",
+    "F_tangent": "force along the tangent", "F_width": "force along the width",
     "F_normal": "force along the normal", "M_tangent": "moment about the tangent", "M_width": "moment about the width",
     "M_normal": "moment about the normal", "energy": "energy",
 }  # fmt: skip

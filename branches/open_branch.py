@@ -23,7 +23,7 @@ from ribbon_model.shape import Shape
 CONJUGATE = {
     "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
     "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
-    "weight": "rise",
+    "weight": "rise", "roller": "F_roller",
 }  # fmt: skip
 #: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
 _SAME = 1e-6

@@ -29,7 +29,7 @@ _WORDS: dict[str, dict] = {
 }  # fmt: skip
 #: What a number is measured in: the power of the length, the power of the modulus B, and the name of the unit.
 _UNITS = {
-    **dict.fromkeys((*PLACE, "stroke"), (1, 0, "m")), **dict.fromkeys(ANGLES, (0, 0, "rad")),
+    **dict.fromkeys((*PLACE, "stroke", "roller"), (1, 0, "m")), **dict.fromkeys(ANGLES, (0, 0, "rad")),
     **dict.fromkeys(("force_width", "force_normal", "force_tangent"), (-2, 1, "N")), "moment": (-1, 1, "N m"),
     "weight": (-3, 1, "N/m"), "foundation": (-4, 1, "N/m^2"), **dict.fromkeys(("kappa_n", "kappa_2", "tau_n"), (-1, 0, "1/m")),
     **dict.fromkeys(("energy", "potential"), (-1, 1, "J")),
@@ -39,6 +39,7 @@ MEANINGS = {
     "distance": "place of the last end along the tangent of the first one", "rise": "along its normal",
     "shear": "along its width", "turn": "angle of the last end about the tangent of the first one",
     "bend": "about its width", "swing": "about its normal", "stroke": "further displacement of the last end",
+    "roller": "place of the strip at the roller, along the direction in which it holds",
     "force_width": "dead force at the last end along the width", "force_normal": "along the normal",
     "force_tangent": "along the tangent; negative compresses", "moment": "dead moment about the hinge of the last end",
     "weight": "weight per length", "foundation": "stiffness per length of the foundation",
@@ -125,6 +126,13 @@ class DirectionsConfig(Strict):
     weight: Direction = (0.0, -1.0, 0.0)
     foundation: Direction = DIRECTIONS["normal"]
     stroke: Direction = DIRECTIONS["tangent"]
+
+
+class RollerConfig(Strict):
+    """A support between the ends."""
+
+    at: float = Field(gt=0, lt=1, description="where along the strip, over its length")
+    held: Direction = Field(DIRECTIONS["normal"], description="direction in which the place is held")
 
 
 class DimensionsConfig(Strict):
@@ -220,6 +228,7 @@ class OpenConfig(Strict):
     start: EndWords = EndConfig()
     finish: EndWords = EndConfig()
     closed: ClosedConfig | None = None
+    roller: RollerConfig | None = None
     numbers: dict[str, float] = Field(default_factory=dict)
     directions: DirectionsConfig = DirectionsConfig()
     begin: Literal["natural", "arch", "arch, other side", "twisted", "circle"] = "natural"
@@ -327,13 +336,14 @@ class OpenConfig(Strict):
 
     def _strip_with(self, start: EndConfig, finish: EndConfig, changed: bool):
         """Return the strip with these ends; once they have changed, with all loads that can replace reactions."""
-        from ribbon_model.open_strip import LOADS, STROKE, OpenStrip, replacing_loads
+        from ribbon_model.open_strip import LOADS, STROKE, OpenStrip, Roller, replacing_loads
 
         ends, where = (start.end(), finish.end()), self.directions
         directions, material = (where.weight, where.foundation, where.stroke), self._material()
         replacing = replacing_loads(ends[1])
         unknown = {"moment"} - set(replacing)
-        known = set(OpenStrip(material, *ends, {}, *directions).known) - unknown
+        more = (tuple(self.phases), Roller(self.roller.at, self.roller.held) if self.roller else None)
+        known = set(OpenStrip(material, *ends, {}, *directions, *more).known) - unknown
         numbers = {name: value / self.factor(name) for name, value in self.numbers.items()}
         if self.closed is not None:
             numbers = {**dict.fromkeys((*PLACE, *ANGLES), 0.0), "turn": math.pi * self.closed.half_twists, **numbers}
@@ -342,7 +352,7 @@ class OpenConfig(Strict):
         for name in itertools.chain.from_iterable((stage.follow, *stage.numbers) for stage in self.stages):
             if name in (STROKE, *LOADS) and name in known:
                 numbers.setdefault(name, 0.0)
-        return OpenStrip(material, *ends, numbers, *directions, tuple(self.phases))
+        return OpenStrip(material, *ends, numbers, *directions, *more)
 
     @property
     def name(self) -> str:

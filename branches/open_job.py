@@ -148,6 +148,7 @@ def writer_of(config: OpenConfig, path: Path | None, image: bytes | None = None)
     }  # fmt: skip
     columns = (("stage", "i4", MEANINGS["stage"]), ("potential", "f8", MEANINGS["potential"]))
     columns += tuple((name, "f8", text) for name, text in meaning.items())
+    columns += (("F_roller", "f8", "force of the roller on the strip"),) if config.roller else ()
     length = "1" if config.dimensions is None else f"1 ({exact_text(config.dimensions.length)} m)"
     modulus = "1" if config.dimensions is None else f"1 ({config.dimensions.modulus:.12g} N m^2)"
     table = Table.of(config)
@@ -211,16 +212,20 @@ def first_state(config: OpenConfig) -> Point:
         "circle": lambda: strip.twisted_circle(half_twists), "twisted": lambda: strip.twisted(turn),
     }  # fmt: skip
     try:
-        return strip.first_point(
-            guesses[config.begin](), intervals=mesh.intervals, degree=mesh.degree, mesh=_mesh_control(config)
-        )
+        guess, values, intervals = guesses[config.begin](), None, mesh.intervals
+        if strip.roller is not None:
+            intervals = strip.roller.intervals(mesh.intervals)
+            if guess is not None and "roller" not in config.numbers:  # it touches the strip where it is
+                values = {"roller": float(np.dot(guess(strip.roller.at)[4:7], strip.roller.direction))}
+        return strip.first_point(guess, values, intervals, mesh.degree, mesh=_mesh_control(config))
     except (ProblemError, ValueError) as error:
         raise ConfigError(f"begin: {config.begin}: {error}") from error
 
 
 def _mesh_control(config: OpenConfig) -> MeshControl:
     mesh = config.mesh
-    return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every)
+    every = 0 if config.roller else mesh.adapt_every  # a mesh point stays at the roller
+    return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, every)
 
 
 def _followed(config: OpenConfig, begun, writer: BranchWriter, display) -> tuple[str, Stop | None]:

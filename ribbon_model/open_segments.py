@@ -242,6 +242,8 @@ def unsupported(strip: OpenStrip) -> str:
     """Return why there are no chains of segments of a strip, '' if there are."""
     if strip.phases:
         return "a strip with phases"
+    if strip.roller is not None:
+        return "a strip with a roller"
     if JOINT in (strip.start.rotation, strip.finish.rotation):
         return "a strip with a universal joint"
     if len(strip.start.held) < 3:

@@ -36,6 +36,9 @@ MISTAKES = {
     TIP.replace("-6}", "-6, finish: clamped}"): "stage 1: start, finish, numbers: those of the scene are the first stage's",
     TIP.replace("-6}", "-6}, {follow: force_width, to: 0, finish: clamped}"): "stage 2: follow: 'force_width' must be one of",
     TIP.replace("-6}", "-6}, {follow: force_width, to: 0, numbers: {bend: 1}}"): "stage 2: numbers: 'bend' must be one of",
+    TIP + "roller: {at: 1.5}\n": "roller.at: must be less than 1, not 1.5",
+    TIP + "roller: {at: 0.123456789}\n": "roller: at: 0.123457 must be a multiple of 1/N",
+    TIP + "roller: {at: 0.5, held: up}\n": "roller.held: must be width, normal, tangent or three numbers",
     TIP.replace("0.3", "[]"): "material.nu: must be a number, or a list of numbers, not []",
     TIP.replace("0.3", "[0.3, 0.30]"): "the branch nu = 0.3 is listed twice",
     TIP.replace("0.3", "[0.8, 0.9]"): "none of its branches can be run (nu: 0.8 must be",
@@ -250,6 +253,23 @@ def test_points_that_later_stages_miss(tmp_path):
         assert run_stages(parse(ring + stages % start_at, "scene"), path, Display(silent=True)) == "lost"
         branch = read_branch(path)
         assert sentence in branch.stop and set(branch.points["stage"]) == {1}
+
+
+@pytest.mark.full
+def test_an_arch_under_a_roller(root, tmp_path):
+    """Symmetric about its middle until it leaves for the branch on which it snaps through; then its second mode grows."""
+    path = tmp_path / "roller.h5"
+    assert run_stages(load(root / "configs" / "open_roller.yaml"), path, Display(silent=True)) == "complete"
+    branch = read_branch(path)
+    (first, *_) = branch.events[branch.events["label"] == b"BP"]
+    assert (first["index_before"], first["index_after"]) == (0, 1)
+    through = branch.points[branch.points["stage"] == 2]
+    assert set(through["index"][2:]) == {0} and through["roller"][-1] == pytest.approx(-0.05)
+    assert np.interp(0.0, through["roller"][::-1], through["F_roller"][::-1]) == pytest.approx(0.0, abs=1e-3)
+    shape = branch.shape(len(branch.points) - 1)
+    assert np.interp(0.5, shape.arclength, shape.centreline[:, 1]) == pytest.approx(-0.05, abs=1e-9)
+    sums = through["F_normal"] + through["start_F_normal"] + through["F_roller"]
+    assert np.abs(sums).max() < 1e-8
 
 
 @pytest.mark.full
