@@ -48,6 +48,8 @@ def _places(values: dict) -> Iterator[tuple[tuple, Any]]:
     for part in _PARTS:
         if isinstance(values.get(part), dict):
             yield from (((part, name), value) for name, value in values[part].items())
+    if isinstance(values.get("roller"), dict):  # its direction is a list in any case
+        yield ("roller", "at"), values["roller"].get("at")
     stages = values["stages"] if isinstance(values["stages"], list) else []
     for number, stage in enumerate(stages):
         if isinstance(stage, dict):
@@ -75,7 +77,9 @@ def combinations(values: dict, lists: dict[tuple, list]) -> Iterator[tuple[str, 
 
 def _name(place: tuple) -> str:
     """Return the name of a number: its own, with the stage that it belongs to."""
-    return f"stage {place[1] + 1} {place[-1]}" if place[0] == "stages" else place[-1]
+    if place[0] == "stages":
+        return f"stage {place[1] + 1} {place[-1]}"
+    return "roller at" if place[0] == "roller" else place[-1]
 
 
 def _text(value: Any) -> str:

@@ -231,6 +231,15 @@ def test_a_scene_of_many_strips(call, tmp_path):
     assert other.returncode == 2 and "holds another scene" in other.err
 
 
+def test_where_lists_stand_in_place_of_numbers():
+    """Of the material, the ends of stages and the roller; a direction and a table are lists in any case."""
+    text = TIP.replace("flat rod", "[flat rod, ribbon]").replace("to: -6", "to: -6, numbers: {}")
+    text += "roller: {at: [0.25, 0.5], held: [0, 1, 0]}\nalong: {kappa_n: [[0, 1], [1, 2]]}\n"
+    sweep = parse(text, "scene")
+    assert sweep.numbers["lawribbon_roller_at0.5.h5"] == {"law": "ribbon", "roller at": 0.5} and len(sweep.branches) == 4
+    assert parse(dump(sweep), "scene") == sweep
+
+
 def test_a_stage_begins_at_the_node_of_the_one_before(tip):
     """The graph of one result: the second stage leaves the branch point of the first one."""
     one = open_graph.new_graph("")
