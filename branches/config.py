@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -215,8 +216,10 @@ def _pairs(values: dict, lists: dict, name: str) -> list[tuple]:
 _MOST_BYTES = 1_000_000
 
 
-def load(path: str | Path, settings: list[str] = ()) -> Config | DiagramConfig:
+def load(path: str | Path, settings: list[str] = ()) -> Any:
     """Return the scene of a YAML file, changed by ``key=value`` settings (dotted keys, YAML values).
+
+    It is a `Config` or `DiagramConfig`, or of open strips an `OpenConfig` or `OpenSweep`.
 
     Raises
     ------
@@ -236,7 +239,7 @@ def load(path: str | Path, settings: list[str] = ()) -> Config | DiagramConfig:
     return parse(text, _plain(str(path)), settings)
 
 
-def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramConfig:
+def parse(text: str, name: str, settings: list[str] = ()) -> Any:
     """Return the scene of a YAML text; messages call the text ``name``."""
     values = _yaml(text, name)
     if not isinstance(values, dict):
@@ -250,13 +253,44 @@ def parse(text: str, name: str, settings: list[str] = ()) -> Config | DiagramCon
         _put(values, parts, _yaml(value, f"--set {_plain(key)}"))
     if "stages" in values:
         from branches.open_config import OpenConfig  # needs the models of this module
+        from branches.sweep_config import lists_in
 
-        return _validated(OpenConfig, values, name, settings)
+        lists = lists_in(values)
+        return _sweep(values, lists, name, settings) if lists else _validated(OpenConfig, values, name, settings)
     if "strip" in values:
         values = _of_strip(values, name)
     if _is_diagram(values):
         return _diagram(values, name, settings)
     return _validated(Config, values, name, settings)
+
+
+def _sweep(values: dict, lists: dict[tuple, list], name: str, settings: list[str]):
+    """Return the scene of many open strips with these values."""
+    from branches.open_config import OpenConfig
+    from branches.sweep_config import OpenSweep, combinations, file_of
+
+    for place, entries in lists.items():
+        if not entries or any(isinstance(entry, (list, dict)) for entry in entries):
+            raise ConfigError(
+                f"{name}: {'.'.join(map(str, place))}: must be a number, or a list of numbers, not {show(entries)}"
+            )
+    count = math.prod(len(entries) for entries in lists.values())
+    if count > _MOST_BRANCHES:
+        raise ConfigError(f"{name}: {count} branches are more than {_MOST_BRANCHES}")
+    branches, numbers, absent = {}, {}, {}
+    for words, chosen, fields in combinations(values, lists):
+        file = file_of(chosen)
+        if file in numbers:
+            raise ConfigError(f"{name}: the branch {words} is listed twice; give each value once")
+        try:
+            branches[file], numbers[file] = OpenConfig.model_validate(fields), chosen
+        except ValidationError as error:
+            if error.errors()[0]["loc"]:  # a field is invalid in every combination
+                raise ConfigError(f"{_origin(error, name, settings)}: {_sentence(error, OpenConfig)}") from error
+            absent[words] = _sentence(error, OpenConfig)
+    if not branches:
+        raise ConfigError(f"{name}: none of its branches can be run ({next(iter(absent.values()))})")
+    return OpenSweep(str(values.get("title", "")), values, branches, numbers, absent)
 
 
 def _validated(model: type[Strict], values: dict, name: str, settings: list[str]) -> Any:
@@ -351,7 +385,7 @@ class _Dumper(yaml.SafeDumper):
 
 def dump(config: Config | DiagramConfig) -> str:
     """Return the YAML text of a scene without fields at their defaults; `parse` reads it back."""
-    values = config.values if isinstance(config, DiagramConfig) else config.model_dump(mode="json", exclude_defaults=True)
+    values = config.model_dump(mode="json", exclude_defaults=True) if isinstance(config, Strict) else config.values
     if "strip" in values:
         values = {key: value for key, value in values.items() if key not in _FROM_STRIP}
     return yaml.dump(values, Dumper=_Dumper, sort_keys=False)

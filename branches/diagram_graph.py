@@ -23,6 +23,8 @@ from contin import exact_text
 from ribbon_model.laws import from_label, label
 from ribbon_model.linear import circle, covering
 
+#: Names of the formats of diagrams: of closed strips, and of open ones.
+_FORMAT, OPEN_FORMAT = "ribbon bifurcation diagram", "open strip diagram"
 #: Columns of a branch that an edge carries.
 COLUMNS = ("arclength", "kappa_n", "kappa_star", "energy")
 #: Kinds of points where a secondary branch meets a primary one; the second kind if that point is not in the diagram.
@@ -35,7 +37,7 @@ def new_graph(title: str = ""):
     """Return an empty diagram."""
     import networkx
 
-    return networkx.MultiGraph(title=title, format="ribbon bifurcation diagram", format_version=1)
+    return networkx.MultiGraph(title=title, format=_FORMAT, format_version=1)
 
 
 @dataclass(frozen=True)
@@ -355,14 +357,20 @@ def save(graph, folder: Path) -> tuple[Path, Path]:
     folder = Path(folder)
     text = _lines(networkx.node_link_data(graph, edges="edges"))
     plain = networkx.MultiGraph(**graph.graph)
-    plain.add_nodes_from(graph.nodes(data=True))
+    for one, data in graph.nodes(data=True):
+        plain.add_node(one, **_plain(data))
     for a, b, data in graph.edges(data=True):
-        plain.add_edge(a, b, **{k: json.dumps(v) if isinstance(v, list) else v for k, v in data.items()})
+        plain.add_edge(a, b, **_plain(data))
     paths = folder / DIAGRAM, folder / GRAPHML
     with interrupt.held():  # both or none
         write_bytes(paths[0], text.encode())
         write_bytes(paths[1], "\n".join(networkx.generate_graphml(plain)).encode())
     return paths
+
+
+def _plain(data: dict) -> dict:
+    """Return attributes with lists and mappings as JSON text, which is all that GraphML can hold."""
+    return {name: json.dumps(value) if isinstance(value, (list, dict)) else value for name, value in data.items()}
 
 
 def _lines(data: dict) -> str:
@@ -378,6 +386,20 @@ def read(folder: str | Path):
     Raises
     ------
     StoreError
+        There is none, or it is of open strips.
+    """
+    graph = read_any(folder)
+    if graph.graph["format"] != _FORMAT:
+        raise StoreError(f"{str(folder)!r} is the diagram of open strips; branches.graph and branches.explore show it")
+    return graph
+
+
+def read_any(folder: str | Path):
+    """Return the diagram in a folder; it may also be of open strips (`branches.open_graph`).
+
+    Raises
+    ------
+    StoreError
         There is none.
     """
     import networkx
@@ -386,10 +408,11 @@ def read(folder: str | Path):
     path = path / DIAGRAM if path.is_dir() else path
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-        if data["graph"]["format"] != "ribbon bifurcation diagram":
-            raise KeyError("format")
         graph = networkx.node_link_graph(data, edges="edges")
-        _check(graph)
+        if graph.graph["format"] == _FORMAT:
+            _check(graph)
+        elif graph.graph["format"] != OPEN_FORMAT:
+            raise KeyError("format")
         return graph
     except OSError as error:
         raise StoreError(f"cannot read {str(path)!r}: {error.strerror}") from error

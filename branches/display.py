@@ -126,10 +126,11 @@ class Display:
 
     # --- open strips ---------------------------------------------------------------------------------------------
 
-    def begin_stages(self, config) -> None:
-        """Say what is about to be computed."""
+    def begin_stages(self, config, count: int, labels: int) -> None:
+        """Say what is about to be computed, after ``count`` points, ``labels`` of them labelled, of a run resumed."""
+        self._label = labels
         if not self._quiet:
-            self.note(config.title or config.name)
+            self.note(f"{config.title or config.name}{f', resumed after {count} points' if count else ''}")
 
     def stage(self, config, number: int) -> None:
         """Say which stage begins."""
@@ -159,7 +160,7 @@ class Display:
         lines.append(f"{config.title or config.name}: {count} points in {seconds:.2f} s")
         lines += [f"  {_describe_stage(config, event)}" for event in events]
         if outcome == "interrupted":
-            lines.append(f"  interrupted; run it again with --resume --out {shlex.quote(str(path))}")
+            lines.append(f"  interrupted; go on with --resume --out {shlex.quote(str(path))}")
         elif outcome == "lost":
             lines.append(f"  stopped: {stop}")
         self.note("\n".join([*lines, f"  written to {path}"]))
@@ -181,6 +182,17 @@ class Display:
 
         self.clear()
         self.note(f"  {name_of(config)}: {'FAILED: ' + problem if problem else describe(nodes)}")
+        self._to_go(settled)
+
+    def sweep_done(self, lines: list[str], problem: str, settled: int) -> None:
+        """Show one of many open strips, as `branch_done`; ``lines`` are what it is, and its stages."""
+        if self._quiet:
+            return
+        self.clear()
+        self.note("\n".join(f"  {line}" for line in lines) + (f": FAILED: {problem}" if problem else ""))
+        self._to_go(settled)
+
+    def _to_go(self, settled: int) -> None:
         each = (time.monotonic() - self._began) / (settled - self._kept)
         self._line(f"{settled} of {self._total} branches, about {duration(each * (self._total - settled))} to go")
 

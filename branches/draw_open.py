@@ -13,6 +13,8 @@ from ribbon_model.shape import Shape
 
 #: Width of a strip of unknown dimensions, over its length, and the part of the largest possible one that it stays below.
 WIDTH, ROOM = 0.06, 0.8
+#: Diagrams in a row, at most: with more, their letters are too small to read in a page of text.
+_PANELS = 4
 #: Colours of stages (Okabe and Ito), told apart by the colour-blind.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 #: Numbers and columns in words.
@@ -22,7 +24,8 @@ WORDS = {
     "force_tangent": "force along the tangent", "force_width": "force along the width",
     "force_normal": "force along the normal", "moment": "moment at the hinge", "weight": "weight per length",
     "foundation": "stiffness of the foundation", "kappa_n": "natural curvature", "tau_n": "natural twist",
-    "softness": "softness in the plane", "F_tangent": "force along the tangent", "F_width": "force along the width",
+    "roller": "place at the roller", "F_roller": "force of the roller", "softness": "softness in the plane",
+    "F_tangent": "force along the tangent", "F_width": "force along the width",
     "F_normal": "force along the normal", "M_tangent": "moment about the tangent", "M_width": "moment about the width",
     "M_normal": "moment about the normal", "energy": "energy",
 }  # fmt: skip
@@ -43,7 +46,7 @@ def figure(branch, shapes: int = 6, width: float | None = None):
 
     chosen = chosen_points(branch, shapes)
     names = list(dict.fromkeys(branch.followed(int(stage)) for stage in np.unique(branch.points["stage"])))
-    panels = min(len(names), 3)
+    panels = min(len(names), _PANELS)
     columns = max(len(chosen), 1)
     result = Figure(figsize=(max(9, 3.6 * panels), 5.9 if chosen else 4.2), layout="constrained")
     rows = result.subfigures(2 if chosen else 1, 1, height_ratios=[1, 2.4] if chosen else [1], squeeze=False)[:, 0]

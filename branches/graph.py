@@ -26,14 +26,15 @@ def read(path: str | Path):
         There is none, or the scene is none.
     """
     if Path(path).suffix not in (".yaml", ".yml"):
-        return diagram.read(path)
+        return diagram.read_any(path)
     from branches.config import ConfigError, load  # with the quadrature they take 0.15 s: not for questions about results
     from branches.open_config import OpenConfig
     from branches.preview import preview
+    from branches.sweep_config import OpenSweep
 
     try:
         config = load(path)
-        if isinstance(config, OpenConfig):
+        if isinstance(config, (OpenConfig, OpenSweep)):
             raise StoreError(f"{str(path)!r} is a scene of an open strip, for which there is no exact solution; run it")
         return preview(config)
     except ConfigError as error:
@@ -67,6 +68,9 @@ def main(argv=None) -> int:
 
 
 def _answers(graph, options) -> Iterable[str]:
+    if graph.graph["format"] == diagram.OPEN_FORMAT:
+        yield from _of_open_strips(graph, options)
+        return
     if "source" in graph.graph:
         yield graph.graph["source"]
     if options.where:
@@ -90,6 +94,21 @@ def _answers(graph, options) -> Iterable[str]:
         yield f"{len(found)} branches, {graph.number_of_nodes()} special points"
         for (law, nu, m, n), nodes in found:
             yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(nodes)}"
+
+
+def _of_open_strips(graph, options) -> Iterable[str]:
+    """Yield the labelled points of a diagram of open strips, stage by stage.
+
+    Raises
+    ------
+    StoreError
+        A question that is for closed strips.
+    """
+    from branches.open_graph import listed
+
+    if options.where or options.at is not None or options.folds:
+        raise StoreError(f"{options.folder!r} is the diagram of open strips: it is listed without --where, --at and --folds")
+    yield from listed(graph)
 
 
 if __name__ == "__main__":

@@ -217,7 +217,9 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
         raise StoreError(
             f"{str(path)!r} exists and is not a readable result of this program; --overwrite replaces it"
         ) from error
-    different = difference(stored, config, _CHANGEABLE if resume else ())
+    further = len(getattr(config, "stages", ())) > len(getattr(stored, "stages", ()))
+    same = config.model_copy(update={"stages": config.stages[: len(stored.stages)]}) if resume and further else config
+    different = difference(stored, same, _CHANGEABLE if resume else ())
     if different:
         advice = "resume with the same config" if resume else "--overwrite replaces it, --out writes elsewhere"
         raise StoreError(f"{str(path)!r} holds another scene ({different}); {advice}")
@@ -227,7 +229,7 @@ def _look_at(path: Path, config: Config, resume: bool, overwrite: bool) -> str |
                 f"{str(path)!r} holds an unfinished run of this scene; --resume continues it, --overwrite starts again"
             )
         return None
-    goes_on = reason in ("limit", "max points") and stored != config
+    goes_on = further or (reason in ("limit", "max points") and stored != config)
     return stop if status == "complete" and not goes_on else None
 
 

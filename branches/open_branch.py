@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,10 +23,8 @@ from ribbon_model.shape import Shape
 CONJUGATE = {
     "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
     "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
-    "weight": "rise",
+    "weight": "rise", "roller": "F_roller",
 }  # fmt: skip
-#: Followed numbers that are dead loads, with the column whose product with them is the work to subtract from the energy.
-_WORK = {"force_tangent": "distance", "force_normal": "rise", "force_width": "shear"}
 #: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
 _SAME = 1e-6
 
@@ -53,7 +52,7 @@ class Snap:
 class OpenBranch(StoredBranch):
     """The result file of an open strip; as `branches.read.StoredBranch`, with lengths over that of the strip."""
 
-    @property
+    @functools.cached_property
     def scene(self) -> OpenConfig:
         """The scene."""
         return OpenConfig.model_validate(self.config)
@@ -70,7 +69,7 @@ class OpenBranch(StoredBranch):
     def strains(self, point: int) -> np.ndarray:
         """Return omega_1, omega_2, omega_3 (K, 3) at a kept point, over 1/L."""
         t, states = self.states_at(point)
-        problem = self.scene.strip().problem
+        problem = self.scene.strip(int(self.points["stage"][point])).problem
         row, names = self.points[point], self.points.dtype.names
         values = [float(row[name]) if name in names else 0.0 for name in problem.parameters]
         return strains_of(states[:, :4], problem.batch("field").values(t, states, states[:0], np.array(values)))
@@ -147,20 +146,22 @@ class OpenBranch(StoredBranch):
             rows = np.flatnonzero(self.points["stage"] == stage)
             ends = sorted({rows[0], rows[-1], *(row for row in rows if row in special)})
             for first, last in pairwise(ends):
-                index = self._index(np.arange(first, last + 1))
+                index = self.index_on(np.arange(first, last + 1))
                 found.append(Piece(int(stage), np.arange(first, last + 1), None if index < 0 else index == 0))
         return found
 
-    def _index(self, rows: np.ndarray) -> int:
+    def origin(self, stage: int) -> int:
+        """Return the point of an earlier stage from which a stage starts."""
+        one = self.scene.stages[stage - 1]
+        events = self.events[self.events["stage"] == (one.stage or stage - 1)]
+        place = one.place_among([(event["label"].decode(), event["name"].decode()) for event in events])
+        return int(events["point"][place])
+
+    def index_on(self, rows: np.ndarray) -> int:
         """Return the index on a piece, that of its points which are not special; -1 if they differ or there are none."""
         regular = [row for row in rows if self.points["label"][row] not in (b"LP", b"BP")]
         values = set(self.points["index"][regular].tolist())
         return int(values.pop()) if len(values) == 1 else -1
-
-    def potential(self, name: str) -> np.ndarray:
-        """Return the energy of all points with the work of the load that is followed."""
-        work = self.points[_WORK[name]] * self.points[name] if name in _WORK else 0.0
-        return self.points["energy"] - work
 
     def snaps(self) -> list[Snap]:
         """Return the folds at which a stable piece ends, with the stable state below that the file has, if any."""
@@ -169,7 +170,7 @@ class OpenBranch(StoredBranch):
             if event["label"] != b"LP" or 0 not in (event["index_before"], event["index_after"]):
                 continue
             row, name = int(event["point"]), self.followed(int(event["stage"]))
-            energy, value = self.potential(name), float(event[name])
+            energy, value = self.points["potential"], float(event[name])
             for piece in pieces:
                 state = self._below(piece, row, name, value) if piece.stable else None
                 if state is not None and energy[row] - state["potential"] > _SAME * (1 + abs(energy[row])):
@@ -182,12 +183,12 @@ class OpenBranch(StoredBranch):
 
     def _below(self, piece: Piece, row: int, name: str, value: float) -> dict[str, float] | None:
         """Return the columns of a stable piece where the followed number has a value, None if it does not get there."""
-        if self.followed(piece.stage) != name or not self._same_numbers(piece.rows[0], row, name):
+        if self.followed(piece.stage) != name or not self.same_strip(piece.rows[0], row, name):
             return None
         x, conjugate = self.points[name][piece.rows], self.conjugate(name)
         for i in range(len(x) - 1):
             if (x[i] - value) * (x[i + 1] - value) <= 0 and x[i] != x[i + 1] and row not in piece.rows[i : i + 2]:
-                columns = {conjugate: self.points[conjugate], "potential": self.potential(name)}
+                columns = {conjugate: self.points[conjugate], "potential": self.points["potential"]}
                 return {column: self._between(piece.rows, i, name, value, values) for column, values in columns.items()}
         return None
 
@@ -196,9 +197,12 @@ class OpenBranch(StoredBranch):
         near = rows[max(i - 1, 0) : i + 3]
         return float(BarycentricInterpolator(self.points[name][near], column[near])(value))
 
-    def _same_numbers(self, first: int, second: int, name: str) -> bool:
-        """Return whether two points agree in all prescribed numbers but the followed one."""
-        for other in self.scene.strip().parameters:
+    def same_strip(self, first: int, second: int, name: str = "") -> bool:
+        """Return whether two points agree in what is held, and in all prescribed numbers but the named one."""
+        strip, same = (self.scene.strip(int(self.points["stage"][row])) for row in (first, second))
+        if strip is not same:
+            return False
+        for other in strip.parameters:
             a, b = (float(self.points[other][row]) for row in (first, second))
             if other != name and abs(a - b) > _SAME * (1 + abs(a)):
                 return False

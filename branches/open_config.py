@@ -7,8 +7,10 @@ the length of the strip and its bending modulus (`ribbon_model.material`).
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import re
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -18,6 +20,7 @@ from contin import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH
 from ribbon_model.material import Material
+from ribbon_model.plate import RIGIDITIES
 
 #: Ends in one word or two.
 _WORDS: dict[str, dict] = {
@@ -26,22 +29,26 @@ _WORDS: dict[str, dict] = {
 }  # fmt: skip
 #: What a number is measured in: the power of the length, the power of the modulus B, and the name of the unit.
 _UNITS = {
-    **dict.fromkeys((*PLACE, "stroke"), (1, 0, "m")), **dict.fromkeys(ANGLES, (0, 0, "rad")),
+    **dict.fromkeys((*PLACE, "stroke", "roller"), (1, 0, "m")), **dict.fromkeys(ANGLES, (0, 0, "rad")),
     **dict.fromkeys(("force_width", "force_normal", "force_tangent"), (-2, 1, "N")), "moment": (-1, 1, "N m"),
     "weight": (-3, 1, "N/m"), "foundation": (-4, 1, "N/m^2"), **dict.fromkeys(("kappa_n", "kappa_2", "tau_n"), (-1, 0, "1/m")),
-    "energy": (-1, 1, "J"),
+    **dict.fromkeys(("energy", "potential"), (-1, 1, "J")),
 }  # fmt: skip
 #: Meanings of the columns of an open strip.
 MEANINGS = {
     "distance": "place of the last end along the tangent of the first one", "rise": "along its normal",
     "shear": "along its width", "turn": "angle of the last end about the tangent of the first one",
     "bend": "about its width", "swing": "about its normal", "stroke": "further displacement of the last end",
+    "roller": "place of the strip at the roller, along the direction in which it holds",
     "force_width": "dead force at the last end along the width", "force_normal": "along the normal",
     "force_tangent": "along the tangent; negative compresses", "moment": "dead moment about the hinge of the last end",
     "weight": "weight per length", "foundation": "stiffness per length of the foundation",
     "kappa_n": "natural curvature about the width", "kappa_2": "natural curvature about the normal", "tau_n": "natural twist",
+    "D11": "bending stiffness of the plate along the strip, times the width", "D12": "its coupling",
+    "D22": "bending stiffness across the strip", "D66": "twisting stiffness",
     "nu": "Poisson's ratio", "Gamma": "w^2/(h L) of the law finite width", "softness": "compliance about the normal",
     "energy": "elastic energy, zero in the natural state, and potential of weight and foundation",
+    "potential": "energy and the potential of dead loads at the last end: the one of which the index is",
     "stage": "stage of the scene, from 1",
 }  # fmt: skip
 
@@ -121,6 +128,13 @@ class DirectionsConfig(Strict):
     stroke: Direction = DIRECTIONS["tangent"]
 
 
+class RollerConfig(Strict):
+    """A support between the ends."""
+
+    at: float = Field(gt=0, lt=1, description="where along the strip, over its length")
+    held: Direction = Field(DIRECTIONS["normal"], description="direction in which the place is held")
+
+
 class DimensionsConfig(Strict):
     """A strip in SI units."""
 
@@ -143,13 +157,16 @@ class DimensionsConfig(Strict):
 
 
 class StageConfig(Strict):
-    """One stage: a number that is followed from a labelled point to a value."""
+    """One stage: a number that is followed from a labelled point to a value; from there on, the ends may be held otherwise."""
 
     follow: str = Field(description="the number that is followed")
     to: float = Field(description="the value at which the stage ends")
     start_at: str | None = Field(None, description="labelled point to start from, as in BP 2 (the end of the stage before)")
     stage: int | None = Field(None, ge=1, description="number of the stage of that point (the one before)")
     way: Literal["forward", "backward"] = Field("forward", description="which of the two ways away from a branch point")
+    start: EndWords | None = Field(None, description="what is held at the first end from here on (as before)")
+    finish: EndWords | None = Field(None, description="what is held at the last end from here on (as before)")
+    numbers: dict[str, float] = Field(default_factory=dict, description="numbers that the stage begins with (as before)")
     max_points: int | None = Field(None, ge=1, le=1_000_000, description="steps.max_points of this stage")
     limits: dict[str, Interval] = Field(default_factory=dict)
     label: dict[str, Annotated[list[float], Field(max_length=100)]] = Field(
@@ -161,6 +178,14 @@ class StageConfig(Strict):
         if self.start_at is not None and not re.fullmatch(r"(EP|BP|LP|UZ)( [1-9][0-9]{0,2})?", self.start_at):
             raise ValueError(f"start_at: {self.start_at!r} must be a label with a number, as in BP 1, LP 2, UZ 1")
         return self
+
+    def place_among(self, labelled: Sequence[tuple[str, str]]) -> int | None:
+        """Return which of the labelled points (label, name) of a stage this one starts from; None if there is none."""
+        if self.start_at is None:
+            return len(labelled) - 1
+        label, _, count = self.start_at.partition(" ")
+        found = [place for place, (other, name) in enumerate(labelled) if other == label and name != "start"]
+        return found[int(count or 1) - 1] if int(count or 1) <= len(found) else None
 
 
 def _expression(value: Any) -> Any:
@@ -203,6 +228,7 @@ class OpenConfig(Strict):
     start: EndWords = EndConfig()
     finish: EndWords = EndConfig()
     closed: ClosedConfig | None = None
+    roller: RollerConfig | None = None
     numbers: dict[str, float] = Field(default_factory=dict)
     directions: DirectionsConfig = DirectionsConfig()
     begin: Literal["natural", "arch", "arch, other side", "twisted", "circle"] = "natural"
@@ -225,15 +251,20 @@ class OpenConfig(Strict):
     def _fits(self):
         if self.closed is not None and (self.start, self.finish) != (EndConfig(), EndConfig()):
             raise ValueError("closed: must not be given together with start or finish")
-        strip = self.strip()
         for number, stage in enumerate(self.stages, 1):
+            if stage.stage is not None and stage.stage >= number:
+                raise ValueError(f"stage {number}: stage: {stage.stage} must be an earlier stage")
+            if number == 1 and (stage.start or stage.finish or stage.numbers):
+                raise ValueError("stage 1: start, finish, numbers: those of the scene are the first stage's")
+            strip = self.strip(number)
             if stage.follow not in strip.parameters:
                 followed = ", ".join(strip.parameters)
                 raise ValueError(f"stage {number}: follow: {stage.follow!r} must be one of the numbers here: {followed}")
-            if stage.stage is not None and stage.stage >= number:
-                raise ValueError(f"stage {number}: stage: {stage.stage} must be an earlier stage")
             if number == 1 and (stage.start_at or stage.stage):
                 raise ValueError("stage 1: start_at: the first stage starts from the first state")
+            for name in stage.numbers:
+                if name not in strip.parameters:
+                    raise ValueError(f"stage {number}: numbers: {name!r} must be one of {', '.join(strip.parameters)}")
             for name in (*stage.limits, *stage.label):
                 if name not in (*strip.parameters, *PLACE, "energy"):
                     known = ", ".join(dict.fromkeys((*strip.parameters, *PLACE, "energy")))
@@ -258,7 +289,7 @@ class OpenConfig(Strict):
         law = values.pop("law", None)
         if self.dimensions is not None:
             d = self.dimensions
-            given = [name for name in ("nu", "Gamma") if name in values]
+            given = [name for name in ("nu", "Gamma", *RIGIDITIES) if name in values]
             if given or law not in (None, FINITE_WIDTH.name):
                 raise ValueError(f"material: {(given or ['law'])[0]} must not be given together with dimensions")
             law = FINITE_WIDTH.name
@@ -275,30 +306,53 @@ class OpenConfig(Strict):
         return Material(str(law), numbers, self.along)
 
     @functools.cached_property
-    def _strip(self):
-        from ribbon_model.open_strip import LOADS, STROKE, OpenStrip
+    def _strips(self):
+        """The strips of all stages by what is held: first end, last end, and whether reactions have become loads."""
+        return {}
 
-        numbers = {name: value / self.factor(name) for name, value in self.numbers.items()}
-        if self.closed is not None:
-            numbers = {**dict.fromkeys((*PLACE, *ANGLES), 0.0), "turn": math.pi * self.closed.half_twists, **numbers}
-        for stage in self.stages:
-            if stage.follow in (STROKE, *LOADS):
-                numbers.setdefault(stage.follow, 0.0)
-        where = self.directions
-        return OpenStrip(
-            self._material(), self.start.end(), self.finish.end(), numbers, where.weight, where.foundation, where.stroke,
-            tuple(self.phases),
-        )  # fmt: skip
+    def _held(self, stage: int) -> tuple[EndConfig, EndConfig, bool]:
+        """Return what is held in a stage, and whether that has changed since the first one."""
+        if stage == 1:
+            return self.start, self.finish, False
+        one = self.stages[stage - 1]
+        start, finish, changed = self._held(one.stage or stage - 1)
+        return one.start or start, one.finish or finish, changed or bool(one.start or one.finish)
 
-    def strip(self):
-        """Return the `ribbon_model.open_strip.OpenStrip`.
+    def strip(self, stage: int = 1):
+        """Return the `ribbon_model.open_strip.OpenStrip` of a stage, from 1.
 
         Raises
         ------
         ValueError
             Fields that do not fit; one sentence.
         """
-        return self._strip
+        held = self._held(stage)
+        if held not in self._strips:
+            try:
+                self._strips[held] = self._strip_with(*held)
+            except ValueError as error:
+                raise ValueError(f"stage {stage}: {error}" if held[2] else str(error)) from error
+        return self._strips[held]
+
+    def _strip_with(self, start: EndConfig, finish: EndConfig, changed: bool):
+        """Return the strip with these ends; once they have changed, with all loads that can replace reactions."""
+        from ribbon_model.open_strip import LOADS, STROKE, OpenStrip, Roller, replacing_loads
+
+        ends, where = (start.end(), finish.end()), self.directions
+        directions, material = (where.weight, where.foundation, where.stroke), self._material()
+        replacing = replacing_loads(ends[1])
+        unknown = {"moment"} - set(replacing)
+        more = (tuple(self.phases), Roller(self.roller.at, self.roller.held) if self.roller else None)
+        known = set(OpenStrip(material, *ends, {}, *directions, *more).known) - unknown
+        numbers = {name: value / self.factor(name) for name, value in self.numbers.items()}
+        if self.closed is not None:
+            numbers = {**dict.fromkeys((*PLACE, *ANGLES), 0.0), "turn": math.pi * self.closed.half_twists, **numbers}
+        if changed:
+            numbers = dict.fromkeys(replacing, 0.0) | {name: value for name, value in numbers.items() if name in known}
+        for name in itertools.chain.from_iterable((stage.follow, *stage.numbers) for stage in self.stages):
+            if name in (STROKE, *LOADS) and name in known:
+                numbers.setdefault(name, 0.0)
+        return OpenStrip(material, *ends, numbers, *directions, *more)
 
     @property
     def name(self) -> str:

@@ -1,15 +1,16 @@
 """Run the stages of an open strip, one after the other, into one result file.
 
-A stage starts from a labelled point of an earlier one, by default from its end. An interrupted run is computed again from its
-beginning by ``--resume``: a scene takes seconds, and later stages need branch points of earlier ones with all that was found
-there.
+A stage starts from a labelled point of an earlier one, by default from its end. An interrupted run goes on from its last point:
+the file keeps the state of its stage, and the labelled points of all stages with everything that a later stage needs of them.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import math
+import tempfile
 import time
 from pathlib import Path
 
@@ -19,8 +20,23 @@ from branches.config import ConfigError, dump
 from branches.job import Interruption, is_done, writing
 from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
-from branches.store import BranchWriter, Kind
-from contin import BranchPoint, Continuation, MeshControl, Point, ProblemError, Settings, Stop, exact_text
+from branches.store import BranchWriter, Kind, read_kept, read_state
+from contin import (
+    Branch,
+    BranchPoint,
+    ContinError,
+    Continuation,
+    MeshControl,
+    Point,
+    ProblemError,
+    Settings,
+    Stop,
+    exact_text,
+    load,
+    save,
+)  # fmt: skip
+from ribbon_model.changed_ends import with_ends
+from ribbon_model.ends import ANGLES, angles_of
 from ribbon_model.open_strip import REACTIONS, OpenStrip
 
 #: A state keeps a symmetry that moves it by less than this.
@@ -73,37 +89,111 @@ def _run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite
     began = time.perf_counter()
     if is_done(path, config, display, resume, overwrite):
         return "complete"
-    strip = config.strip()
-    start = first_state(config)
-    with contextlib.closing(writer_of(config, strip, path)) as writer:
-        display.begin_stages(config)
-        outcome, stop = _followed(config, strip, start, writer, display)
+    run, labelled, image = _resumed(config, path) if resume else (_run(config, 1, first_state(config)), [[]], None)
+    with contextlib.closing(writer_of(config, path, image)) as writer:
+        display.begin_stages(config, writer.count, len(writer.events()))
+        outcome, stop = _followed(config, (run, labelled), writer, display)
         display.stages_summary(config, writer.events(), writer.count, time.perf_counter() - began, path, (outcome, stop))
     return outcome
 
 
-def writer_of(config: OpenConfig, strip: OpenStrip, path: Path | None) -> BranchWriter:
-    """Return the writer of the result file."""
+def compute_stages(config: OpenConfig, display) -> tuple[bytes, str]:
+    """Return the image of the result file of a scene that is followed in memory, and the reason of a failure or ''.
+
+    Raises
+    ------
+    ConfigError
+    """
+    begun = _run(config, 1, first_state(config)), [[]]
+    with contextlib.closing(writer_of(config, None)) as writer:
+        outcome, stop = _followed(config, begun, writer, display)
+        return writer.image(), "" if outcome == "complete" else str(stop or outcome)
+
+
+def _resumed(config: OpenConfig, path: Path) -> tuple[Continuation, list[list[Point]], bytes | None]:
+    """Return the run that continues the file, the labelled points so far by stage, and the image of the file."""
+    rows, kept = read_kept(path)
+    if not len(rows):  # it was interrupted before its first step
+        return _run(config, 1, first_state(config)), [[]], None
+    number, labelled = int(rows["stage"][-1]), []
+    for stage in range(1, number + 1):
+        count = np.count_nonzero((rows["stage"] == stage) & (rows["label"] != b""))
+        labelled.append(_points(config.strip(stage).problem, kept[f"stage {stage}"])[:count])
+    strip, stage = config.strip(number), config.stages[number - 1]
+    state, start, _, image = read_state(path, strip.problem, (stage.follow, *strip.problem.multipliers))
+    here = start[0].parameter(start[1], stage.follow)
+    run = Continuation(state.system, state.x, _settings(config, number, here), state=state, start=start)
+    return run, labelled, image
+
+
+def _image(points: list[Point]) -> bytes:
+    """Return labelled points of a stage as a file of `contin.save`."""
+    with tempfile.TemporaryDirectory() as folder:
+        save(Branch(points), Path(folder, "points.npz"))
+        return Path(folder, "points.npz").read_bytes()
+
+
+def _points(problem, image: bytes) -> list[Point]:
+    """Return the points of an `_image`."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "points.npz").write_bytes(image)
+        return load(problem, Path(folder, "points.npz")).points
+
+
+def writer_of(config: OpenConfig, path: Path | None, image: bytes | None = None) -> BranchWriter:
+    """Return the writer of the result file; ``image`` is that of an unfinished one."""
     meaning = {
         name: f"{_WORDS[name.removeprefix('start_')[0]]} on the strip at its {'first' if name[0] == 's' else 'last'} end, "
         f"along the {name.rpartition('_')[2]} of the first one" for name in REACTIONS
     }  # fmt: skip
-    columns = (("stage", "i4", MEANINGS["stage"]), *((name, "f8", text) for name, text in meaning.items()))
+    columns = (("stage", "i4", MEANINGS["stage"]), ("potential", "f8", MEANINGS["potential"]))
+    columns += tuple((name, "f8", text) for name, text in meaning.items())
+    columns += (("F_roller", "f8", "force of the roller on the strip"),) if config.roller else ()
     length = "1" if config.dimensions is None else f"1 ({exact_text(config.dimensions.length)} m)"
     modulus = "1" if config.dimensions is None else f"1 ({config.dimensions.modulus:.12g} N m^2)"
-    kind = Kind(OPEN, f"bending modulus B = {modulus}, length L = {length}", columns, _Row(strip))
+    table = Table.of(config)
+    kind = Kind(OPEN, f"bending modulus B = {modulus}, length L = {length}", columns, _Row(config, table))
     followed = list(dict.fromkeys(stage.follow for stage in config.stages))
-    return BranchWriter(path, dump(config), strip.problem, followed, config.stride, watch=Watch(strip), kind=kind)
+    return BranchWriter(path, dump(config), table, followed, config.stride, image, Watch(config.strip()), kind)
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """Names of states and columns of all stages together, as `branches.store.BranchWriter` takes those of a problem."""
+
+    states: tuple[str, ...]
+    parameters: tuple[str, ...]
+    functionals: tuple[str, ...]
+    multipliers: tuple[str, ...]
+
+    @classmethod
+    def of(cls, config: OpenConfig) -> Table:
+        """Return those of a scene."""
+        problems = [config.strip(number).problem for number in range(1, len(config.stages) + 1)]
+        parameters, functionals, multipliers = (
+            tuple(dict.fromkeys(itertools.chain.from_iterable(getattr(problem, kind) for problem in problems)))
+            for kind in ("parameters", "functionals", "multipliers")
+        )
+        functionals = tuple(name for name in functionals if name not in parameters)
+        return cls(tuple(problems[0].states), parameters, functionals, multipliers)
 
 
 class _Row:
-    """The further columns of a point: its stage and the reactions. ``stage`` is set by the run."""
+    """The further columns of a point: its stage, the reactions, and numbers that its stage does not have.
 
-    def __init__(self, strip: OpenStrip):
-        self._strip, self.stage = strip, 1
+    Loads that do not act are zero; angles that are not prescribed are those of the last end. ``stage`` is set by the run.
+    """
+
+    def __init__(self, config: OpenConfig, table: Table):
+        self._config, self._names, self.stage = config, (*table.parameters, *table.functionals), 1
 
     def __call__(self, point: Point) -> dict:
-        return {"stage": self.stage, **self._strip.reactions(point)}
+        strip, states = self._config.strip(self.stage), point.system.states(point.x)
+        absent = {name: 0.0 for name in self._names if name not in point.parameters and name not in point.functionals}
+        if set(ANGLES) & set(absent):
+            absent |= dict(zip(ANGLES, angles_of(states[-1, :4])))
+        own = {"stage": self.stage, "potential": strip.potential(point), **strip.reactions_of(states)}
+        return absent | own
 
 
 def first_state(config: OpenConfig) -> Point:
@@ -122,52 +212,87 @@ def first_state(config: OpenConfig) -> Point:
         "circle": lambda: strip.twisted_circle(half_twists), "twisted": lambda: strip.twisted(turn),
     }  # fmt: skip
     try:
-        return strip.first_point(
-            guesses[config.begin](), intervals=mesh.intervals, degree=mesh.degree, mesh=_mesh_control(config)
-        )
+        guess, values, intervals = guesses[config.begin](), None, mesh.intervals
+        if strip.roller is not None:
+            intervals = strip.roller.intervals(mesh.intervals)
+            if guess is not None and "roller" not in config.numbers:  # it touches the strip where it is
+                values = {"roller": float(np.dot(guess(strip.roller.at)[4:7], strip.roller.direction))}
+        return strip.first_point(guess, values, intervals, mesh.degree, mesh=_mesh_control(config))
     except (ProblemError, ValueError) as error:
         raise ConfigError(f"begin: {config.begin}: {error}") from error
 
 
 def _mesh_control(config: OpenConfig) -> MeshControl:
     mesh = config.mesh
-    return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every)
+    every = 0 if config.roller else mesh.adapt_every  # a mesh point stays at the roller
+    return MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, every)
 
 
-def _followed(config, strip, start: Point, writer: BranchWriter, display) -> tuple[str, Stop | None]:
-    """Follow all stages; return the outcome and the reason why the last one stopped."""
-    labelled: list[list[Point]] = []
-    run = None
+def _followed(config: OpenConfig, begun, writer: BranchWriter, display) -> tuple[str, Stop | None]:
+    """Follow a stage that has begun (its run, and the labelled points so far by stage), and all later ones.
+
+    Returns
+    -------
+    outcome, stop
+        The outcome, and the reason why the last stage stopped.
+    """
+    run, labelled = begun
+    writer.kept = _Kept(labelled)
     with Interruption() as interruption:
-        for number, stage in enumerate(config.stages, 1):
-            try:
-                following = _run(config, strip, stage, start if number == 1 else _origin(stage, labelled))
-            except ConfigError as error:
-                if run is None:
-                    raise
-                stop = Stop("scene", f"stage {number}: {error}")
-                writer.checkpoint(run.start, "lost", stop)
-                return "lost", stop
-            run = following
-            labelled.append([])
-            writer.kind.values.stage = number
-            display.stage(config, number)
-            for point in run:
-                display.stage_point(config, stage, point, writer.count)
-                writer.append(point)
-                labelled[-1] += [point] if point.label else []
-                if writer.due():
-                    writer.checkpoint(run.start, "running")
-                if interruption.asked:
-                    writer.checkpoint(run.start, "interrupted")
-                    return "interrupted", None
-            writer.flush()
-            if run.stop.reason == "no convergence" or run.stop.message.startswith("met "):
-                stop = dataclasses.replace(run.stop, message=f"stage {number}: {strip.explained(run)}", advice="")
-                writer.checkpoint(run.start, "lost", stop)
-                return "lost", stop
+        for number in range(len(labelled), len(config.stages) + 1):
+            if number > len(labelled):
+                try:
+                    run = _run(config, number, _origin(config.stages[number - 1], labelled))
+                except ConfigError as error:
+                    stop = Stop("scene", f"stage {number}: {error}")
+                    writer.checkpoint(run.start, "lost", stop)
+                    return "lost", stop
+                labelled.append([])
+            ended = _through(config, run, labelled, writer, (display, interruption))
+            if ended is not None:
+                return ended
         writer.checkpoint(run.start, "complete", run.stop)
     return "complete", run.stop
+
+
+class _Kept:
+    """The labelled points of all stages as the file keeps them for a resumed run; made anew where there are more."""
+
+    def __init__(self, labelled: list[list[Point]]):
+        self._labelled = labelled
+        self._images: dict[tuple[int, int], bytes] = {}
+
+    def __call__(self) -> dict[str, bytes]:
+        keys = [(number, len(points)) for number, points in enumerate(self._labelled, 1) if points]
+        self._images = {key: self._images.get(key) or _image(self._labelled[key[0] - 1]) for key in keys}
+        return {f"stage {number}": self._images[number, count] for number, count in keys}
+
+
+def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWriter, others) -> tuple[str, Stop | None] | None:
+    """Follow the last of the stages that have begun; return outcome and reason if that ends the run, otherwise None."""
+    (display, interruption), number = others, len(labelled)
+    writer.kind.values.stage = number
+    display.stage(config, number)
+    for point in run:
+        display.stage_point(config, config.stages[number - 1], point, writer.count)
+        writer.append(point)
+        labelled[-1] += [point] if point.label else []
+        if point.label and point.name != "start":
+            continue  # inside a step: a run cannot be resumed from here
+        if run.state.system.scales is None:  # states with scales are not stored; such a stage begins again
+            writer.mark(run.state)
+        if interruption.asked:
+            writer.checkpoint(run.start, "interrupted")
+            return "interrupted", None
+        if writer.due():
+            writer.checkpoint(run.start, "running")
+    writer.flush()
+    if run.stop.reason == "no convergence" or run.stop.message.startswith("met "):
+        why = config.strip(number).explained(run)
+        stop = dataclasses.replace(run.stop, message=f"stage {number}: {why}", advice="")
+        writer.checkpoint(run.start, "lost", stop)
+        return "lost", stop
+    return None
 
 
 def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
@@ -180,46 +305,67 @@ def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
     """
     source = stage.stage or len(labelled)
     points = labelled[source - 1]
-    if stage.start_at is None:
-        return points[-1]
-    label, _, count = stage.start_at.partition(" ")
-    found = [point for point in points if point.label == label and point.name != "start"]
-    place = int(count or 1)
-    if place > len(found):
+    place = stage.place_among([(point.label, point.name) for point in points])
+    if place is None:
         there = ", ".join(point.label for point in points)
         raise ConfigError(f"start_at: {stage.start_at!r} is not among the points of stage {source}: {there}")
-    return found[place - 1]
+    return points[place]
 
 
-def _run(config: OpenConfig, strip: OpenStrip, stage: StageConfig, origin: Point) -> Continuation:
+def _run(config: OpenConfig, number: int, origin: Point) -> Continuation:
     """Return the run of a stage."""
-    here, to = origin[stage.follow], stage.to / config.factor(stage.follow)
-    leaves = stage.start_at is not None and stage.start_at.startswith("BP")
-    switched = leaves and isinstance(origin.details, BranchPoint)
-    if leaves and not switched:
+    stage, strip = config.stages[number - 1], config.strip(number)
+    changed = origin.system.problem is not strip.problem or bool(stage.numbers)
+    if stage.start_at is not None and stage.start_at.startswith("BP"):
+        return Continuation(origin.system, origin.x, *_switched(config, number, origin, changed))
+    if not changed:
+        system, x = origin.system.with_free((stage.follow, *strip.problem.multipliers), origin.x)
+        return Continuation(system, x, _settings(config, number, origin[stage.follow]))
+    numbers = {name: value / config.factor(name) for name, value in stage.numbers.items()}
+    try:
+        system, x = with_ends(strip, origin, stage.follow, numbers)
+        return Continuation(system, x, _settings(config, number, system.parameter(x, stage.follow)))
+    except ValueError as error:
+        raise ConfigError(f"start, finish: {error}") from error
+    except ContinError as error:
+        raise ConfigError(f"numbers: no state was found near the one before ({error}); follow them in a stage") from error
+
+
+def _switched(config: OpenConfig, number: int, origin: Point, changed: bool) -> tuple[Settings, np.ndarray]:
+    """Return the settings and the first tangent of a stage that leaves a branch point.
+
+    Raises
+    ------
+    ConfigError
+        No single branch leaves it, or not in this stage.
+    """
+    stage = config.stages[number - 1]
+    if not isinstance(origin.details, BranchPoint):
         raise ConfigError(
             f"start_at: {stage.start_at!r}: {origin.nullity} modes are neutral there, and no single branch leaves it; a phase "
             "or an imperfection tells the modes apart"
         )
+    if changed:
+        raise ConfigError(f"start_at: {stage.start_at!r}: a branch point is left with the ends and the numbers that led to it")
+    if origin.system.free[0] != stage.follow:
+        raise ConfigError(
+            f"follow: {stage.follow!r}: a branch point is left with the number that led to it, {origin.system.free[0]}"
+        )
+    way = 1 if stage.way == "forward" else -1
+    settings = dataclasses.replace(_settings(config, number, origin[stage.follow]), direction=way)
+    return settings, way * origin.details.tangents[1]
+
+
+def _settings(config: OpenConfig, number: int, here: float) -> Settings:
+    """Return the settings of a stage that starts where its number has the value ``here``."""
+    stage, steps = config.stages[number - 1], config.steps
+    to = stage.to / config.factor(stage.follow)
     reach = abs(to - here) or 1.0
     limits = {stage.follow: (min(to, here - reach), max(to, here + reach))}
     limits |= {name: tuple(end / config.factor(name) for end in ends) for name, ends in stage.limits.items()}
     zeros = {name: [value / config.factor(name) for value in values] for name, values in stage.label.items()}
-    steps = config.steps
-    forward = 1 if stage.way == "forward" else -1
-    direction = forward if switched else int(np.sign(to - here)) or 1
-    settings = Settings(
-        primary=stage.follow, direction=direction, step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
-        max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits, zeros=zeros,
-        mesh=_mesh_control(config), test_functions=strip.domain_tests(),
+    return Settings(
+        primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
+        max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits, zeros=zeros,
+        mesh=_mesh_control(config), test_functions=config.strip(number).domain_tests(),
     )  # fmt: skip
-    free = (stage.follow, *strip.problem.multipliers)
-    if switched:
-        system, x = origin.system, origin.x
-        if system.free[0] != stage.follow:
-            raise ConfigError(
-                f"follow: {stage.follow!r}: a branch point is left with the number that led to it, {system.free[0]}"
-            )
-        return Continuation(system, x, settings, forward * origin.details.tangents[1])
-    system, x = origin.system.with_free(free, origin.x)
-    return Continuation(system, x, settings)

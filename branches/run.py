@@ -61,11 +61,12 @@ def main(argv=None) -> int:
 
 
 def _run(options) -> int:
-    from branches.config import Config, ConfigError, DiagramConfig, load
+    from branches.config import Config, ConfigError, load
+    from branches.fields import Strict
 
     try:
         config = load(options.config, options.set)
-        if isinstance(config, DiagramConfig):
+        if not isinstance(config, Strict):
             return _run_diagram(config, options)
         path = output_path(options)
     except ConfigError as error:
@@ -86,7 +87,22 @@ def _run(options) -> int:
     except (ConfigError, StoreError, ContinError) as error:
         display.clear()
         return _refuse(error)
+    if outcome == "complete" and not isinstance(config, Config):
+        _tell_barriers(path, display, options.quiet)
     return {"complete": 0, "interrupted": interrupt.EXIT_INTERRUPTED}.get(outcome, EXIT_STOPPED_SHORT)
+
+
+def _tell_barriers(path, display, quiet: bool) -> None:
+    """Print the barriers of the stable states of an open strip."""
+    from threadpoolctl import threadpool_limits
+
+    from branches.open_barriers import report
+    from branches.read import read_branch
+
+    with threadpool_limits(1, "blas"):  # the matrices are small
+        lines = report(read_branch(path), quiet)
+    if lines:
+        display.note("\n".join(lines))
 
 
 def _run_diagram(config, options) -> int:
@@ -107,16 +123,20 @@ def _run_diagram(config, options) -> int:
     folder = Path(options.out or Path(options.config).stem)
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {str(folder)!r}: must be a folder for a scene of many branches")
+    from branches.config import DiagramConfig
     from branches.progress import StartingDisplay
 
     display = StartingDisplay(options.quiet)  # before the imports below, which compile the first time
-    from branches.diagram import run_diagram
+    if isinstance(config, DiagramConfig):
+        from branches.diagram import run_diagram as run
+    else:
+        from branches.open_sweep import run_sweep as run
     from branches.executor import ExecutorError
     from branches.files import StoreError
     from contin import ContinError
 
     try:
-        outcome = run_diagram(
+        outcome = run(
             config, folder, display, scheduler=options.scheduler, workers=options.workers, time_limit=options.time_limit,
             overwrite=options.overwrite,
         )  # fmt: skip

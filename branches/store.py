@@ -173,6 +173,8 @@ class BranchWriter:
         self.kind = kind or Kind(CLOSED, "bending modulus B = 1, length L = 2 pi")
         self._buffer: list[tuple[Point, int]] = []
         self._mark: tuple[State, int] | None = None
+        #: Further data for a resumed run, by name: called at every checkpoint that writes the state.
+        self.kept: Callable[[], dict[str, bytes]] = dict
         with damage_told(path):
             empty = _empty_file(problem, self._free, watch is not None, self.kind) if image is None else None
             self._file = h5py.File.in_memory(image or empty, libver=_LIBRARY)
@@ -287,15 +289,20 @@ class BranchWriter:
         here = {"x": state.x, "tangent": state.tangent, "previous": state.previous_tangent}
         _write_vectors(group.create_group("here"), state.system, **here)
         _write_vectors(group.create_group("start"), start[0], x=start[1], tangent=start[2])
+        for name, data in self.kept().items():
+            values = np.frombuffer(data, "u1")
+            group.create_dataset(f"kept/{name}", data=values, chunks=values.shape, fletcher32=True)
 
     def _rewind(self, problem) -> int:
         """Truncate the tables to the points before the saved state; return their number.
 
         Later points are computed again: a limit that ended the run need not end the resumed run.
         """
-        for table, columns in _columns(problem, self._free, self._watch is not None).items():
+        for table, columns in _columns(problem, self._free, self._watch is not None, self.kind.columns).items():
             if self._file[table].dtype != _kind(columns):
-                raise StoreError(f"cannot resume {str(self.path)!r}: this version has other columns")
+                raise StoreError(
+                    f"cannot resume {str(self.path)!r}: this version or scene has other columns; run it again without --resume"
+                )
         points, solutions = int(self._file["resume"].attrs["points"]), self._file["solutions"]
         index = solutions["index"][:]
         index = index[index["point"] < points]
@@ -369,6 +376,15 @@ def read_state(path: Path, problem, free):
             return *_read_state(file, problem, free), Path(path).read_bytes()
         except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
             raise StoreError(f"cannot resume {str(path)!r}: the file is damaged") from error
+
+
+def read_kept(path: Path) -> tuple[np.ndarray, dict[str, bytes]]:
+    """Return the rows before the saved state of a run, none without a state, and its further data (`BranchWriter.kept`)."""
+    with open_branch(path) as file:
+        if "resume" not in file:
+            return file["points"][:0], {}
+        kept = file["resume"].get("kept", {})
+        return file["points"][: int(file["resume"].attrs["points"])], {name: kept[name][:].tobytes() for name in kept}
 
 
 def _read_state(file, problem, free):

@@ -1,4 +1,4 @@
-"""Barriers: the states that the energy passes on its lowest way out of a stable state of a closed strip.
+"""Barriers: the states that the energy passes on its lowest way out of a stable state of a strip.
 
 On the lowest way from one minimum of the energy to another, the highest state is an equilibrium of index 1, a saddle. From a
 saddle the energy falls to two sides, along its one unstable direction; `sides` follows it down on both
@@ -8,7 +8,8 @@ its own. Only saddles that are given are considered: another one may be lower.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -16,19 +17,24 @@ import numpy as np
 
 from ribbon_model.descent import descend, modes
 from ribbon_model.second_variation import Equilibrium
-from ribbon_model.segments import Strip, discretized
+from ribbon_model.segments import Chain, Strip, discretized
 
 #: Segments to begin with, and at most: their number is doubled where both ways down lead to the same state, because the saddle
 #: of the segments lies further from that of the continuous strip than the kick leads.
 SEGMENTS, _MOST = 96, 400
 #: The kick: root mean square change of the strains, over 2 pi/L.
 _KICK = 0.02
+#: The same for open strips of length 1.
+KICK_OPEN = 2 * math.pi * _KICK
+#: Root mean square difference of the strains, relative to that of one, of two states of an open strip at rest.
+_APART = 1e-3
 #: Difference of the strains from those of a circle, and of energies of the same state on the same segments, at rest.
 _PLANAR, _SAME = 1e-6, 1e-6
 #: The same where one of the two is the continuous state cut into segments, which are not quite at rest.
 _CUT = 1e-4
 
 Name = TypeVar("Name")
+Segmented = TypeVar("Segmented", bound=Chain)
 
 
 @dataclass(frozen=True)
@@ -50,16 +56,43 @@ class Barrier(Generic[Name]):
 
 def sides(saddle: Equilibrium) -> tuple[Strip, Strip] | None:
     """Return the strips at rest on both sides of a state of index 1; None where they cannot be told apart."""
+
+    def apart(first: Strip, last: Strip) -> bool:
+        return abs(first.energy - last.energy) > _SAME * (1 + abs(first.energy))
+
+    return ways_down(lambda segments: discretized(saddle, segments), apart, _KICK)
+
+
+def ways_down(
+    cut: Callable[[int], Segmented], apart: Callable[[Segmented, Segmented], bool], kick: float
+) -> tuple[Segmented, Segmented] | None:
+    """Return the strips at rest on both sides of a state of index 1; None where they cannot be told apart.
+
+    Parameters
+    ----------
+    cut : callable
+        ``cut(N)`` returns the state as a strip of N segments.
+    apart : callable
+        ``apart(first, last)`` returns whether two strips at rest are two states.
+    kick : float
+        Root mean square change of the strains by which the state is left.
+    """
     segments = SEGMENTS
     while segments <= _MOST:
-        strip = discretized(saddle, segments)
+        strip = cut(segments)
         mode = modes(strip, 1)[1][:, 0]
-        ways = [descend(strip.moved(sign * _KICK * mode)) for sign in (1, -1)]
+        ways = [descend(strip.moved(sign * kick * mode)) for sign in (1, -1)]
         first, last = (way.end for way in ways)
-        if all(way.rests for way in ways) and abs(first.energy - last.energy) > _SAME * (1 + abs(first.energy)):
+        if all(way.rests for way in ways) and apart(first, last):
             return first, last
         segments *= 2
     return None
+
+
+def apart(first: Chain, last: Chain) -> bool:
+    """Return whether two open strips at rest, on the same segments, are two states."""
+    size = float(np.sqrt(np.mean(first.strains**2)))
+    return float(np.sqrt(np.mean((first.strains - last.strains) ** 2))) > _APART * (1 + size)
 
 
 def covering_index(strip: Strip) -> int | None:

@@ -84,7 +84,7 @@ class Descent:
 
 
 def _strain_metric(strip: Strip) -> np.ndarray:
-    return np.eye(len(strip.strains) * len(strip.free))
+    return np.eye(strip.size)
 
 
 def _velocity_metric(strip: Strip) -> np.ndarray:
@@ -122,7 +122,7 @@ class _Tangent:
     def projected(self, matrix) -> np.ndarray:
         """Return a form (n, n) on the closed strips; across them, its largest diagonal element."""
         image = matrix @ self._across
-        inner = self._across.T @ image + np.abs(np.diag(matrix)).max() * np.eye(6)
+        inner = self._across.T @ image + np.abs(np.diag(matrix)).max() * np.eye(len(image.T))
         half = (image - self._across @ (inner / 2)) @ self._across.T
         return matrix - half - half.T
 
@@ -153,7 +153,7 @@ def descend(strip: Strip, metric: str = "strain", longest: float = 0.1, toleranc
     if metric not in METRICS:
         raise ValueError(f"metric {metric!r} must be one of {', '.join(map(repr, METRICS))}")
     if not math.isfinite(strip.energy):
-        raise ValueError(f"{strip.law.name}: the energy is not finite; omega_1 must be positive")
+        raise ValueError(f"{strip.material}: the energy is not finite; omega_1 must be positive")
     strips, times, dt = [strip], [0.0], 1.0
     tangent = _Tangent(strip)
     while tangent.size >= tolerance and len(strips) <= steps:

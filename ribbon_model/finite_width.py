@@ -117,18 +117,42 @@ def _foundation_by_series(z):
     return 1 - z * g, first, -16 * z * (g + 3 * z * slope + z * z * curvature)
 
 
+def isotropic(nu, Gamma):
+    """Return the section of an isotropic strip: the numbers on which U depends, over the modulus D22 of its plate across.
+
+    They are nu = D12/D22, plane = D11/D22 - nu**2, twist = 2 D66/D22, stiff = sqrt(D11/D22), C, and the |omega_1| up to which
+    the strip is like a flat rod, x < 1 (zero stands for an inextensible ribbon, of any width). See `ribbon_model.plate`.
+    """
+    plane = 1 - nu * nu
+    return nu, plane, 1 - nu, 1.0, 3 * plane * Gamma * Gamma, 1 / (math.sqrt(3 * plane.real) * Gamma.real + 1e-100)
+
+
 def strain_energy(w1, w3, kappa_n, nu, Gamma):
     """U and its derivatives: (U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k), k for kappa_n; without the term -kappa_n**2/2.
 
     Arguments may be complex, for complex steps: first derivatives of U, U_1, U_3 and U_k then are exact. (Only the membrane
     function of real numbers is called; what the imaginary parts add is its linear term.)
     """
-    return _strain_energy(w1, w3, kappa_n, nu, Gamma, membrane((3 * (1 - nu * nu) * Gamma * Gamma * w1 * w1).real))
+    return section_energy(w1, w3, kappa_n, isotropic(nu, Gamma))
 
 
-def _strain_energy(w1, w3, kappa_n, nu, Gamma, profile):
-    """Return `strain_energy`, with the values of `membrane`."""
-    plane, C = 1 - nu * nu, 3 * (1 - nu * nu) * Gamma * Gamma
+def section_energy(w1, w3, kappa_n, section):
+    """Return `strain_energy` of a section; see `isotropic`."""
+    return _strain_energy(w1, w3, kappa_n, section, _profile(w1, section))
+
+
+def _profile(w1, section):
+    """Return g, g' and g'' where the section is bent by w1, all real: `membrane`, or 1/z for a ribbon."""
+    z = (section[4] * w1 * w1).real
+    if section[5] > 0:
+        return membrane(z)
+    z = z + 1e-300
+    return 1 / z, -1 / (z * z), 2 / (z * z * z)
+
+
+def _strain_energy(w1, w3, kappa_n, section, profile):
+    """Return `section_energy`, with the values of `_profile`."""
+    nu, plane, twist, _, C, _ = section
     z = C * w1 * w1
     g, slope, curvature = profile
     dz = z - z.real
@@ -139,12 +163,12 @@ def _strain_energy(w1, w3, kappa_n, nu, Gamma, profile):
     Q, Q1, Q3, Qk = w3 * w3 + nu * w1 * bent, nu * (w1 + bent), 2 * w3, -nu * w1
     PQ, slope1 = P * Q, P1 * Q + P * Q1
     return (
-        plane * bent * bent / 2 + (1 - nu) * w3 * w3 + PQ * Q / 2,
+        plane * bent * bent / 2 + twist * w3 * w3 + PQ * Q / 2,
         plane * bent + P1 * Q * Q / 2 + PQ * Q1,
-        2 * (1 - nu) * w3 + PQ * Q3,
+        2 * twist * w3 + PQ * Q3,
         plane + P11 * Q * Q / 2 + 2 * P1 * Q * Q1 + P * Q1 * Q1 + 2 * nu * PQ,
         slope1 * Q3,
-        2 * (1 - nu) + P * Q3 * Q3 + 2 * PQ,
+        2 * twist + P * Q3 * Q3 + 2 * PQ,
         -plane * bent + PQ * Qk,
         -plane + slope1 * Qk - nu * PQ,
         P * Q3 * Qk,
@@ -164,53 +188,51 @@ def first_zero_of_t(nu: float, width: float) -> float | None:
     return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
 
 
-def _region(nu, Gamma):
-    """Return the |omega_1| up to which the strip is like a flat rod, x < 1."""
-    return 1 / (math.sqrt(3 * (1 - nu * nu)) * Gamma + 1e-100)
-
-
-def _start(M1, M3, kappa_n, nu, Gamma):
+def _start(M1, M3, kappa_n, section):
     """Return the strains to start from: the ribbon's or the flat rod's closed form, whichever makes U - M.omega smaller.
 
+    The ribbon's is exact where D12 + 2 D66 = sqrt(D11 D22), as for isotropic plates: scaled by stiff, U then has its form.
     The flat rod's is not taken if it lies beyond the concave region along omega_1 = 0, where there is another minimum. A start
     inside that region is moved towards omega_1 > 0, the side on which branches begin.
     """
-    flat1, flat3 = kappa_n + M1 / (1 - nu * nu), M3 / (2 * (1 - nu))
-    p = M1 + (1 - nu) * kappa_n
-    root = math.sqrt(p * p + M3 * M3)
-    a = (p + root) / 2 if p > 0 else M3 * M3 / (2 * (root - p) + 1e-300)
+    nu, plane, twist, stiff, _, region = section
+    flat1, flat3 = kappa_n + M1 / plane, M3 / (2 * twist)
+    m3 = M3 / math.sqrt(stiff)
+    p = M1 / stiff + (stiff - nu) * kappa_n
+    root = math.sqrt(p * p + m3 * m3)
+    a = (p + root) / 2 if p > 0 else m3 * m3 / (2 * (root - p) + 1e-300)
     if a < 1e-12 * root or nu * kappa_n + a <= 0:
         return flat1, flat3
-    eta = M3 / (2 * a)
+    eta = m3 / (2 * a)
     w1 = (nu * kappa_n + a) / (1 + eta * eta)
-    w3 = eta * w1
-    region = _region(nu, Gamma)
+    w3 = eta * w1 / math.sqrt(stiff)
+    w1 = w1 / stiff
     if p > 0 and w1 > 10 * region:  # x > 3: like a ribbon
         return w1, w3
     if flat1 > -region:
-        ribbon = strain_energy(w1, w3, kappa_n, nu, Gamma)[0] - M1 * w1 - M3 * w3
-        flat = strain_energy(flat1, flat3, kappa_n, nu, Gamma)[0] - M1 * flat1 - M3 * flat3
+        ribbon = section_energy(w1, w3, kappa_n, section)[0] - M1 * w1 - M3 * w3
+        flat = section_energy(flat1, flat3, kappa_n, section)[0] - M1 * flat1 - M3 * flat3
         if flat < ribbon:
             return flat1, flat3
     for _ in range(20):
-        _, _, _, U11, U13, U33, _, _, _ = strain_energy(w1, w3, kappa_n, nu, Gamma)
+        _, _, _, U11, U13, U33, _, _, _ = section_energy(w1, w3, kappa_n, section)
         if U11 > 0 and U11 * U33 > U13 * U13:
             break
         w1 = 1.2 * w1 + region
     return w1, w3
 
 
-def _strains(M1, M3, kappa_n, nu, Gamma):
+def _strains(M1, M3, kappa_n, section):
     """omega_1 and omega_3 at a moment, all real: a minimum of U - M.omega, by Newton's method; nan where none is found.
 
     Steps are halved until U - M.omega decreases, and they do not leave the convex region again (a concave one lies along
     omega_1 = 0 at large twist, and another minimum beyond). Where D2U is indefinite, it is shifted.
     """
-    w1, w3 = _start(M1, M3, kappa_n, nu, Gamma)
-    region = _region(nu, Gamma)
+    w1, w3 = _start(M1, M3, kappa_n, section)
+    region = section[5]
     best, d1, d3, convex = math.inf, 0.0, 0.0, False
     for _ in range(_STEPS):
-        U, U1, U3, U11, U13, U33, _, _, _ = strain_energy(w1 + d1, w3 + d3, kappa_n, nu, Gamma)
+        U, U1, U3, U11, U13, U33, _, _, _ = section_energy(w1 + d1, w3 + d3, kappa_n, section)
         value = U - M1 * (w1 + d1) - M3 * (w3 + d3)
         mean, spread = (U11 + U33) / 2, math.sqrt((U11 - U33) * (U11 - U33) / 4 + U13 * U13)
         was_convex, convex = convex, mean - spread > 1e-9 * (mean + spread)
@@ -233,8 +255,13 @@ def _strains(M1, M3, kappa_n, nu, Gamma):
 
 def search(M1, M3, kappa_n, nu, Gamma):
     """Return omega_1, omega_3 and the three values of `membrane` there, for real numbers."""
-    w1, w3 = _strains(M1, M3, kappa_n, nu, Gamma)
-    g, slope, curvature = membrane(3 * (1 - nu * nu) * Gamma * Gamma * w1 * w1)
+    return section_search(M1, M3, kappa_n, isotropic(nu, Gamma))
+
+
+def section_search(M1, M3, kappa_n, section):
+    """Return `search` of a section."""
+    w1, w3 = _strains(M1, M3, kappa_n, section)
+    g, slope, curvature = _profile(w1, section)
     return w1, w3, g, slope, curvature
 
 
@@ -246,11 +273,19 @@ def response(M1, M2, M3, kappa_n, nu, Gamma):
 def response_from(M1, M2, M3, kappa_n, nu, Gamma, found):
     """Return the response from what `search` has found for the real parts of the arguments.
 
+    The same as `section_response`.
+    """
+    return section_response(M1, M2, M3, kappa_n, isotropic(nu, Gamma), found)
+
+
+def section_response(M1, M2, M3, kappa_n, section, found):
+    """Return the response of a section from what `section_search` has found for the real parts of the arguments.
+
     One more step of Newton's method, on the numbers as they come, carries imaginary parts along: by the theorem on implicit
     functions that is the exact derivative.
     """
     w1, w3, g, slope, curvature = found
-    U, U1, U3, U11, U13, U33, Uk, U1k, U3k = _strain_energy(w1, w3, kappa_n, nu, Gamma, (g, slope, curvature))
+    U, U1, U3, U11, U13, U33, Uk, U1k, U3k = _strain_energy(w1, w3, kappa_n, section, (g, slope, curvature))
     determinant = U11 * U33 - U13 * U13
     d1 = (U33 * (M1 - U1) - U13 * (M3 - U3)) / determinant
     d3 = (U11 * (M3 - U3) - U13 * (M1 - U1)) / determinant

@@ -11,12 +11,18 @@ a rod add M.omega_n. A section whose modulus is f times that of the first one ha
 from __future__ import annotations
 
 import ast
+import functools
 import math
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, LAWS, Law
+import numpy as np
+
+from ribbon_model import plate
+from ribbon_model.finite_width import isotropic, section_energy
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, LAWS, RIBBON, Law
+from ribbon_model.plate import RIGIDITIES
 
 #: The general Kirchhoff rod, which is no law of the paper.
 ROD = "rod"
@@ -26,6 +32,8 @@ STIFFNESSES = ("B1", "B2", "C")
 NATURAL = ("kappa_n", "kappa_2", "tau_n")
 #: Laws that may have a natural twist: quadratic ones. For the others the energy with one is another function.
 _TWISTED = (ROD, FLAT_ROD.name, ISOTROPIC_ROD.name)
+#: Laws of strips of a plate, which may be orthotropic, with their Hamiltonians then.
+_ORTHOTROPIC = {FLAT_ROD.name: plate.flat_rod, RIBBON.name: plate.ribbon, FINITE_WIDTH.name: plate.finite_width}
 #: Functions in expressions along the strip; all can be differentiated.
 _FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "sqrt", "sinh", "cosh", "tanh", "atan")
 #: Longest expression. A longer one is a table that should be shorter: each is compiled as one formula.
@@ -47,7 +55,8 @@ class Material:
     law : str
         A law of the paper ('ribbon', 'flat rod', 'isotropic rod', 'finite width'), or 'rod'.
     numbers : mapping of str to float
-        Values by name: ``nu``, ``Gamma``, or ``B1``, ``B2``, ``C``, natural strains ``kappa_n``, ``kappa_2``, ``tau_n``, and
+        Values by name: ``nu``, ``Gamma``, or ``B1``, ``B2``, ``C``; for a strip of an orthotropic plate ``D11``, ``D12``,
+        ``D22``, ``D66`` instead of ``nu`` (`ribbon_model.plate`); natural strains ``kappa_n``, ``kappa_2``, ``tau_n``, and
         further names that expressions use. An infinite ``B2`` is a strip that does not bend in its plane.
     along : mapping of str to str
         Expressions in s (from 0 to 1) and numbers, for a natural strain, ``width`` or ``thickness`` (relative to s = 0).
@@ -104,24 +113,34 @@ class Material:
                 raise ValueError(f"along: {name}: its value at s = {step / _STEPS:g} must be {allowed}")
 
     def _check(self, numbers: Mapping[str, float]) -> None:
-        own = (*self.needed, *NATURAL, "softness", "Gamma", *STIFFNESSES)
+        own = (*self.needed, *NATURAL, "softness", "Gamma", "nu", *STIFFNESSES, *RIGIDITIES)
         for name, value in numbers.items():
             infinite = name == "B2" and value == math.inf
             if name in own and name not in (*self.needed, *self.natural, "softness"):
                 raise ValueError(f"{name}: is not a number of the law {self.law!r}")
             if not (math.isfinite(value) or infinite):
                 raise ValueError(f"{name}: {value:g} must be finite")
-            if name in STIFFNESSES and not value > 0:
+            if name in (*STIFFNESSES, "D11", "D22", "D66") and not value > 0:
                 raise ValueError(f"{name}: {value:g} must be positive")
             if name == "nu" and not -1 < value <= 0.5:
                 raise ValueError(f"nu: {value:g} must be greater than -1 and at most 0.5")
             if name in ("Gamma", "softness") and not value >= 0:
                 raise ValueError(f"{name}: {value:g} must not be negative")
+        if self.orthotropic and not numbers["D11"] * numbers["D22"] > numbers["D12"] ** 2:
+            raise ValueError(f"D12: {numbers['D12']:g} must be smaller than the square root of D11 D22")
 
     @property
     def needed(self) -> tuple[str, ...]:
         """Names of the numbers that must be given."""
-        return STIFFNESSES if self.law == ROD else LAWS[self.law].parameters
+        if self.law == ROD:
+            return STIFFNESSES
+        own = LAWS[self.law].parameters
+        return (*RIGIDITIES, *(name for name in own if name != "nu")) if self.orthotropic else own
+
+    @property
+    def orthotropic(self) -> bool:
+        """True if the stiffnesses of a plate stand in place of nu."""
+        return self.law in _ORTHOTROPIC and any(name in self.numbers for name in RIGIDITIES)
 
     @property
     def natural(self) -> tuple[str, ...]:
@@ -197,11 +216,83 @@ class Material:
 
             return rod
         complementary, width, thickness = law.hamiltonian, self.datum("width"), self.datum("thickness")
+        if self.orthotropic:
+            return self._orthotropic_section()
         if law.has_width:
             return lambda t, M1, M2, M3, kappa_n, p: (
                 complementary(M1, M2, M3, kappa_n, p.nu, p.Gamma * width(t, p) ** 2 / thickness(t, p)) - kappa_n * kappa_n / 2
             )
         return lambda t, M1, M2, M3, kappa_n, p: complementary(M1, M2, M3, kappa_n, p.nu) - kappa_n * kappa_n / 2
+
+    def _orthotropic_section(self) -> Callable[..., float]:
+        """Return the same for a strip of an orthotropic plate."""
+        section, width, thickness = _ORTHOTROPIC[self.law], self.datum("width"), self.datum("thickness")
+        if self.law == FINITE_WIDTH.name:
+            return lambda t, M1, M2, M3, kappa_n, p: section(
+                M1, M2, M3, kappa_n, p.D11, p.D12, p.D22, p.D66, p.Gamma * width(t, p) ** 2 / thickness(t, p)
+            )
+        return lambda t, M1, M2, M3, kappa_n, p: section(M1, M2, M3, kappa_n, p.D11, p.D12, p.D22, p.D66)
+
+    def strain_energy(self, t: np.ndarray, strains: np.ndarray, p) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return U, zero in the natural state, the moment dU/d(omega) and the stiffness D2U at places t (K,).
+
+        Components of the strains (K, 3) that cannot change are ignored, and have no moment.
+        """
+        data, factor = [self.datum(name) for name in NATURAL], self._factor()
+        natural = np.array([[datum(s, p) for datum in data] for s in t])
+        modulus = np.array([factor(s, p) for s in t])
+        if self.law in (RIBBON.name, FINITE_WIDTH.name):
+            U, moment, stiffness = self._wide_energy(t, strains, natural[:, 0], p)
+        else:
+            moduli, change = self._moduli(p), strains - natural
+            U, moment = (moduli * change * change).sum(axis=1) / 2, moduli * change
+            stiffness = np.broadcast_to(np.diag(moduli), (len(t), 3, 3)).copy()
+        if self.constrained and p.softness > 0:
+            bent = strains[:, 1] - natural[:, 1]
+            U, moment[:, 1] = U + bent * bent / (2 * p.softness), bent / p.softness
+            stiffness[:, 1, 1] = 1 / p.softness
+        return modulus * U, modulus[:, None] * moment, modulus[:, None, None] * stiffness
+
+    def _moduli(self, p) -> np.ndarray:
+        """Return the three stiffnesses of a quadratic law; zero where omega_2 = 0."""
+        if self.law == ROD:
+            return np.array([p.B1, 0.0 if self.constrained else p.B2, p.C])
+        if self.orthotropic:
+            return np.array([p.D11 - p.D12**2 / p.D22, 0.0, 4 * p.D66])
+        twisting = 1 / (1 + p.nu)
+        return np.array([1.0, 1.0, twisting] if self.law == ISOTROPIC_ROD.name else [1.0, 0.0, 2 * twisting])
+
+    def _wide_energy(self, t: np.ndarray, strains: np.ndarray, kappa_n: np.ndarray, p) -> tuple[np.ndarray, ...]:
+        """Return `strain_energy` of a ribbon (infinite unless omega_1 > 0) or a strip of finite width."""
+        U, moment, stiffness = np.full(len(t), math.inf), np.zeros((len(t), 3)), np.zeros((len(t), 3, 3))
+        modulus = p.D22 if self.orthotropic else 1.0
+        for i, (w1, _, w3) in enumerate(strains):
+            if self.law == RIBBON.name and not w1 > 0:
+                continue
+            U[i], U1, U3, U11, U13, U33, *_ = section_energy(w1, w3, kappa_n[i], self._section_at(t[i], p))
+            moment[i, ::2], stiffness[i, ::2, ::2] = (U1, U3), ((U11, U13), (U13, U33))
+        return modulus * U, modulus * moment, modulus * stiffness
+
+    def _section_at(self, t: float, p) -> tuple:
+        """Return the section of a ribbon or a strip of finite width at a place, as `finite_width.isotropic`."""
+        rigidities = (p.D11, p.D12, p.D22, p.D66) if self.orthotropic else (1.0, p.nu, 1.0, (1 - p.nu) / 2)
+        if self.law == RIBBON.name:
+            return plate.section_of(*rigidities)
+        Gamma = p.Gamma * self.datum("width")(t, p) ** 2 / self.datum("thickness")(t, p)
+        return plate.wide_section_of(*rigidities, Gamma) if self.orthotropic else isotropic(p.nu, Gamma)
+
+    def other_side(self, p) -> float:
+        """Return k of a ribbon, for which bending to the other side lowers the energy where M1 + k kappa_n < 0.
+
+        There the H of omega_1 of either sign are equal. For an orthotropic plate that holds without kappa_n, or where D12 +
+        2 D66 = sqrt(D11 D22); otherwise it is an estimate.
+        """
+        return p.D11 + math.sqrt(p.D11 / p.D22) * p.D12 if self.orthotropic else 1 + p.nu
+
+    def curvatures(self, t: float, w1: float, w3: float, p) -> tuple[float, float, float]:
+        """Return U_11, U_13 and U_33 of the law of finite width at a place, up to a factor."""
+        _, _, _, U11, U13, U33, *_ = section_energy(w1, w3, self.datum("kappa_n")(t, p), self._section_at(t, p))
+        return U11, U13, U33
 
 
 # --- expressions ------------------------------------------------------------------------------------------------------------
@@ -215,6 +306,7 @@ def _zero(t, p):
     return 0.0
 
 
+@functools.lru_cache(maxsize=1000)  # a strip of segments asks for its data at every step downhill
 def compiled(text: str, names: tuple[str, ...]) -> Datum:
     """Return an expression in s, pi, functions and these names as a function of (t, p), with the names as fields of p.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -53,6 +54,57 @@ _ZERO = 1e-10
 _LOOSE = 1e-9
 
 
+#: Fewest intervals of the mesh of a strip with a roller, and the most that are added so that one ends there. It is not adapted.
+_FEWEST, _MOST = 20, 100
+
+
+@dataclass(frozen=True)
+class Roller:
+    """A support between the ends, which holds the place of one point of the strip along a direction.
+
+    Attributes
+    ----------
+    at : float
+        Arclength of this point, a multiple of 1/N for a whole number N up to 100.
+    direction : tuple of float
+        The strip's place there along it is the number ``roller``.
+
+    Raises
+    ------
+    ValueError
+        A field that does not fit; one sentence.
+
+    Notes
+    -----
+    The place is x(at) = the integral of d3 up to there, so a roller is an integral condition whose density jumps at a mesh
+    point. Its multiplier is the force of the roller on the strip, and the contact force before it is larger by this.
+    """
+
+    at: float
+    direction: ends.Vector
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "direction", ends.unit("roller", self.direction))
+        if not 0 < self.at < 1 or self.intervals() == 0:
+            raise ValueError(f"roller: at: {self.at:g} must be a multiple of 1/N between 0 and 1, with N up to {_MOST}")
+
+    def intervals(self, least: int = _FEWEST) -> int:
+        """Return a number of equal intervals, not below ``least``, one of which ends at the roller; 0 if there is none."""
+        counts = range(max(least, _FEWEST), max(least, _FEWEST) + _MOST)
+        return next((count for count in counts if abs(self.at * count - round(self.at * count)) < _LOOSE), 0)
+
+    def density(self) -> Callable:
+        """Return g(t, x, p), whose integral over the strip vanishes where the roller holds it."""
+        at, (x, y, z) = self.at, self.direction
+
+        def density(t, state, p):
+            before = (1 - (t - at) / (abs(t - at) + 1e-300)) / 2
+            d31, d32, d33 = directors(*state[:4])[6:]
+            return before * (x * d31 + y * d32 + z * d33) - p.roller
+
+        return density
+
+
 @dataclass(frozen=True)
 class OpenStrip:
     """A strip between two ends.
@@ -70,6 +122,8 @@ class OpenStrip:
         whose number is ``stroke``.
     phases : tuple of str
         Names of `PHASES`, for strips that can shift along themselves or spin about their tangents.
+    roller : Roller, optional
+        A support between the ends. The place of the first end must be held.
 
     Raises
     ------
@@ -97,6 +151,7 @@ class OpenStrip:
     foundation_direction: ends.Vector = DIRECTIONS["normal"]
     stroke_direction: ends.Vector = DIRECTIONS["tangent"]
     phases: tuple[str, ...] = ()
+    roller: Roller | None = None
 
     def __post_init__(self) -> None:
         for name in ("weight_direction", "foundation_direction", "stroke_direction"):
@@ -112,6 +167,8 @@ class OpenStrip:
                 "numbers: moment needs a hinge or a joint at the last end, about whose axis it acts: elsewhere a dead moment "
                 "has no energy"
             )
+        if self.roller is not None and len(self.start.held) < 3:
+            raise ValueError("roller: the place of the first end must be held")
         if len(set(self.phases)) < len(self.phases):
             raise ValueError("phases: one of them is given twice")
         for name in self.phases:
@@ -123,18 +180,20 @@ class OpenStrip:
     @property
     def known(self) -> tuple[str, ...]:
         """Names of the numbers that can be given here, besides those of the material."""
-        forces = tuple(
-            name for name, axis in zip(FORCES, DIRECTIONS.values()) if not _spanned(axis, self.finish.held)
-        )  # fmt: skip
+        forces = forces_of(self.finish)
         along = np.array(self.finish.held).reshape(-1, 3) @ self.stroke_direction
         stroke = (STROKE,) if np.any(abs(along) > _LOOSE) else ()
-        return (*ends.numbers_of(self.finish), *stroke, *forces, *(name for name in LOADS if name not in FORCES))
+        roller = () if self.roller is None else ("roller",)
+        return (*ends.numbers_of(self.finish), *roller, *stroke, *forces, *(name for name in LOADS if name not in FORCES))
 
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
         natural = self._natural_numbers()
         prescribed = {name: self.numbers.get(name, natural[name]) for name in ends.numbers_of(self.finish)}
+        if self.roller is not None:
+            place = self.natural_states([self.roller.at])[0, 4:] @ self.roller.direction
+            prescribed["roller"] = self.numbers.get("roller", float(place))
         loads = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
         return {**prescribed, **loads, **self.material.parameters}
 
@@ -149,23 +208,28 @@ class OpenStrip:
         ProblemError
             Conditions that repeat or contradict each other.
         """
-        states = (*FRAME, *CENTRELINE, *(f"phase{i}" for i in range(len(self.phases))))
+        states = (*FRAME, *CENTRELINE, *(f"phase{i}" for i in range(self.conditions_inside)))
         return VariationalProblem(
             None, states, self.parameters, hamiltonian=self._hamiltonian(), ends=self._conditions(),
             end_energy=self._end_energy(), symmetries={"plane": _mirrored},
             functionals={name: rate for name, rate in _PLACES.items() if name not in self.parameters},
         )  # fmt: skip
 
+    @property
+    def conditions_inside(self) -> int:
+        """Number of integral conditions: phases, and the roller, which is the last."""
+        return len(self.phases) + (self.roller is not None)
+
     def _hamiltonian(self) -> Callable:
         section, potential = self.material.hamiltonian(), self._potential()
-        phases = _together(self.phases)
+        phases = _together((*(_of_phase(name) for name in self.phases), *([self.roller.density()] if self.roller else [])))
 
         def hamiltonian(t, x, lam, p):
             q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam[:7]
             rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
             M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
             d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
-            return section(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + phases(t, x, lam[7:])
+            return section(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + phases(t, x, lam[7:], p)
 
         return hamiltonian
 
@@ -189,7 +253,7 @@ class OpenStrip:
         clamped = self.start.rotation == CLAMPED
         first, last = ends.rotation_conditions(self.start), ends.rotation_conditions(self.finish)
         place, far = ends.place_conditions(self.start), ends.place_conditions(self.finish)
-        frame, count, prescribed = ends.prescribed, len(self.phases), self._prescribed()
+        frame, count, prescribed = ends.prescribed, self.conditions_inside, self._prescribed()
 
         def conditions(a, b, p):
             turned, there = frame(*prescribed(p)[:3]), prescribed(p)[3:]
@@ -293,13 +357,13 @@ class OpenStrip:
 
         def guess(t):
             a, y, z = (np.interp(t, s, column) for column in (angle, *place.T))
-            return [math.cos(a / 2), -math.sin(a / 2), 0, 0, 0, y, z, *[0] * len(self.phases)]
+            return [math.cos(a / 2), -math.sin(a / 2), 0, 0, 0, y, z, *[0] * self.conditions_inside]
 
         return guess
 
     def twisted(self, turn: float) -> Callable[[float], list[float]]:
         """Return a guess of a straight strip that is evenly twisted."""
-        return lambda t: [math.cos(turn * t / 2), 0, 0, math.sin(turn * t / 2), 0, 0, t, *[0] * len(self.phases)]
+        return lambda t: [math.cos(turn * t / 2), 0, 0, math.sin(turn * t / 2), 0, 0, t, *[0] * self.conditions_inside]
 
     def twisted_circle(self, half_twists: float = 0) -> Callable[[float], list[float]]:
         """Return a guess of a closed strip: a circle that bends about d1 at the start, evenly twisted by half twists."""
@@ -307,7 +371,7 @@ class OpenStrip:
         def guess(t):
             a, b, r = math.pi * t, math.pi * half_twists * t / 2, 1 / (2 * math.pi)
             q = ends.product((math.cos(a), math.sin(a), 0, 0), (math.cos(b), 0, 0, math.sin(b)))
-            return [*q, 0, r * (math.cos(2 * a) - 1), r * math.sin(2 * a), *[0] * len(self.phases)]
+            return [*q, 0, r * (math.cos(2 * a) - 1), r * math.sin(2 * a), *[0] * self.conditions_inside]
 
         return guess
 
@@ -330,7 +394,7 @@ class OpenStrip:
 
     def _natural_guess(self):
         s = np.linspace(0, 1, 401)
-        return s, np.hstack([self.natural_states(s), np.zeros((len(s), len(self.phases)))])
+        return s, np.hstack([self.natural_states(s), np.zeros((len(s), self.conditions_inside))])
 
     def _reason(self, error: Exception) -> str:
         text = str(error)
@@ -386,6 +450,8 @@ class OpenStrip:
     def _ribbon_margin(self, trial: Trial) -> float:
         """Return the least M1 + (1 + nu) kappa_n at the nodes, over the largest: the law holds where it is positive.
 
+        For an orthotropic plate see `Material.other_side`.
+
         With p and a of `ribbon_hamiltonian`, the two roots a belong to omega_1 of either sign, and their H differ by
         sqrt(p**2 + M3**2) (p + 2 nu kappa_n)/2. Where that is negative, bending to the other side lowers the energy at this
         moment: strips with an inflection of this kind need the width.
@@ -395,7 +461,7 @@ class OpenStrip:
         natural, n = self.material.datum("kappa_n"), self.problem.dimension
         kappa_n = np.array([natural(t, p) for t in system.nodes])
         moments = _components(states.T[:4], states.T[n : n + 4])[0]
-        values = moments + (1 + p.nu) * kappa_n
+        values = moments + self.material.other_side(p) * kappa_n
         return float(values.min() / max(abs(values).max(), _LOOSE))
 
     def _convexity(self, trial: Trial) -> float:
@@ -407,12 +473,9 @@ class OpenStrip:
             return -1.0
         places = np.concatenate([omega, (omega[1:] + omega[:-1]) / 2])
         t = np.concatenate([system.nodes, (system.nodes[1:] + system.nodes[:-1]) / 2])
-        data = [self.material.datum(name) for name in ("kappa_n", "width", "thickness")]
         least = math.inf
         for s, (w1, _, w3) in zip(t, places):
-            kappa_n, width, thickness = (datum(s, p) for datum in data)
-            here = _Numbers({"kappa_n": kappa_n, "nu": p.nu, "Gamma": p.Gamma * width**2 / thickness})
-            U11, U13, U33 = FINITE_WIDTH.curvatures_at(w1, w3, here)
+            U11, U13, U33 = self.material.curvatures(s, w1, w3, p)
             least = min(least, (U11 * U33 - U13**2) / (U11 * U33) if U11 > 0 and U33 > 0 else -1.0)
         return least
 
@@ -420,18 +483,35 @@ class OpenStrip:
 
     def reactions(self, point: Point) -> dict[str, float]:
         """Return the force and the moment on the strip at the last end, then at the first one, on the lab axes."""
-        states = point.system.states(point.x)
+        return self.reactions_of(point.system.states(point.x))
+
+    def reactions_of(self, states: np.ndarray) -> dict[str, float]:
+        """Return the same from the states (K, 2n) at the nodes."""
         n = self.problem.dimension
         values = []
-        for row, sign in ((states[-1], 1.0), (states[0], -1.0)):
+        roller = 0.0 if self.roller is None else float(states[0, -1])
+        before = np.zeros(3) if self.roller is None else roller * np.array(self.roller.direction)
+        for row, sign, more in ((states[-1], 1.0, 0.0), (states[0], -1.0, before)):
             q, lam = row[:4], row[n : n + 7]
-            values += [*(sign * lam[4:7]), *(sign * _moment(q, lam[:4]))]
-        return dict(zip(REACTIONS, map(float, values)))
+            values += [*(sign * (lam[4:7] + more)), *(sign * _moment(q, lam[:4]))]
+        found = dict(zip(REACTIONS, map(float, values)))
+        return found if self.roller is None else {**found, "F_roller": roller}
+
+    def potential(self, point: Point) -> float:
+        """Return the energy with the potential of the dead loads at the last end: that of which the index is."""
+        loads = self._end_energy()
+        if loads is None:
+            return point["energy"]
+        last = point.system.states(point.x)[-1]
+        return point["energy"] + float(loads(None, _LastEnd(*last[:7]), _Numbers(point.parameters)))
 
     def strains(self, system: Collocation, x: np.ndarray) -> np.ndarray:
         """Return omega_1, omega_2 and omega_3 (K, 3) at the nodes of a discretized state."""
-        u = system.states(x)
-        return strains_of(u[:, :4], self.problem.batch("field").values(system.nodes, u, u[:0], system.all_parameters(x)))
+        return self.strains_at(system.nodes, system.states(x), system.all_parameters(x))
+
+    def strains_at(self, t: np.ndarray, states: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Return the same at places t (K,) with states (K, 2n) and the values of all parameters."""
+        return strains_of(states[:, :4], self.problem.batch("field").values(t, states, states[:0], p))
 
     def shape(self, point: Point) -> Shape:
         """Return the strip in space, of length 1."""
@@ -462,12 +542,22 @@ _PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lam
 _STRAINS = ("kappa_n", "kappa_2", "tau_n")
 
 
-def _together(names: tuple[str, ...]) -> Callable:
-    """Return the sum of these phases times their multipliers."""
-    if not names:
-        return lambda t, x, lam: 0
-    rest, last, place = _together(names[:-1]), PHASES[names[-1]], len(names) - 1
-    return lambda t, x, lam: rest(t, x, lam) + lam[place] * last(t, x)
+def _together(functions: tuple[Callable, ...]) -> Callable:
+    """Return the sum of these densities times their multipliers."""
+    if not functions:
+        return lambda t, x, lam, p: 0
+    rest, last, place = _together(functions[:-1]), functions[-1], len(functions) - 1
+    return lambda t, x, lam, p: rest(t, x, lam, p) + lam[place] * last(t, x, p)
+
+
+def _of_phase(name: str) -> Callable:
+    """Return the density of a phase as that of a roller is given."""
+    phase = PHASES[name]
+    return lambda t, x, p: phase(t, x)
+
+
+#: States of the last end, as the potential of its loads takes them.
+_LastEnd = namedtuple("_LastEnd", (*FRAME, *CENTRELINE))
 
 
 class _Numbers:
@@ -520,6 +610,16 @@ def _moved(state, k: int, n: int) -> np.ndarray:
         change[:4] = ends.product((0, *axis / 2), state[:4])
         change[4:7] = np.cross(axis, state[4:7])
     return change
+
+
+def forces_of(finish: End) -> tuple[str, ...]:
+    """Return the names of the dead forces that can act on the last end: along directions in which its place is not held."""
+    return tuple(name for name, axis in zip(FORCES, DIRECTIONS.values()) if not _spanned(axis, finish.held))
+
+
+def replacing_loads(finish: End) -> tuple[str, ...]:
+    """Return the names of the dead loads that can replace reactions of the last end: forces, and the moment of a hinge."""
+    return (*forces_of(finish), *(("moment",) if finish.rotation in (HINGED, JOINT) else ()))
 
 
 def _spanned(axis, held) -> bool:

@@ -1,4 +1,4 @@
-"""A closed strip of segments, on each of which the strains are constant: energy, closure and their exact derivatives.
+"""Strips of segments, on each of which the strains are constant; closed ones: energy, closure and their exact derivatives.
 
 The loop is cut into N segments of length h. On each the frame turns about a fixed axis and the centreline is an arc of a helix,
 both in closed form. Closure is six conditions: the frame and the centreline are periodic. So every closed strip of this kind
@@ -43,63 +43,27 @@ def _turn(a):
     return series, cross, square, np.eye(3) + sine * cross + f * square, np.eye(3) + f * cross + g * square
 
 
-# --- the discrete strip -------------------------------------------------------------------------------------------------
+# --- segments in a row --------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class Strip:
-    """A strip of segments of constant strain; B = 1, L = 2 pi. The directors at S = 0 are the lab axes, x(0) is the origin.
+class Chain:
+    """Segments of constant strain, one after the other, from the origin: frames, centreline and their derivatives.
 
     Attributes
     ----------
-    law : Law
-    nu, kappa_n : float
     strains : ndarray, shape (N, 3)
         Components of omega on the directors, segment by segment.
-    Gamma : float, optional
-        Gamma of a law that has one.
+    first : ndarray, shape (3, 3)
+        The first frame; columns are directors.
     """
 
-    law: Law
-    nu: float
-    kappa_n: float
     strains: np.ndarray
-    Gamma: float | None = None
+    first: np.ndarray
 
     @property
     def segment(self) -> float:
         """Length of a segment."""
-        return LENGTH / len(self.strains)
-
-    @property
-    def free(self) -> list[int]:
-        """The components of the strains that may change."""
-        return [0, 2] if self.law.constrained else [0, 1, 2]
-
-    @cached_property
-    def density(self):
-        """U, moment and stiffness on the segments: `Law.strain_energy`."""
-        return self._strain_energy(self.kappa_n)
-
-    def _strain_energy(self, kappa_n):
-        return self.law.strain_energy(self.strains, kappa_n, *self.law.values(self.nu, self.Gamma).values())
-
-    @cached_property
-    def energy(self) -> float:
-        """Mean of U, without the constant kappa_n**2/2."""
-        return float(np.mean(self.density[0]))
-
-    @cached_property
-    def kappa_star(self) -> float:
-        """-dE/dkappa_n, the conjugate curvature (28), with U as in `Law.strain_energy`."""
-        step = 1e-30
-        varied = self._strain_energy(self.kappa_n + 1j * step)[0]
-        return float(-np.mean(varied.imag) / step)
-
-    @property
-    def slack(self) -> int:
-        """Segments on which U is not strictly convex (ribbon: c <= nu kappa_n)."""
-        return int(np.sum(np.any(np.diagonal(self.density[2], axis1=1, axis2=2)[:, self.free] == 0, axis=1)))
+        raise NotImplementedError
 
     @cached_property
     def _local(self):
@@ -115,22 +79,13 @@ class Strip:
         while reach < len(product):  # products of 2, 4, 8 ... neighbours
             product = np.concatenate([product[:reach], product[:-reach] @ product[reach:]])
             reach *= 2
-        return np.concatenate([np.eye(3)[None], product])
+        return self.first @ np.concatenate([np.eye(3)[None], product])
 
     @cached_property
     def centreline(self) -> np.ndarray:
         """x at the ends of the segments, shape (N + 1, 3)."""
         steps = self.segment * np.einsum("kij,kj->ki", self.axes[:-1], self._local[5][:, :, 2])
         return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-
-    @cached_property
-    def closure(self) -> np.ndarray:
-        """Rotation vector of the last frame, and the last x: shape (6,), zero on a closed strip."""
-        last = self.axes[-1]
-        vector = np.array([last[2, 1] - last[1, 2], last[0, 2] - last[2, 0], last[1, 0] - last[0, 1]]) / 2
-        sine = np.linalg.norm(vector)
-        angle = math.atan2(sine, (np.trace(last) - 1) / 2)
-        return np.concatenate([vector * (angle / sine if sine > 0 else 1.0), self.centreline[-1]])
 
     @cached_property
     def turning(self) -> np.ndarray:
@@ -159,6 +114,129 @@ class Strip:
         """Change of a segment's own step by a unit of each strain, shape (N, 3, 3), component by column."""
         return self.segment**2 * np.einsum("kij,kbj->kib", self.axes[:-1], self._slopes[0][..., 2])
 
+    def levers(self, rotation, forces) -> tuple[np.ndarray, ...]:
+        """Return what forces (N, 3) at the ends of segments, and a moment at the last one, do to a segment and what follows.
+
+        Returns
+        -------
+        lever : ndarray, shape (N, 3, 3)
+            Component by column: its product with a rotation before the segment is a second derivative of the work.
+        force, moment : ndarray, shape (N, 3)
+            Sums of the forces at the segment's end and behind, and of their moments about its end.
+        spread : ndarray, shape (N, 3, 3)
+            The sums of arm force^T, less their traces.
+        """
+        x = self.centreline[1:]
+        force = np.cumsum(forces[::-1], axis=0)[::-1]
+        moment = np.cumsum(np.cross(x, forces)[::-1], axis=0)[::-1] - np.cross(x, force)
+        spread = np.cumsum((x[:, :, None] * forces[:, None, :])[::-1], axis=0)[::-1] - x[:, :, None] * force[:, None, :]
+        spread = spread - np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+        lever = np.cross(self.own, force[:, :, None], axis=1) + spread @ self.turning
+        return lever - cross_matrix(rotation) @ self.turning / 2, force, moment, spread
+
+    def curvature(self, rotation, forces) -> np.ndarray:
+        """Return the second derivatives by the strains, shape (N, 3, N, 3), of the sum of forces . x at the ends of segments.
+
+        And of rotation . rotation vector, by which the last frame turns from where it is.
+        """
+        turning, count = self.turning, len(self.turning)
+        lever, force, moment, spread = self.levers(rotation, forces)
+        # a segment rotates all later ones: its rotation vector times the effect of a later one
+        later = np.triu(np.ones((count, count)), 1)[:, None, :, None]
+        result = np.einsum("kia,lib->kalb", turning, lever, optimize=True) * later
+        result += result.transpose(2, 3, 0, 1)
+        first, second = self._slopes
+        turned = self.segment**2 * np.einsum("kij,kbja->kiab", self.axes[:-1], first)
+        pair = np.cross(turning[:, :, :, None], turning[:, :, None, :], axis=1)  # v_a x v_b
+        step = self.segment**3 * np.einsum("kij,kabj->kiab", self.axes[:-1], second)
+        local = np.einsum("ki,kiab->kab", force, step) + np.einsum("ki,kiab->kab", moment, turned)
+        local += np.einsum("kia,kij,kjb->kab", turning, spread, turning) + np.einsum("i,kiab->kab", rotation, turned + pair / 2)
+        result[np.arange(count), :, np.arange(count)] += local
+        return result
+
+
+# --- the discrete strip -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Strip(Chain):
+    """A strip of segments of constant strain; B = 1, L = 2 pi. The directors at S = 0 are the lab axes, x(0) is the origin.
+
+    Attributes
+    ----------
+    law : Law
+    nu, kappa_n : float
+    strains : ndarray, shape (N, 3)
+        Components of omega on the directors, segment by segment.
+    Gamma : float, optional
+        Gamma of a law that has one.
+    """
+
+    law: Law
+    nu: float
+    kappa_n: float
+    strains: np.ndarray
+    Gamma: float | None = None
+
+    @property
+    def first(self) -> np.ndarray:
+        """The first frame: the lab axes."""
+        return np.eye(3)
+
+    @property
+    def segment(self) -> float:
+        """Length of a segment."""
+        return LENGTH / len(self.strains)
+
+    @property
+    def free(self) -> list[int]:
+        """The components of the strains that may change."""
+        return [0, 2] if self.law.constrained else [0, 1, 2]
+
+    @property
+    def size(self) -> int:
+        """n, the number of strains that may change."""
+        return len(self.strains) * len(self.free)
+
+    @property
+    def material(self) -> str:
+        """The name of the law."""
+        return self.law.name
+
+    @cached_property
+    def density(self):
+        """U, moment and stiffness on the segments: `Law.strain_energy`."""
+        return self._strain_energy(self.kappa_n)
+
+    def _strain_energy(self, kappa_n):
+        return self.law.strain_energy(self.strains, kappa_n, *self.law.values(self.nu, self.Gamma).values())
+
+    @cached_property
+    def energy(self) -> float:
+        """Mean of U, without the constant kappa_n**2/2."""
+        return float(np.mean(self.density[0]))
+
+    @cached_property
+    def kappa_star(self) -> float:
+        """-dE/dkappa_n, the conjugate curvature (28), with U as in `Law.strain_energy`."""
+        step = 1e-30
+        varied = self._strain_energy(self.kappa_n + 1j * step)[0]
+        return float(-np.mean(varied.imag) / step)
+
+    @property
+    def slack(self) -> int:
+        """Segments on which U is not strictly convex (ribbon: c <= nu kappa_n)."""
+        return int(np.sum(np.any(np.diagonal(self.density[2], axis1=1, axis2=2)[:, self.free] == 0, axis=1)))
+
+    @cached_property
+    def closure(self) -> np.ndarray:
+        """Rotation vector of the last frame, and the last x: shape (6,), zero on a closed strip."""
+        last = self.axes[-1]
+        vector = np.array([last[2, 1] - last[1, 2], last[0, 2] - last[2, 0], last[1, 0] - last[0, 1]]) / 2
+        sine = np.linalg.norm(vector)
+        angle = math.atan2(sine, (np.trace(last) - 1) / 2)
+        return np.concatenate([vector * (angle / sine if sine > 0 else 1.0), self.centreline[-1]])
+
     @cached_property
     def closure_slopes(self) -> np.ndarray:
         """Derivatives of `closure` by the strains, shape (6, N, 3); those of the rotation are exact on closed strips."""
@@ -170,23 +248,9 @@ class Strip:
     def closure_curvature(self, multipliers) -> np.ndarray:
         """Return the second derivatives of multipliers . closure by the strains on a closed strip, shape (N, 3, N, 3)."""
         rotation, position = np.split(np.asarray(multipliers), 2)
-        turning, shift = self.turning, self.closure_slopes[3:].transpose(1, 0, 2)
-        # a segment rotates all later ones: its rotation vector times the effect of a later one
-        lever = -cross_matrix(position) @ shift - cross_matrix(rotation) @ turning / 2
-        count = len(turning)
-        later = np.triu(np.ones((count, count)), 1)[:, None, :, None]
-        result = np.einsum("kia,lib->kalb", turning, lever, optimize=True) * later
-        result += result.transpose(2, 3, 0, 1)
-        first, second = self._slopes
-        turned = self.segment**2 * np.einsum("kij,kbja->kiab", self.axes[:-1], first)
-        arm = (self.centreline[-1] - self.centreline[1:])[:, :, None, None]
-        pair = np.cross(turning[:, :, :, None], turning[:, :, None, :], axis=1)  # v_a x v_b
-        inner = np.cross(turning[:, :, None, :], arm, axis=1)  # v_b x arm
-        local = self.segment**3 * np.einsum("kij,kabj->kiab", self.axes[:-1], second)
-        local += np.cross(turned, arm, axis=1) + np.cross(turning[:, :, :, None], inner, axis=1)
-        local = np.einsum("i,kiab->kab", position, local) + np.einsum("i,kiab->kab", rotation, turned + pair / 2)
-        result[np.arange(count), :, np.arange(count)] += local
-        return result
+        forces = np.zeros((len(self.strains), 3))
+        forces[-1] = position
+        return self.curvature(rotation, forces)
 
     def linearized(self):
         """Return moments (n,), slopes of closure (6, n) and Hessian of the Lagrangian (n, n) by the free strains, times N.

@@ -22,13 +22,14 @@ def main(argv=None) -> int:
     parser.add_argument("--nu", type=float, help="which nu, where the diagram has several")
     parser.add_argument("--plain", action="store_true", help="only in conjugate coordinates, not disentangled beside")
     options = parser.parse_args(argv)
+    from branches import diagram_graph
     from branches.draw_diagram import figure
     from branches.files import StoreError, check_picture, write_picture
     from branches.graph import read
 
     try:
         out = picture_path(options)
-        graph = read(options.diagram)
+        graph = diagram_graph.read(options.diagram) if Path(options.diagram).is_dir() else read(options.diagram)
         law, nu, more = choose(graph, options.law, options.nu)
         check_picture(out)
         write_picture(figure(graph, law, nu, tuple(options.window), not options.plain), out)

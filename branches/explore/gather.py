@@ -117,7 +117,7 @@ def _files_of(path: Path) -> tuple[list[Path], str]:
         return [path], ""
     if not (path / DIAGRAM).exists() and (found := sorted(path.glob(f"*{STORED}"))):
         return found, ""
-    graph = diagram.read(path)
+    graph = diagram.read_any(path)
     names = dict.fromkeys(data["file"] for _, _, data in graph.edges(data=True))
     if not names:
         raise StoreError(f"the diagram in {str(path)!r} holds no branch")

@@ -8,7 +8,7 @@ import pytest
 from browser import CHROMIUM, Browser
 
 import contin
-from branches import export, run
+from branches import export, graph, open_graph, run
 from branches.config import ConfigError, dump, load, parse
 from branches.display import Display
 from branches.explore import __main__ as page
@@ -33,6 +33,16 @@ MISTAKES = {
     TIP.replace("to: -6", "too: -6"): "the field 'stages.0.to' is missing",
     TIP.replace("force_width", "force"): "stage 1: follow: 'force' must be one of the numbers here",
     TIP.replace("-6}", "-6, start_at: BP}"): "stage 1: start_at: the first stage starts from the first state",
+    TIP.replace("-6}", "-6, finish: clamped}"): "stage 1: start, finish, numbers: those of the scene are the first stage's",
+    TIP.replace("-6}", "-6}, {follow: force_width, to: 0, finish: clamped}"): "stage 2: follow: 'force_width' must be one of",
+    TIP.replace("-6}", "-6}, {follow: force_width, to: 0, numbers: {bend: 1}}"): "stage 2: numbers: 'bend' must be one of",
+    TIP + "roller: {at: 1.5}\n": "roller.at: must be less than 1, not 1.5",
+    TIP + "roller: {at: 0.123456789}\n": "roller: at: 0.123457 must be a multiple of 1/N",
+    TIP + "roller: {at: 0.5, held: up}\n": "roller.held: must be width, normal, tangent or three numbers",
+    TIP.replace("0.3", "[]"): "material.nu: must be a number, or a list of numbers, not []",
+    TIP.replace("0.3", "[0.3, 0.30]"): "the branch nu = 0.3 is listed twice",
+    TIP.replace("0.3", "[0.8, 0.9]"): "none of its branches can be run (nu: 0.8 must be",
+    TIP.replace("0.3", "[0.2, 0.3]").replace("to: -6", "too: -6"): "the field 'stages.0.to' is missing",
     TIP + "closed: {half_twists: 1}\n": "closed: must not be given together with start or finish",
     TIP + "numbers: {distance: 1}\n": "numbers: distance is used by nothing here",
     TIP + "along: {kappa_n: 'exp(x)'}\n": "along: kappa_n: 'exp(x)': 'x' is not allowed",
@@ -155,21 +165,89 @@ def test_what_other_commands_say(tip, root, command, words, sentence):
     assert done.returncode == 2 and sentence in done.err and done.err.count("\n") == 1
 
 
-def test_interrupted_and_run_again(root, tmp_path):
-    """Ctrl-C keeps the points so far; --resume computes the scene again, to the same points."""
+def test_interrupted_and_run_again(tip, root, tmp_path, tables):
+    """Ctrl-C keeps the points so far; --resume goes on from there, in any stage, to the same bits."""
+    config, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
+    shown = []
 
     class Interrupts(Display):
+        def __init__(self, at):
+            super().__init__(silent=True)
+            self.at = at
+
         def stage_point(self, config, stage, point, number):
-            if number == 5:
+            shown.append(number)
+            if number == self.at:
                 signal.raise_signal(signal.SIGINT)
 
-    config, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
-    assert run_stages(config, path, Interrupts(silent=True)) == "interrupted"
-    assert read_branch(path).status == "interrupted" and len(read_branch(path).points) == 6
+    stage = read_branch(tip).points["stage"]
+    places = [0, 5, int(np.flatnonzero(stage == 2)[0]), len(stage) - 2]
+    for place in places:
+        assert run_stages(config, path, Interrupts(place), resume=place > 0) == "interrupted"
+        assert read_branch(path).status == "interrupted" and len(read_branch(path).points) == place + 1
     with pytest.raises(StoreError, match="unfinished run of this scene; --resume"):
         run_stages(config, path, Display(silent=True))
-    assert run_stages(config, path, Display(silent=True), resume=True) == "complete"
-    assert len(read_branch(path).points) > 20
+    assert run_stages(config, path, Interrupts(None), resume=True) == "complete"
+    assert shown == sorted(shown) and len(shown) < len(stage) + len(places)  # nothing is computed twice but ends inside a step
+    assert tables(path) == tables(tip)
+
+
+def test_a_scene_with_further_stages_goes_on(tip, root, tmp_path, tables):
+    """The file of the first stage alone becomes that of both."""
+    both, path = load(root / "configs" / "open_tip.yaml"), tmp_path / "tip.h5"
+    one = both.model_copy(update={"stages": both.stages[:1]})
+    assert run_stages(one, path, Display(silent=True)) == "complete"
+    assert run_stages(both, path, Display(silent=True), resume=True) == "complete"
+    assert tables(path) == tables(tip)
+    other = both.model_copy(update={"stages": [both.stages[1], both.stages[1]]})
+    with pytest.raises(StoreError, match="holds another scene"):
+        run_stages(other, path, Display(silent=True), resume=True)
+
+
+def test_a_scene_of_many_strips(call, tmp_path):
+    """Lists give one result for each combination, and one graph: the tip loads of Michell, 4.0126 sqrt(2/(1 + nu))."""
+    (tmp_path / "tip.yaml").write_text(TIP.replace("nu: 0.3", "nu: [0.2, 0.9, 0.5]").replace("to: -6", "to: [-5, -6]"))
+    done = call(run.main, "tip.yaml", "--out", "tips", "--workers", "1")
+    assert done.returncode == 0 and "4 branches" in done.out
+    assert "left out: nu = 0.9, stage 1 to = -5: nu: 0.9 must be" in done.out
+    assert sorted(path.name for path in (tmp_path / "tips").glob("*.h5")) == [
+        f"nu{nu}_stage_1_to{to}.h5" for nu in (0.2, 0.5) for to in (-5, -6)
+    ]  # fmt: skip
+    diagram = graph.read(tmp_path / "tips")
+    found = {data["nu"]: data["force_width"] for _, data in diagram.nodes(data=True) if data["kind"] == "branch point"}
+    for nu, force in found.items():
+        assert force == pytest.approx(-4.012599 * math.sqrt(2 / (1 + nu)), rel=1e-6)
+    assert len(found) == 2 and diagram.number_of_edges() == 7  # that of nu = 0.2 is beyond -5
+    listed = call(graph.main, "tips")
+    assert "nu = 0.2, stage 1 to = -5\n  stage 1, force_width: 0 -> -5\n" in listed.out
+    assert "nu = 0.5, stage 1 to = -5\n  stage 1, force_width: 0 -> branch point at -4.63" in listed.out
+    for words in (["tips", "--at", "3"], ["tips", "--folds", "0", "1"]):
+        refused = call(graph.main, *words)
+        assert refused.returncode == 2 and "without --where, --at and --folds" in refused.err
+    again = call(run.main, "tip.yaml", "--out", "tips")
+    assert again.returncode == 0 and "4 of them computed before" in again.out
+    (tmp_path / "tip.yaml").write_text(TIP.replace("nu: 0.3", "nu: [0.2, 0.4]"))
+    other = call(run.main, "tip.yaml", "--out", "tips")
+    assert other.returncode == 2 and "holds another scene" in other.err
+
+
+def test_where_lists_stand_in_place_of_numbers():
+    """Of the material, the ends of stages and the roller; a direction and a table are lists in any case."""
+    text = TIP.replace("flat rod", "[flat rod, ribbon]").replace("to: -6", "to: -6, numbers: {}")
+    text += "roller: {at: [0.25, 0.5], held: [0, 1, 0]}\nalong: {kappa_n: [[0, 1], [1, 2]]}\n"
+    sweep = parse(text, "scene")
+    assert sweep.numbers["lawribbon_roller_at0.5.h5"] == {"law": "ribbon", "roller at": 0.5} and len(sweep.branches) == 4
+    assert parse(dump(sweep), "scene") == sweep
+
+
+def test_a_stage_begins_at_the_node_of_the_one_before(tip):
+    """The graph of one result: the second stage leaves the branch point of the first one."""
+    one = open_graph.new_graph("")
+    open_graph.add_result(one, read_branch(tip), "tip.h5", {"nu": 0.3})
+    edges = [(data["ends"], data["stage"], data["index"]) for *_, data in one.edges(data=True)]
+    point = edges[0][0][1]
+    assert "stage 1, branch point" in point and [ends[0] for ends, stage, _ in edges if stage == 2] == [point]
+    assert [index for *_, index in edges] == [0, 1, 0]
 
 
 def test_points_that_later_stages_miss(tmp_path):
@@ -184,6 +262,51 @@ def test_points_that_later_stages_miss(tmp_path):
         assert run_stages(parse(ring + stages % start_at, "scene"), path, Display(silent=True)) == "lost"
         branch = read_branch(path)
         assert sentence in branch.stop and set(branch.points["stage"]) == {1}
+
+
+@pytest.mark.full
+def test_an_arch_under_a_roller(root, tmp_path):
+    """Symmetric about its middle until it leaves for the branch on which it snaps through; then its second mode grows."""
+    path = tmp_path / "roller.h5"
+    assert run_stages(load(root / "configs" / "open_roller.yaml"), path, Display(silent=True)) == "complete"
+    branch = read_branch(path)
+    (first, *_) = branch.events[branch.events["label"] == b"BP"]
+    assert (first["index_before"], first["index_after"]) == (0, 1)
+    through = branch.points[branch.points["stage"] == 2]
+    assert set(through["index"][2:]) == {0} and through["roller"][-1] == pytest.approx(-0.05)
+    assert np.interp(0.0, through["roller"][::-1], through["F_roller"][::-1]) == pytest.approx(0.0, abs=1e-3)
+    shape = branch.shape(len(branch.points) - 1)
+    assert np.interp(0.5, shape.arclength, shape.centreline[:, 1]) == pytest.approx(-0.05, abs=1e-9)
+    sums = through["F_normal"] + through["start_F_normal"] + through["F_roller"]
+    assert np.abs(sums).max() < 1e-8
+
+
+@pytest.mark.full
+def test_ends_that_change(root, tmp_path):
+    """States agree whether a number or its conjugate is prescribed, and the fold is that of the moment."""
+    path = tmp_path / "release.h5"
+    assert run_stages(load(root / "configs" / "open_release.yaml"), path, Display(silent=True)) == "complete"
+    branch = read_branch(path)
+    stages = [branch.points[branch.points["stage"] == number] for number in (1, 2, 3, 4)]
+    for before, after in ((stages[0], stages[1]), (stages[2], stages[3])):
+        for name in ("distance", "energy", "F_tangent", "M_width", "F_normal"):
+            assert after[0][name] == pytest.approx(before[-1][name], rel=1e-8, abs=1e-8)
+    assert stages[1][0]["force_tangent"] == pytest.approx(stages[0][-1]["F_tangent"], rel=1e-8)
+    assert stages[3][0]["moment"] == pytest.approx(stages[2][-1]["M_width"], rel=1e-8)
+    assert stages[0][0]["moment"] == 0 and stages[3][0]["distance"] == pytest.approx(0.9)
+    (fold,) = branch.events[branch.events["label"] == b"LP"]
+    assert (fold["stage"], fold["index_before"], fold["index_after"]) == (4, 0, 1)
+    assert branch.plot(3).axes and len(branch.strains(len(branch.points) - 1))
+
+
+def test_ends_that_let_go_of_a_moment(tmp_path):
+    """The run ends with what is not carried, and keeps what was computed."""
+    text = "material: {law: rod, B1: 1, B2: 4, C: 0.8}\nnumbers: {distance: 0.98}\nbegin: arch\n"
+    text += "stages: [{follow: distance, to: 0.97}, {follow: distance, to: 0.9, finish: ball joint}]\n"
+    path = tmp_path / "arch.h5"
+    assert run_stages(parse(text, "scene"), path, Display(silent=True)) == "lost"
+    branch = read_branch(path)
+    assert branch.stop.startswith("stage 2: start, finish: they let go of what no load replaces") and len(branch.points) > 2
 
 
 @pytest.mark.full

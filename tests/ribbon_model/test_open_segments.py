@@ -1,0 +1,134 @@
+"""Open strips of segments: exact derivatives, the index of the continuous strip, and what lies beside a saddle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import contin
+from ribbon_model.barriers import KICK_OPEN, apart, ways_down
+from ribbon_model.changed_ends import with_ends
+from ribbon_model.descent import descend, modes
+from ribbon_model.ends import ANGLES, BALL, CLAMP, FREE_END, PLACE, End, angles_of, hinge
+from ribbon_model.material import Material
+from ribbon_model.open_segments import OpenChain, cut, unsupported
+from ribbon_model.open_strip import OpenStrip
+
+ROD = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8, "kappa_n": 0.5})
+LOADS = {"force_width": 1.3, "force_normal": -0.4, "force_tangent": 0.7, "weight": 2.0, "foundation": 3.0}
+STRIPS = {
+    "clamped": OpenStrip(ROD, numbers={"weight": 2.0}), "free": OpenStrip(ROD, finish=FREE_END, numbers=LOADS),
+    "hinged": OpenStrip(ROD, hinge("normal"), BALL, {"weight": 2.0, "foundation": 3.0}), "ball": OpenStrip(ROD, BALL, CLAMP),
+}  # fmt: skip
+
+
+def held_where_it_is(strip, segments):
+    """A strip of random strains, with prescribed numbers that fit it."""
+    strains = np.random.default_rng(0).normal(size=(segments, 3))
+    chain = OpenChain(strip, strip.parameters, strains, np.eye(3))
+    x, y, z, w = Rotation.from_matrix(chain.axes[-1]).as_quat()
+    here = dict(zip(ANGLES, angles_of((w, x, y, z)))) | dict(zip(PLACE, chain.centreline[-1]))
+    return replace(chain, numbers={name: here.get(name, value) for name, value in strip.parameters.items()})
+
+
+@pytest.mark.parametrize(
+    "ends", ["clamped", "free", *(pytest.param(name, marks=pytest.mark.full) for name in ("hinged", "ball"))]
+)
+def test_derivatives_against_differences(ends):
+    """Of the energy and of the conditions with their multipliers; the differences are good to 1e-8 and 1e-7 of the largest."""
+    chain, h = held_where_it_is(STRIPS[ends], 5), 1e-4
+    gradient, slopes, hessian, multipliers = chain.linearized()
+    unit = h * np.eye(chain.size)
+
+    def lagrangian(change):
+        moved = chain._changed(change)
+        return 5 * moved.energy + multipliers @ moved.closure
+
+    first = [(lagrangian(a) - lagrangian(-a)) / (2 * h) for a in unit]
+    np.testing.assert_allclose(first, gradient + multipliers @ slopes, atol=1e-7 * np.abs(gradient).max())
+    pairs = [[(lagrangian(a + b), lagrangian(a - b), lagrangian(b - a), lagrangian(-a - b)) for a in unit] for b in unit]
+    second = np.array(pairs) @ [1, -1, -1, 1] / (4 * h * h)
+    np.testing.assert_allclose(second, hessian, atol=1e-6 * np.abs(hessian).max())
+
+
+@pytest.mark.parametrize(
+    ("law", "numbers"),
+    [
+        ("rod", {"B1": 1.0, "B2": 3.0, "C": 0.8, "tau_n": 0.2}), ("flat rod", {"nu": 0.3, "kappa_n": 0.4}),
+        ("flat rod", {"nu": 0.3, "softness": 0.1}), ("isotropic rod", {"nu": 0.3, "kappa_2": 0.1}),
+        ("ribbon", {"nu": 0.3, "kappa_n": 0.2}), ("finite width", {"nu": 0.3, "Gamma": 2.0, "kappa_n": 0.2}),
+        ("ribbon", {"D11": 3.0, "D12": 0.4, "D22": 1.0, "D66": 0.5}),
+        ("finite width", {"D11": 3.0, "D12": 0.4, "D22": 1.0, "D66": 0.5, "Gamma": 2.0}),
+    ],
+)  # fmt: skip
+def test_the_energy_is_that_of_the_hamiltonian(law, numbers):
+    """U(w) and the largest M.w - H belong together: dH/dM at M = dU/dw is w, and U = M.w - H."""
+    material = Material(law, numbers, {"width": "1 - s/4"} if law == "finite width" else {})
+    p, t = contin_numbers(material), np.array([0.2, 0.7])
+    strains = np.array([[0.9, 0.05, 0.3], [1.2, -0.1, -0.4]])
+    U, moment, stiffness = material.strain_energy(t, strains, p)
+    H = material.hamiltonian()
+    for s, w, energy, M, matrix in zip(t, strains, U, moment, stiffness):
+        w = np.where(np.diag(matrix) > 0, w, 0.0)
+        assert energy == pytest.approx(M @ w - H(s, *M, p), rel=1e-10)
+        step = 1e-5
+        slopes = [(H(s, *(M + d), p) - H(s, *(M - d), p)) / (2 * step) for d in step * np.eye(3)]
+        free = np.diag(matrix) > 0
+        np.testing.assert_allclose(np.array(slopes)[free], w[free], atol=1e-8)
+        moved = material.strain_energy(np.full(6, s), w + step * np.vstack([np.eye(3), -np.eye(3)]), p)[1]
+        difference = (moved[:3] - moved[3:]) / (2 * step)
+        np.testing.assert_allclose(difference[free][:, free], matrix[free][:, free], rtol=1e-6, atol=1e-7)
+
+
+def contin_numbers(material):
+    return type("Numbers", (), material.parameters)()
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("finish", ["clamped", "hinged"])
+def test_the_index_and_the_energy_are_those_of_the_continuous_strip(finish):
+    """Along the arch whose end is bent: the number of negative eigenvalues, and the energy, whose error falls by four."""
+    rod = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})
+    if finish == "clamped":
+        name, strip = "bend", OpenStrip(rod, numbers={"distance": 0.9, "bend": 0.0})
+    else:
+        name, strip = "moment", OpenStrip(rod, finish=hinge(), numbers={"distance": 0.9, "moment": 0.0})
+    options = {"free": [name], "limits": {name: (-9, 9)}, "direction": -1 if name == "bend" else 1, "max_points": 40}
+    branch = contin.trace(strip.first_point(strip.arch()), **options)
+    indices = set()
+    for point in [point for point in branch if not point.label][3::4]:
+        index = point.second_variation().index()
+        errors = [cut(strip, point.system, point.x, segments).energy - strip.potential(point) for segments in (64, 128)]
+        values = modes(cut(strip, point.system, point.x, 128))[0]
+        if min(abs(values)) > 0.3:  # of stiffnesses of one; nearer to zero the segments may change a sign
+            assert np.count_nonzero(values < 0) == index
+            indices.add(index)
+        assert 3 < errors[0] / errors[1] < 5
+    assert {0, 1} <= indices
+
+
+@pytest.mark.full
+def test_both_sides_of_the_saddle_between_two_arches():
+    """The second mode of a clamped arch has index 1 and leads to both first modes, mirror images of equal energy."""
+    strip = OpenStrip(Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8}), numbers={"distance": 0.9})
+    arches = [strip.first_point(strip.arch(side=side)) for side in (1.0, -1.0)]
+
+    column = OpenStrip(strip.material, finish=End(held=CLAMP.held[:2]), numbers={"force_tangent": -70.0})
+    straight = contin.trace(column.first_point(), free=["force_tangent"], limits={"force_tangent": (-90, -60)}, direction=-1)
+    (start, *_) = straight.labelled("BP")
+    mode = contin.trace(start, branch=1, zeros={"distance": [0.9]}, limits={"distance": (0.85, 1.1)})
+    system, x = with_ends(strip, mode.labelled("UZ")[0], "distance")
+    saddle = contin.point_of(system, x)
+    assert saddle.second_variation().index() == 1
+    found = ways_down(lambda segments: cut(strip, saddle.system, saddle.x, segments), apart, KICK_OPEN)
+    rests = [descend(cut(strip, arch.system, arch.x, len(found[0].strains))).end for arch in arches]
+    assert all(any(not apart(end, rest) for end in found) for rest in rests) and apart(*rests)
+    assert found[0].energy == pytest.approx(found[1].energy, rel=1e-9)
+
+
+def test_what_is_not_cut_into_segments():
+    assert unsupported(STRIPS["hinged"]) == ""
+    assert "phases" in unsupported(OpenStrip(ROD, phases=("spin",)))
+    with pytest.raises(ValueError, match="a strip whose first end can move is not cut into segments"):
+        cut(OpenStrip(ROD, FREE_END, CLAMP), None, None, 10)
