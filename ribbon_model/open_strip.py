@@ -46,6 +46,8 @@ REACTIONS = tuple(
 )  # fmt: skip
 #: Largest angle of an arch that is a first guess: beyond it the strip passes through itself.
 _STEEPEST = 2.4
+#: Halvings of the interval in which its amplitude is looked for: to round-off. Ten times more change nothing.
+_HALVINGS = 50
 #: An eigenvalue of the second variation below this part of the largest is zero: a motion that costs no energy. Round-off
 #: leaves 1e-14, and slow branches near their birth have eigenvalues above 1e-8.
 _ZERO = 1e-10
@@ -133,8 +135,9 @@ class OpenStrip:
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
-        natural = self._natural_numbers()
-        prescribed = {name: self.numbers.get(name, natural[name]) for name in ends.numbers_of(self.finish)}
+        names = ends.numbers_of(self.finish)
+        natural = {} if set(names) <= set(self.numbers) else self._natural_numbers()
+        prescribed = {name: self.numbers[name] if name in self.numbers else natural[name] for name in names}
         loads = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
         return {**prescribed, **loads, **self.material.parameters}
 
@@ -243,15 +246,15 @@ class OpenStrip:
 
     def natural_states(self, t) -> np.ndarray:
         """Return quaternion and centreline (K, 7) of the natural state at places t (K,) in [0, 1], from the first frame."""
-        from scipy.integrate import solve_ivp
-
-        data = [self.material.datum(name) for name in ("kappa_n", "kappa_2", "tau_n")]
-        p = _Numbers(self.material.parameters)
+        data = [self.material.datum(name) for name in _STRAINS]
+        p, t = _Numbers(self.material.parameters), np.atleast_1d(np.asarray(t, dtype=float))
+        if not set(_STRAINS) & set(self.material.along):
+            return _helix(np.array([datum(0.0, p) for datum in data]), t)
+        from scipy.integrate import solve_ivp  # takes .5 s, and is needed where natural strains vary only
 
         def rates(s, x):
             return [*spin(*x[:4], *(datum(s, p) for datum in data), 1), *directors(*x[:4])[6:]]
 
-        t = np.atleast_1d(np.asarray(t, dtype=float))
         order = np.argsort(t)
         found = solve_ivp(rates, (0, 1), [1.0, 0, 0, 0, 0, 0, 0], "DOP853", t[order], rtol=1e-12, atol=1e-12).y.T
         states = np.empty_like(found)
@@ -277,8 +280,6 @@ class OpenStrip:
         side : float
             +1 to the side of the normal, -1 to the other one.
         """
-        from scipy.optimize import brentq
-
         distance = self.parameters.get("distance", 0.9) if distance is None else distance
         mode = _euler_mode(self.start, self.finish)
         s = np.linspace(0, 1, 2001)
@@ -286,8 +287,11 @@ class OpenStrip:
         least = float(np.mean(np.cos(_STEEPEST * mode_values)))
         if not least < distance <= 1:
             raise ValueError(f"distance = {distance:g} must be above {least:.3g}, and at most 1")
-        amplitude = side * brentq(lambda a: np.mean(np.cos(a * mode_values)) - distance, 0, _STEEPEST) if distance < 1 else 0.0
-        angle = amplitude * mode_values
+        amplitude, change = 0.0, _STEEPEST
+        for _ in range(_HALVINGS):  # the distance falls with the amplitude
+            change /= 2
+            amplitude += change if np.mean(np.cos((amplitude + change) * mode_values)) > distance else 0.0
+        angle = side * amplitude * mode_values
         steps = np.diff(s)[:, None] * (np.column_stack([np.sin(angle), np.cos(angle)])[1:] + 0)
         place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
 
@@ -502,6 +506,17 @@ def _moment(q, lam) -> np.ndarray:
     """Return the moment on the lab axes from the multipliers of the quaternion."""
     result: np.ndarray = _components(q, lam) @ np.array(directors(*q)).reshape(3, 3)
     return result
+
+
+def _helix(strains: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return quaternion and centreline (K, 7) at places t (K,) of a strip whose strains are constant."""
+    size = float(np.linalg.norm(strains))
+    axis, tangent = strains / (size or 1.0), np.array([0.0, 0.0, 1.0])
+    half, angle = size * t[:, None] / 2, size * t[:, None]
+    sine = np.sin(angle) / size if size else t[:, None]
+    cosine = 2 * np.sin(half) ** 2 / (size or 1.0)  # (1 - cos)/size without cancellation
+    place = axis * axis[2] * (t[:, None] - sine) + tangent * sine + np.cross(axis, tangent) * cosine
+    return np.hstack([np.cos(half), np.sin(half) * axis, place])
 
 
 def _mirrored(t, x):
