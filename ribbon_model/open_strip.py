@@ -325,9 +325,13 @@ class OpenStrip:
         """
         if guess is None:
             guess = self._natural_guess()
+        options = {"intervals": intervals, "degree": degree, **options}
         try:
-            point = solve(self.problem, guess, values, intervals=intervals, degree=degree, **options)
+            point = solve(self.problem, guess, values, **options)
         except ContinError as error:
+            loads = {name: 0.0 for name in LOADS if name in self.numbers}
+            if loads and str(error).startswith(_NO_CONVERGENCE):
+                self._check_unloaded(guess, {**(values or {}), **loads}, options)
             raise ProblemError(self._reason(error)) from error
         self.check_determined(point)
         return point
@@ -336,8 +340,17 @@ class OpenStrip:
         s = np.linspace(0, 1, 401)
         return s, np.hstack([self.natural_states(s), np.zeros((len(s), len(self.phases)))])
 
+    def _check_unloaded(self, guess, values: Mapping[str, float], options: Mapping) -> None:
+        """Raise ProblemError where the state without loads is not determined: then no search with them arrives."""
+        try:
+            solve(self.problem, guess, values, **options)
+        except ContinError as error:
+            raise ProblemError(self._reason(error)) from error
+
     def _reason(self, error: Exception) -> str:
         text = str(error)
+        if text.startswith(_NO_CONVERGENCE):
+            return NOT_FOUND
         if "repeat or contradict" in text:
             return UNDETERMINED
         if "vanishes along a mode" in text:
@@ -458,8 +471,15 @@ UNHELD = (
 )
 #: Why reactions are not determined.
 UNDETERMINED = (
-    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip that does "
-    "not bend in its plane is held sideways at both ends); begin with an arch, a twist or a softness, or hold less"
+    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip is held at "
+    "its full length, or does not bend in its plane and is held sideways at both ends); begin with an arch, a twist or a "
+    "softness, or hold less"
+)
+#: How `contin.solve` begins to say that no state was found, and what that means here.
+_NO_CONVERGENCE = "Newton did not converge"
+NOT_FOUND = (
+    "no equilibrium was found near the first guess; begin with smaller loads, or nearer to the natural state, and follow these "
+    "numbers in a stage, or begin with another first state"
 )
 #: Place of the last end from the first one, as integrals over the strip.
 _PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))
