@@ -343,7 +343,7 @@ class OpenStrip:
     def _check_unloaded(self, guess, values: Mapping[str, float], options: Mapping) -> None:
         """Raise ProblemError where the state without loads is not determined: then no search with them arrives."""
         try:
-            solve(self.problem, guess, values, **options)
+            self.check_determined(solve(self.problem, guess, values, **options))
         except ContinError as error:
             raise ProblemError(self._reason(error)) from error
 
