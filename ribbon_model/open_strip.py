@@ -47,6 +47,8 @@ REACTIONS = tuple(
 )  # fmt: skip
 #: Largest angle of an arch that is a first guess: beyond it the strip passes through itself.
 _STEEPEST = 2.4
+#: Halvings of the interval in which its amplitude is looked for: to round-off. Ten times more change nothing.
+_HALVINGS = 50
 #: An eigenvalue of the second variation below this part of the largest is zero: a motion that costs no energy. Round-off
 #: leaves 1e-14, and slow branches near their birth have eigenvalues above 1e-8.
 _ZERO = 1e-10
@@ -189,8 +191,9 @@ class OpenStrip:
     @functools.cached_property
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
-        natural = self._natural_numbers()
-        prescribed = {name: self.numbers.get(name, natural[name]) for name in ends.numbers_of(self.finish)}
+        names = ends.numbers_of(self.finish)
+        natural = {} if set(names) <= set(self.numbers) else self._natural_numbers()
+        prescribed = {name: self.numbers[name] if name in self.numbers else natural[name] for name in names}
         if self.roller is not None:
             place = self.natural_states([self.roller.at])[0, 4:] @ self.roller.direction
             prescribed["roller"] = self.numbers.get("roller", float(place))
@@ -307,15 +310,15 @@ class OpenStrip:
 
     def natural_states(self, t) -> np.ndarray:
         """Return quaternion and centreline (K, 7) of the natural state at places t (K,) in [0, 1], from the first frame."""
-        from scipy.integrate import solve_ivp
-
-        data = [self.material.datum(name) for name in ("kappa_n", "kappa_2", "tau_n")]
-        p = _Numbers(self.material.parameters)
+        data = [self.material.datum(name) for name in _STRAINS]
+        p, t = _Numbers(self.material.parameters), np.atleast_1d(np.asarray(t, dtype=float))
+        if not set(_STRAINS) & set(self.material.along):
+            return _helix(np.array([datum(0.0, p) for datum in data]), t)
+        from scipy.integrate import solve_ivp  # takes .5 s, and is needed where natural strains vary only
 
         def rates(s, x):
             return [*spin(*x[:4], *(datum(s, p) for datum in data), 1), *directors(*x[:4])[6:]]
 
-        t = np.atleast_1d(np.asarray(t, dtype=float))
         order = np.argsort(t)
         found = solve_ivp(rates, (0, 1), [1.0, 0, 0, 0, 0, 0, 0], "DOP853", t[order], rtol=1e-12, atol=1e-12).y.T
         states = np.empty_like(found)
@@ -341,8 +344,6 @@ class OpenStrip:
         side : float
             +1 to the side of the normal, -1 to the other one.
         """
-        from scipy.optimize import brentq
-
         distance = self.parameters.get("distance", 0.9) if distance is None else distance
         mode = _euler_mode(self.start, self.finish)
         s = np.linspace(0, 1, 2001)
@@ -350,8 +351,11 @@ class OpenStrip:
         least = float(np.mean(np.cos(_STEEPEST * mode_values)))
         if not least < distance <= 1:
             raise ValueError(f"distance = {distance:g} must be above {least:.3g}, and at most 1")
-        amplitude = side * brentq(lambda a: np.mean(np.cos(a * mode_values)) - distance, 0, _STEEPEST) if distance < 1 else 0.0
-        angle = amplitude * mode_values
+        amplitude, change = 0.0, _STEEPEST
+        for _ in range(_HALVINGS):  # the distance falls with the amplitude
+            change /= 2
+            amplitude += change if np.mean(np.cos((amplitude + change) * mode_values)) > distance else 0.0
+        angle = side * amplitude * mode_values
         steps = np.diff(s)[:, None] * (np.column_stack([np.sin(angle), np.cos(angle)])[1:] + 0)
         place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
 
@@ -385,9 +389,13 @@ class OpenStrip:
         """
         if guess is None:
             guess = self._natural_guess()
+        options = {"intervals": intervals, "degree": degree, **options}
         try:
-            point = solve(self.problem, guess, values, intervals=intervals, degree=degree, **options)
+            point = solve(self.problem, guess, values, **options)
         except ContinError as error:
+            loads = {name: 0.0 for name in LOADS if name in self.numbers}
+            if loads and str(error).startswith(_NO_CONVERGENCE):
+                self._check_unloaded(guess, {**(values or {}), **loads}, options)
             raise ProblemError(self._reason(error)) from error
         self.check_determined(point)
         return point
@@ -396,8 +404,17 @@ class OpenStrip:
         s = np.linspace(0, 1, 401)
         return s, np.hstack([self.natural_states(s), np.zeros((len(s), self.conditions_inside))])
 
+    def _check_unloaded(self, guess, values: Mapping[str, float], options: Mapping) -> None:
+        """Raise ProblemError where the state without loads is not determined: then no search with them arrives."""
+        try:
+            self.check_determined(solve(self.problem, guess, values, **options))
+        except ContinError as error:
+            raise ProblemError(self._reason(error)) from error
+
     def _reason(self, error: Exception) -> str:
         text = str(error)
+        if text.startswith(_NO_CONVERGENCE):
+            return NOT_FOUND
         if "repeat or contradict" in text:
             return UNDETERMINED
         if "vanishes along a mode" in text:
@@ -534,8 +551,15 @@ UNHELD = (
 )
 #: Why reactions are not determined.
 UNDETERMINED = (
-    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip that does "
-    "not bend in its plane is held sideways at both ends); begin with an arch, a twist or a softness, or hold less"
+    "ends: what is held there repeats itself in this state, so the reactions are not determined (a straight strip is held at "
+    "its full length, or does not bend in its plane and is held sideways at both ends); begin with an arch, a twist or a "
+    "softness, or hold less"
+)
+#: How `contin.solve` begins to say that no state was found, and what that means here.
+_NO_CONVERGENCE = "Newton did not converge"
+NOT_FOUND = (
+    "no equilibrium was found near the first guess; begin with smaller loads, or nearer to the natural state, and follow these "
+    "numbers in a stage, or begin with another first state"
 )
 #: Place of the last end from the first one, as integrals over the strip.
 _PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))
@@ -592,6 +616,17 @@ def _moment(q, lam) -> np.ndarray:
     """Return the moment on the lab axes from the multipliers of the quaternion."""
     result: np.ndarray = _components(q, lam) @ np.array(directors(*q)).reshape(3, 3)
     return result
+
+
+def _helix(strains: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return quaternion and centreline (K, 7) at places t (K,) of a strip whose strains are constant."""
+    size = float(np.linalg.norm(strains))
+    axis, tangent = strains / (size or 1.0), np.array([0.0, 0.0, 1.0])
+    half, angle = size * t[:, None] / 2, size * t[:, None]
+    sine = np.sin(angle) / size if size else t[:, None]
+    cosine = 2 * np.sin(half) ** 2 / (size or 1.0)  # (1 - cos)/size without cancellation
+    place = axis * axis[2] * (t[:, None] - sine) + tangent * sine + np.cross(axis, tangent) * cosine
+    return np.hstack([np.cos(half), np.sin(half) * axis, place])
 
 
 def _mirrored(t, x):

@@ -300,10 +300,18 @@ def _intervals(system: Collocation, x: Array) -> tuple[_Pieces, Array] | None:
     control += feedback @ inside
     last = np.einsum("ei,einj->enj", weights, rates)
     last[:, :, :n] += np.eye(n)
-    q = np.einsum("ei,eikj,eikl->ejl", weights, control, control, optimize=True)
-    q -= np.einsum("ei,einj,einm,eiml->ejl", weights, inside, (hxx + hxx.swapaxes(2, 3)) / 2, inside, optimize=True)
+    q = _products(weights, control, control)
+    q -= _products(weights, inside, ((hxx + hxx.swapaxes(2, 3)) / 2) @ inside)
     rows = g[:, :, :, :n] @ inside + (g[:, :, :, n:] @ inverse) @ control
     return _Pieces(last[:, :, :n], last[:, :, n:], q, np.einsum("ei,eicj->ecj", weights, rows)), inside
+
+
+def _products(weights: Array, a: Array, b: Array) -> Array:
+    """Return the integrals of a^T b over each interval, (N, j, l), from values at Gauss points: (N, d, k, j), (N, d, k, l)."""
+    rows = a.shape[1] * a.shape[2]
+    weighted = (weights[:, :, None, None] * a).reshape(len(a), rows, -1)
+    result: Array = weighted.swapaxes(1, 2) @ b.reshape(len(b), rows, -1)
+    return result
 
 
 def _jacobian(system: Collocation, x: Array) -> Array:

@@ -38,6 +38,9 @@ def evaluate(
 ) -> None:
     for i in range(u.shape[0]):
 {real}
+"""
+#: The rest of it, for derivatives.
+_DERIVATIVES = """
 {between}
         for colour in range(owner.shape[0]):
             for s in range(inputs[colour], inputs[colour + 1]):
@@ -71,6 +74,10 @@ class Batch:
         Names, in order.
     times : bool
         The functions take t; ``f(u, p)`` without.
+    derivatives : bool
+        There is a Jacobian. Without, half as much is compiled.
+    reads : sequence of str, optional
+        The parameters that the functions read, if it is known: the compiled code then serves problems with others, too.
 
     Warns
     -----
@@ -102,8 +109,13 @@ class Batch:
         *,
         ends: bool = False,
         times: bool = True,
+        derivatives: bool = True,
+        reads: Sequence[str] | None = None,
     ) -> None:
-        self.signature = Signature(tuple(states), tuple(parameters), times and not ends, ends)
+        read = parameters if reads is None else sorted(set(reads) & set(parameters))
+        self.signature = Signature(tuple(states), tuple(read), times and not ends, ends)
+        self._reads: Indices = np.array([list(parameters).index(name) for name in read], dtype=np.int64)
+        self._parameters, self._derivatives = len(parameters), derivatives
         self.count = sum(max(count, 1) for count in counts)
         self._functions, self._counts = tuple(functions), tuple(counts)
         if not self._functions or len(self._functions) != len(self._counts):
@@ -111,11 +123,11 @@ class Batch:
         self._colourings: dict[tuple[int, ...], Colouring] = {}
         self._seconds: dict[int, float] = {}  # a place takes, by the number of colours
         try:
-            self._evaluate: Any = self._compiled()
+            self._evaluate: Any = self._compiled(derivatives)
         except CompilationError as error:
             self._evaluate = Interpreted(self._functions, self._counts, self.signature, str(error))
 
-    def _compiled(self) -> Any:
+    def _compiled(self, derivatives: bool) -> Any:
         """Return the generated kernel.
 
         Raises
@@ -127,13 +139,13 @@ class Batch:
             rewriter.function(parts(function)[0])
         for solve in searches(self._functions):
             rewriter.function(solve)
-        source = _source(self.signature, self._functions, self._counts)
+        source = _source(self.signature, self._functions, self._counts, derivatives)
         rewriter.note(source, self.signature.states, self.signature.parameters)
         return _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
-        out = np.empty((len(u), self.count))
+        out, p = np.empty((len(u), self.count)), p[self._reads]
         try:
             if len(u) < _MANY:
                 self._evaluate(t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN)
@@ -146,7 +158,7 @@ class Batch:
     def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
         """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
         out, new = np.empty((len(u), self.count)), np.zeros if len(u) < _MANY else np.empty
-        jac = new((len(u), self.count, colours.width))
+        jac, p = new((len(u), self.count, colours.width)), p[self._reads]
         work = np.zeros(self.signature.inputs + self.count)
         try:
             if len(u) < _MANY:
@@ -191,17 +203,36 @@ class Batch:
         self._evaluate(*given)
 
     def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:
-        """Return the colouring for derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters."""
+        """Return the colouring for derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters.
+
+        Raises
+        ------
+        ProblemError
+            A batch without derivatives.
+        """
+        if not self._derivatives:
+            raise ProblemError("derivatives: this batch was made without them")
         inputs = len(self.signature.states) * (1 + self.signature.ends)
         columns = (*(range(inputs) if order is None else map(int, order)), *(inputs + int(slot) for slot in free))
         if columns not in self._colourings:
-            self._colourings[columns] = colouring(self.depends, columns)
+            found = colouring(self.depends, columns)
+            starts, places = len(found.owner) + 1, {int(slot): place for place, slot in enumerate(self._inputs)}
+            perturbed = [places[slot] for slot in found.inputs[starts:].tolist()]  # as the compiled code numbers them
+            self._colourings[columns] = found._replace(inputs=np.array([*found.inputs[:starts], *perturbed], dtype=np.int64))
         return self._colourings[columns]
+
+    @property
+    def _inputs(self) -> Indices:
+        """The numbers, among u, v and all of p, of the inputs that the compiled code has."""
+        before = self.signature.inputs - len(self._reads)
+        return np.concatenate([np.arange(before), before + self._reads])
 
     @functools.cached_property
     def depends(self) -> Pattern:
         """Sparsity pattern: which values depend on which of u, v (with ``ends``), p; shape (count, inputs)."""
-        return sparsity_pattern(self._functions, self._counts, self.signature)
+        pattern = np.zeros((self.count, self.signature.inputs - len(self._reads) + self._parameters), dtype=bool)
+        pattern[:, self._inputs] = sparsity_pattern(self._functions, self._counts, self.signature)
+        return pattern
 
 
 #: Stand for a colouring and a Jacobian that are not asked for.
@@ -224,7 +255,7 @@ def _divided(given: _Arguments) -> list[_Arguments]:
     return [(t[a:b], u[a:b], v[a:b], p, inputs, owner, work.copy(), out[a:b], jac[a:b]) for a, b in zip(ends, ends[1:])]
 
 
-def _source(signature: Signature, functions: Sequence[Function], counts: Sequence[int]) -> str:
+def _source(signature: Signature, functions: Sequence[Function], counts: Sequence[int], derivatives: bool) -> str:
     """Return the generated kernel: every function called at point i, with real and with complex numbers."""
     solves = searches(functions)
     once = [f"w{k} = solve{k}({', '.join(_arguments(signature, 'float64'))})" for k in range(len(solves))]
@@ -247,7 +278,8 @@ def _source(signature: Signature, functions: Sequence[Function], counts: Sequenc
             real += [f"out[i, {row + j}] = {value}" for j, value in enumerate(values)]
             step += [f"work[{signature.inputs + row + j}] = complex({value}).imag" for j, value in enumerate(values)]
         row += size
-    return _TEMPLATE.format(
+    template = _TEMPLATE + _DERIVATIVES if derivatives else _TEMPLATE
+    return template.format(
         real="\n".join(" " * 8 + line for line in [*once, *real]), complex="\n".join(" " * 12 + line for line in step),
         inputs=signature.inputs, between=_SAME_LOOP if once else _OTHER_LOOP,
     )  # fmt: skip

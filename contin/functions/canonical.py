@@ -17,6 +17,7 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import math
+import re
 import types
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
@@ -203,7 +204,9 @@ class _Derivation:
         self.t = sympy.Symbol("T", real=True)
         self.x, self.y = self._symbols("X", v.states), self._symbols("Y", v.states)
         self.lam, self.w = self._symbols("L", v.states), self._symbols("W", v.controls)
-        self.p, self.mu = self._symbols("P", v.parameters), self._symbols("M", tuple(v.integrals))
+        # named, so that functions that read the same parameters are the same whatever others there are
+        self.p = [sympy.Symbol(f"P_{name}", real=True) for name in v.parameters]
+        self.mu = self._symbols("M", tuple(v.integrals))
         self.helpers: list[str] = []
         if v.hamiltonian is not None:
             self._from_hamiltonian()
@@ -378,12 +381,13 @@ class _Derivation:
         def code(term: Any) -> str:
             return str(sympy.pycode(term, user_functions={"sgn": "numpy.sign"}))
 
-        lines = [f"def {name}({', '.join(map(str, arguments))}):", *("    " + line for line in head)]
+        lines: list[str] = []
         terms = self._called_once(terms, lines, code)
         shared, reduced = sympy.cse(terms, symbols=sympy.numbered_symbols("Z"), optimizations="basic")
         lines += [f"    {symbol} = {code(term)}" for symbol, term in shared]
         result = code(reduced[0]) if single else "(" + ", ".join(map(code, reduced)) + ",)"
-        return "\n".join([*lines, f"    return {result}", ""])
+        lines = [*_read(head, "\n".join([*lines, result])), *lines]
+        return "\n".join([f"def {name}({', '.join(map(str, arguments))}):", *lines, f"    return {result}", ""])
 
     def _called_once(self, terms: list[Any], lines: list[str], code: Function) -> list[Any]:
         """Return the terms with symbols for the values of functions that state their gradients; append their calls to lines."""
@@ -500,6 +504,17 @@ class _Derivation:
         end, i = own[0]
         slope = self.sympy.diff(value, (self.x, self.y)[end][i])
         return own[0] if slope.is_number and slope != 0 else None
+
+
+def _read(head: Sequence[str], body: str) -> list[str]:
+    """Return the lines of a head, ``name = value``, that the rest of the head or the body reads."""
+    kept: list[str] = []
+    for line in reversed(head):
+        target, _, value = line.partition(" = ")
+        if "," in target or re.search(rf"\b{target}\b", body):
+            kept.insert(0, "    " + line)
+            body += "\n" + value
+    return kept
 
 
 def _elimination(k: int, guarded: bool) -> list[str]:

@@ -138,15 +138,21 @@ class BoundaryValueProblem:
     def _compiled(self, name: str) -> Batch:
         u, p = self.state_names, tuple(self.parameters)
         if name == "boundary":
-            return Batch([self.boundary], [_shape(self.boundary, self._of_ends, self.boundary_size)], u, p, ends=True)
+            shape = _shape(self.boundary, self._of_ends, self.boundary_size)
+            return Batch([self.boundary], [shape], u, p, ends=True, reads=self._reads([self.boundary]))
         if name == "functionals":
             functions = list(self.functionals.values())
             if any(argument_count(f) != 3 or result_count(f, self._of_point.arguments, "a functional") for f in functions):
                 raise ProblemError("functionals: each must be f(t, u, p) and return one number")
-            return Batch(functions, [0] * len(functions), u, p)
+            return Batch(functions, [0] * len(functions), u, p, derivatives=False, reads=self._reads(functions))
         functions = [f for f in (self.rhs, self.integrals) if f is not None]
         sizes = (len(u), self.integral_size)
-        return Batch(functions, [_shape(f, self._of_point, size) for f, size in zip(functions, sizes)], u, p)
+        shapes = [_shape(f, self._of_point, size) for f, size in zip(functions, sizes)]
+        return Batch(functions, shapes, u, p, reads=self._reads(functions))
+
+    def _reads(self, functions: Sequence[Function]) -> tuple[str, ...] | None:
+        """Return the parameters that functions read; None where that is not known."""
+        return None
 
 
 def _value_count(name: str, function: Function | None, signature: Signature, given: int | None) -> int:

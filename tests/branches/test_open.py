@@ -1,4 +1,4 @@
-"""Scenes of open strips: what is asked of them, their files, pictures and pages. Their numbers: test_open_scenes."""
+"""Scenes of open strips: what is asked of them, their files, pictures and pages. Their numbers: test_open_independent."""
 
 import math
 import signal
@@ -323,3 +323,20 @@ def test_a_table_and_a_taper():
         branch = contin.trace(start, free=["weight"], limits={"weight": (-1, 25)})
         found.append(branch.labelled("BP")[0]["weight"])
     assert found[1] < found[0]
+
+
+@pytest.mark.full
+def test_the_snap_of_the_clamped_strip(root, tmp_path):
+    """At the fold the stable branch ends; it snaps to the one that was left, whose energy at this turn is interpolated."""
+    path = tmp_path / "clamped.h5"
+    assert run_stages(load(root / "configs" / "open_clamped.yaml"), path, Display(silent=True)) == "complete"
+    branch = read_branch(path)
+    (snap,) = branch.snaps()
+    fold = next(event for event in branch.events if event["label"] == b"LP" and event["stage"] == 3)
+    assert snap.row == fold["point"] and fold["index_before"] == 0 and fold["index_after"] == 1
+    before = branch.points[branch.points["stage"] == 2]
+    nearest = before[np.argmin(abs(before["turn"] - fold["turn"]))]
+    # dE/dturn is the moment, so the nearest point gives the energy up to the square of the distance
+    below = nearest["energy"] + nearest["M_tangent"] * (fold["turn"] - nearest["turn"])
+    assert snap.released == pytest.approx(fold["energy"] - below, rel=1e-3)
+    assert snap.to["M_tangent"] == pytest.approx(nearest["M_tangent"], abs=0.3)

@@ -9,7 +9,7 @@ import pytest
 import contin
 from ribbon_model.ends import CLAMP, DIRECTIONS, End, hinge
 from ribbon_model.material import Material
-from ribbon_model.open_strip import LOADS, UNDETERMINED, OpenStrip
+from ribbon_model.open_strip import LOADS, NOT_FOUND, UNDETERMINED, OpenStrip
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
 ROD = Material("rod", {"B1": 1.0, "B2": 3.0, "C": 0.8, "kappa_n": 0.7})
@@ -96,6 +96,8 @@ SIDEWAYS = (WIDTH, NORMAL)
 REJECTED = {
     "straight, flat, held sideways": (MATERIALS[1], CLAMP, End(held=SIDEWAYS), {"force_tangent": 0.1}, UNDETERMINED),
     "loose": (ROD, End("free", held=()), End("free", held=()), {}, "without a change of energy"),
+    "taut, under its weight": (MATERIALS[2], CLAMP, End("joint", TANGENT, 1, (NORMAL, TANGENT)), {"weight": 0.1}, UNDETERMINED),
+    "under too much weight": (MATERIALS[0], CLAMP, End("free", held=()), {"weight": 1e4}, NOT_FOUND),
     "on one hinge": (ROD, hinge(), End("free", held=()), {}, "rigid body"),
     "turning about the chord": (MATERIALS[2], End("free"), End("free", held=SIDEWAYS), {"force_tangent": 1.0}, "without"),
 }  # fmt: skip
@@ -109,6 +111,18 @@ def test_what_nothing_determines_is_rejected(what):
         OpenStrip(material, start, finish, numbers).first_point()
     assert sentence in str(caught.value)
     assert_sentence(str(caught.value))
+
+
+@pytest.mark.full
+def test_strips_of_one_law_share_compiled_code():
+    """The equations depend on the law and on loads along the strip, not on the ends; a new scene compiles its ends only."""
+    strips = [
+        OpenStrip(MATERIALS[1]), OpenStrip(MATERIALS[3], finish=End("free", held=())), OpenStrip(MATERIALS[1], finish=hinge()),
+        OpenStrip(MATERIALS[1], finish=End("free", held=()), numbers={"force_width": 0.1}),
+    ]  # fmt: skip
+    assert len({strip.problem.batch("field")._evaluate for strip in strips}) == 1
+    clamps = [OpenStrip(MATERIALS[1]), OpenStrip(MATERIALS[2])]
+    assert len({strip.problem.batch("boundary")._evaluate for strip in clamps}) == 1
 
 
 @pytest.mark.parametrize(

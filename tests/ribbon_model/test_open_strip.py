@@ -66,7 +66,7 @@ def test_the_elastica_beyond_buckling():
         m = math.sin(angle / 2) ** 2
         assert math.isclose(-point["force_tangent"], (2 * ellipk(m)) ** 2, rel_tol=1e-8)
         assert math.isclose(point["distance"], 2 * ellipe(m) / ellipk(m) - 1, abs_tol=1e-8)
-        assert point.index == 0
+        assert point.index == 0 or point is meet  # where the ends meet, the loop turns about them without a change of energy
     second = follow(column.first_point(), "force_tangent", -41, 0, direction=-1).labelled("BP")[1]
     assert contin.trace(second, branch=1, max_points=4).points[-1].index == 1  # Euler's mode j has index j - 1
 

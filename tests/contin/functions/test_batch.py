@@ -130,3 +130,28 @@ def test_one_function_of_other_states_is_another_batch():
     for parameters, b in ((["a", "b"], 2.0), (["b", "a"], 1.0)):
         batch = Batch([lambda t, u, p: p.b], [0], ["x"], parameters)
         assert batch.values(np.zeros(1), np.zeros((1, 1)), np.empty((0, 1)), np.array([1.0, 2.0])).tolist() == [[b]]
+
+
+def test_parameters_that_are_not_read():
+    """Functions that read the same parameters have one compiled code; the columns of the others are zero."""
+    given = {"states": ["x"], "reads": ["a", "c"]}
+
+    def rate(t, u, p):
+        return (p.a * u.x + p.c,)
+
+    first = Batch([rate], [1], parameters=["a", "b", "c"], **given)
+    second = Batch([rate], [1], parameters=["d", "c", "a"], **given)
+    assert first._evaluate is second._evaluate
+    place = np.zeros(1), np.array([[2.0]]), np.empty((0, 1))
+    for batch, p in ((first, [3.0, 5.0, 7.0]), (second, [5.0, 7.0, 3.0])):
+        values, jacobian = batch.jacobian(*place, np.array(p), batch.colouring([0, 1, 2]))
+        assert values[0, 0] == batch.values(*place, np.array(p))[0, 0] == 13.0
+        by_name = dict(zip(["x", *(["a", "b", "c"] if batch is first else ["d", "c", "a"])], jacobian[0, 0]))
+        assert by_name == {"x": 3.0, "a": 2.0, "c": 1.0, ("b" if batch is first else "d"): 0.0}
+
+
+def test_a_batch_without_derivatives():
+    batch = Batch([lambda t, u, p: u.x**2], [0], ["x"], [], derivatives=False)
+    assert batch.values(np.zeros(1), np.array([[3.0]]), np.empty((0, 1)), np.empty(0))[0, 0] == 9.0
+    with pytest.raises(ProblemError, match="without them"):
+        batch.colouring([])
