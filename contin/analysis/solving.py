@@ -74,8 +74,12 @@ def solve(
     if isinstance(guess, Point):
         parameters = {**guess.parameters, **parameters}
     needed = problem.free_size - 1
+    if needed < 0:
+        there = len(problem.state_names) + needed
+        kind = "equations" if isinstance(problem, AlgebraicProblem) else "boundary and integral conditions"
+        raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
     if len(free) != needed:
-        raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {max(needed, 0)} (conditions - states)")
+        raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
     system, x = first_guess(problem, guess, Options(parameters, free, intervals, degree))
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")

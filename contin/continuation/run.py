@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import sys
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -490,6 +491,29 @@ class Continuation:
             state.arclength + found.at, trial.iterations, trial.newton_error, errors, found.details,
             stability.index, stability.nullity, change, stability.breaks,
         )  # fmt: skip
+
+
+def follow_until_interrupted(
+    system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None
+) -> Branch:
+    """Run to the end, or to the first Ctrl-C, and return the branch.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C before the first point.
+    """
+    run, branch = Continuation(system, x, settings, tangent), Branch()
+    try:
+        for point in run:
+            branch.points.append(point)
+    except KeyboardInterrupt:
+        if not branch.points:
+            raise
+        run.stop = Stop("interrupted", f"interrupted after {len(branch.points)} points", "trace from the last one goes on")
+        print(f"contin: {run.stop}", file=sys.stderr)
+    branch.stop, branch.notes = run.stop, run.notes
+    return branch
 
 
 def follow(system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None) -> Branch:

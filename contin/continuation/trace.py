@@ -7,7 +7,7 @@ from typing import Any
 
 from contin import checks
 from contin.continuation.cycle_starts import doubled, from_hopf
-from contin.continuation.run import follow
+from contin.continuation.run import follow_until_interrupted
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.errors import ProblemError
@@ -19,6 +19,8 @@ from contin.stepping.settings import Settings, settings_with
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
           **options: Any) -> Branch:  # fmt: skip
     """Follow the branch through a point, or away from a branch point, to its end.
+
+    Ctrl-C ends the run: the branch so far is returned.
 
     Parameters
     ----------
@@ -51,13 +53,13 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if free is not None and checks.names("free", free) != system.free:
         system, x = system_of(start, "start").with_free(free, x)
     if branch is None:
-        return follow(system, x, settings)
+        return follow_until_interrupted(system, x, settings)
     checks.whole("branch", branch, 0, 10)
     if start.label in ("HB", "PD") and branch == 1:
         cycles, x, tangent = from_hopf(start) if start.label == "HB" else doubled(start)
-        return follow(cycles, x, settings, settings.direction * tangent)
+        return follow_until_interrupted(cycles, x, settings, settings.direction * tangent)
     if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")
     if not 0 <= branch < len(start.details.tangents):
         raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
-    return follow(system, x, settings, settings.direction * start.details.tangents[branch])
+    return follow_until_interrupted(system, x, settings, settings.direction * start.details.tangents[branch])

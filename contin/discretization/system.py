@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -50,6 +51,11 @@ class System(Discretization):
         self.scales = scales
         #: Sizes of the free parameters.
         self.free_scales: Array = np.ones(len(self.free)) if scales is None else scales.parameters[self._free]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: all but what is computed when it is first asked for, such as compiled functions."""
+        kinds = {name: getattr(type(self), name, None) for name in vars(self)}
+        return {name: value for name, value in vars(self).items() if not isinstance(kinds[name], functools.cached_property)}
 
     def _indices(self, names: Sequence[str]) -> Indices:
         """Return the places of parameters among all of them."""

@@ -12,11 +12,11 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Signature, argument_count, result_count
-from contin.problems.statement import MOST_CONDITIONS, check_statement
+from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 
 @dataclass(frozen=True, eq=False)
-class AlgebraicProblem:
+class AlgebraicProblem(Restated):
     """F(u, p) = 0, or the equilibria of u' = F(u, p).
 
     Parameters

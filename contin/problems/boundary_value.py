@@ -13,11 +13,11 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Signature, argument_count, result_count
-from contin.problems.statement import MOST_CONDITIONS, check_statement
+from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryValueProblem:
+class BoundaryValueProblem(Restated):
     """u' = rhs(t, u, p) on ``domain``, with conditions at both ends and under the integral.
 
     Every function is plain Python; ``u`` and ``p`` come as named tuples (``u.x``, ``p.mu``, ``x, y = u``). They are

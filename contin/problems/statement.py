@@ -42,6 +42,25 @@ class Statement(Protocol):
         """Return some of the functions, compiled."""
 
 
+class Restated:
+    """A statement that survives pickling: it is stated again with its arguments, and compiled code comes from the cache."""
+
+    _stated: tuple[tuple[Any, ...], dict[str, Any]]
+
+    def __new__(cls, *arguments: Any, **options: Any) -> Any:
+        """Note the arguments."""
+        made = super().__new__(cls)
+        object.__setattr__(made, "_stated", (arguments, options))
+        return made
+
+    def __reduce__(self) -> Any:
+        return _restated, (type(self), *self._stated)
+
+
+def _restated(kind: Any, arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
+    return kind(*arguments, **options)
+
+
 def with_multipliers(problem: Statement, free: Sequence[str]) -> tuple[str, ...]:
     """Return the free parameters with those that a problem adds by itself: its ``multipliers``, if it has any."""
     names = checks.names("free", free)

@@ -33,6 +33,10 @@ class Branch:
     stop: Stop | None = None
     notes: list[str] = field(default_factory=list)
 
+    def __repr__(self) -> str:
+        labels = " ".join(point.label for point in self.points if point.label)
+        return f"Branch({len(self.points)} points: {labels}; {self.stop or 'not ended'})"
+
     def __len__(self) -> int:
         return len(self.points)
 

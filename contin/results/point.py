@@ -16,6 +16,9 @@ from contin.errors import ProblemError
 from contin.results import portrait
 from contin.stepping.trial import Trial
 
+#: So many columns stand in the representation of a point.
+_SHOWN = 8
+
 
 def system_of(point: Point, what: str) -> System:
     """Return the system of a point, where other parameters of its problem may become free.
@@ -85,8 +88,24 @@ class Point:
     breaks: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float:
-        """Return a parameter or functional by name."""
-        return self.parameters[name] if name in self.parameters else self.functionals[name]
+        """Return a parameter or functional by name.
+
+        Raises
+        ------
+        KeyError
+            There is none of this name; the message lists those there are.
+        """
+        if name in self.parameters:
+            return self.parameters[name]
+        if name in self.functionals:
+            return self.functionals[name]
+        raise KeyError(f"{name!r} is none of {', '.join((*self.parameters, *self.functionals))}")
+
+    def __repr__(self) -> str:
+        columns = {**self.parameters, **self.functionals}
+        values = ", ".join(f"{name}={value:.6g}" for name, value in list(columns.items())[:_SHOWN])
+        more = ", ..." if len(columns) > _SHOWN else ""
+        return f"Point({' '.join(filter(None, (self.label, self.name)))}{': ' * bool(self.label)}{values}{more})"
 
     @property
     def normal_form(self) -> float | None:

@@ -143,4 +143,7 @@ def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Sett
     for name in options:
         if name not in known:
             raise ProblemError(f"there is no setting {name!r}; known are {', '.join(known)}")
-    return dataclasses.replace(settings or Settings(), **options)
+    settings = settings or Settings()
+    if "step" not in options and checks.is_number(options.get("max_step")):  # the first step is no longer than the largest
+        options = {**options, "step": min(settings.step, max(options["max_step"], settings.min_step))}
+    return dataclasses.replace(settings, **options)
