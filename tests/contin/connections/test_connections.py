@@ -93,6 +93,33 @@ def test_a_homoclinic_orbit_and_its_curve():
     assert abs(branch.points[-1]["d"] - 2) < 1e-11
 
 
+def sandstede(u, p):
+    """Sandstede (1997), AUTO-07p's demo `san`: with mu = 0 the orbit on x^2 (1 - x) = y^2 is homoclinic at nu = 0, for all a."""
+    leaf = p.nu - p.alpha * u.z
+    return (
+        p.a * u.x + u.y - p.a * u.x**2 + leaf * u.x * (2 - 3 * u.x),
+        u.x + p.a * u.y - 1.5 * u.x**2 - 1.5 * p.a * u.x * u.y - 2 * leaf * u.y,
+        -2 * u.z + p.mu * u.x + p.alpha * (u.x**2 * (1 - u.x) - u.y**2),
+    )
+
+
+def test_a_homoclinic_orbit_in_space():
+    """At a = 0 it is x = 1 / cosh(t / 2)^2, y = x'."""
+    numbers = {"a": 0.0, "alpha": 0.3, "mu": 0.0, "nu": 0.01}
+    problem = ConnectionProblem(sandstede, ["x", "y", "z"], numbers, unstable=1)
+
+    def guess(t):
+        x = 1 / math.cosh(20 * (t - 0.5)) ** 2
+        return x, -x * math.tanh(20 * (t - 0.5)), 0
+
+    found = solve(problem, guess, {"time": 40}, free=["nu"])
+    assert abs(found["nu"]) < 1e-12
+    x, y, _ = found.system.states(found.x).T
+    assert np.abs(x**2 * (1 - x) - y**2).max() < 1e-10
+    branch = trace(found, free=["a", "nu"], limits={"a": (-0.3, 0.3)})
+    assert str(branch.stop) == "reached a = 0.3" and max(abs(branch.column("nu"))) < 1e-9
+
+
 @cache
 def lorenz_cycle():
     def lorenz(u, p):
