@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cores, cost, fold, like_for_like, many, startup, stress
+from benchmarks import cores, cost, cycles, fold, like_for_like, many, startup, stress
 
 TITLES = {
     "like-for-like": "Like for like",
@@ -17,6 +17,7 @@ TITLES = {
     "many": "Many branches",
     "stress": "Numerical stability",
     "cores": "Two cores",
+    "cycles": "Cycles",
 }
 TABLES = {
     "like-for-like": like_for_like.table,
@@ -26,6 +27,7 @@ TABLES = {
     "many": many.table,
     "stress": stress.table,
     "cores": cores.table,
+    "cycles": cycles.table,
 }
 
 

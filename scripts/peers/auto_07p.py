@@ -92,8 +92,8 @@ def study(
     }  # fmt: skip
 
 
-def _run(program: Path, folder: Path, constants: str) -> dict:
-    """Run AUTO once in a folder that may hold a restart file."""
+def _run(program: Path, folder: Path, constants: str, trace: bool = True) -> dict:
+    """Run AUTO once in a folder that may hold a restart file; ``trace`` says that the program writes fort.97."""
     (folder / "fort.2").write_text(constants)
     (folder / "fort.97").unlink(missing_ok=True)
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
@@ -102,9 +102,9 @@ def _run(program: Path, folder: Path, constants: str) -> dict:
     elapsed = time.perf_counter() - began
     if done.returncode:
         raise RuntimeError(f"AUTO-07p failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
-    trace = [tuple(map(float, line.split())) for line in (folder / "fort.97").read_text().splitlines()]
+    written = (folder / "fort.97").read_text() if trace else ""
     parsed = parse((folder / "fort.7").read_text(), (folder / "fort.9").read_text(), done.stdout)
-    return parsed | {"process_seconds": elapsed, "trace": trace}
+    return parsed | {"process_seconds": elapsed, "trace": [tuple(map(float, line.split())) for line in written.splitlines()]}
 
 
 #: AUTO's codes of special points in the branch file.

@@ -94,7 +94,7 @@ def test_a_homoclinic_orbit_and_its_curve():
 
 
 def sandstede(u, p):
-    """Sandstede (1997), AUTO-07p's demo `san`: with mu = 0 the orbit on x^2 (1 - x) = y^2 is homoclinic at nu = 0, for all a."""
+    """Sandstede (1997), AUTO-07p's demo `san`: with mu = 0 the orbit on x^2 (1 - x) = y^2 is homoclinic at nu = 0."""
     leaf = p.nu - p.alpha * u.z
     return (
         p.a * u.x + u.y - p.a * u.x**2 + leaf * u.x * (2 - 3 * u.x),

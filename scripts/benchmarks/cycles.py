@@ -1,0 +1,89 @@
+"""Cycles: branches from a Hopf point to a given period, with multipliers at every orbit, by contin and AUTO-07p.
+
+Both have 40 intervals of degree 4, adapted every third step, and the same tolerance. AUTO-07p has analytic Jacobians. The error
+is that of the parameter at the last orbit, against contin with as many intervals as the tolerance 1e-12 takes.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+
+from peers import auto_07p, auto_cycles
+
+import contin
+from benchmarks.measure import in_turn, median
+
+INTERVALS, DEGREE, TOLERANCE = 40, 4, 1e-8
+
+
+def _lorenz(u, p):
+    return 10 * (u.y - u.x), p.r * u.x - u.y - u.x * u.z, u.x * u.y - 8 / 3 * u.z
+
+
+_X = math.sqrt(8 / 3 * 19)
+#: Vector field, parameter with its first value, equilibrium there, the way to the Hopf point, and the last period.
+BRANCHES = {
+    "lorenz": (_lorenz, {"r": 20.0}, [_X, _X, 19.0], 1, 2.0),
+}
+
+
+def run(quick: bool) -> dict:
+    """Return times by branch and program."""
+    results, skipped = {}, {}
+    if (reason := auto_07p.missing()) is not None:
+        skipped["AUTO-07p"] = reason
+    for name, (*_, way, last) in BRANCHES.items():
+        hopf = _hopf(name)
+        exact = _followed(name, hopf, contin.MeshControl(), contin.Newton())["parameter"]
+        mesh = contin.MeshControl(min_intervals=INTERVALS, max_intervals=INTERVALS)
+        contestants = {"contin": lambda: _followed(name, hopf, mesh, contin.Newton(TOLERANCE))}  # noqa: B023
+        if not skipped:
+            settings = {"intervals": INTERVALS, "degree": DEGREE, "tolerance": TOLERANCE}
+            contestants["AUTO-07p"] = lambda: _by_auto(name, last, 0.1 * way, settings)  # noqa: B023
+        runs = in_turn(contestants, 3 if quick else 15)
+        results[name] = {program: _summary(some, exact) for program, some in runs.items()}
+    return {"results": results, "skipped": skipped}
+
+
+def _hopf(name: str) -> contin.Point:
+    field, values, rest, way, _ = BRANCHES[name]
+    point = contin.solve(contin.AlgebraicProblem(field, ["x", "y", "z"], values), rest)
+    return contin.trace(point, free=list(values), direction=way, max_points=200).labelled("HB")[0]
+
+
+def _followed(name: str, hopf: contin.Point, mesh: contin.MeshControl, newton: contin.Newton) -> dict:
+    """Return the time of contin, which begins branches of cycles at degree 4."""
+    _, values, *_, last = BRANCHES[name]
+    (parameter,) = values
+    began = time.perf_counter()
+    branch = contin.trace(hopf, branch=1, limits={"period": (0, last)}, mesh=mesh, newton=newton, errors=False)
+    return {"seconds": time.perf_counter() - began, "points": len(branch), "parameter": branch.points[-1][parameter]}
+
+
+def _by_auto(name: str, last: float, step: float, settings: dict) -> dict:
+    found = auto_cycles.study(name, last, step, **settings)
+    return {"seconds": found["seconds"], "points": found["points"], "parameter": found["labels"][-1][1]}
+
+
+def _summary(runs: list[dict], exact: float) -> dict:
+    row = runs[-1]
+    seconds = median(each["seconds"] for each in runs)
+    error = abs(row["parameter"] - exact)
+    return {"seconds": seconds, "points": row["points"], "per_orbit": seconds / row["points"], "error": error}
+
+
+def ratio(results: dict) -> float | None:
+    """Return the least time per orbit of AUTO-07p over that of contin; None without AUTO-07p."""
+    rows = [row for row in results["results"].values() if "AUTO-07p" in row]
+    return min((row["AUTO-07p"]["per_orbit"] / row["contin"]["per_orbit"] for row in rows), default=None)
+
+
+def table(results: dict) -> str:
+    """Return the results as a Markdown table."""
+    lines = ["| cycles of | program | time, branch | orbits | time an orbit | error at the end |", "|---|---|---|---|---|---|"]
+    for name, rows in results["results"].items():
+        for program, row in rows.items():
+            times = f"{1e3 * row['seconds']:.0f} ms | {row['points']} | {1e3 * row['per_orbit']:.2f} ms"
+            lines.append(f"| {name} | {program} | {times} | {row['error']:.0e} |")
+    return "\n".join(lines)
