@@ -318,6 +318,20 @@ class Collocation(System):
         """Return the same problem with every interval halved, and the carrier."""
         return self.on_mesh(np.sort(np.append(self.mesh, (self.mesh[1:] + self.mesh[:-1]) / 2)))
 
+    def phase_row(self, reference: Array) -> Array:
+        """Return the row of the integral of u . v' over that of v' . v', shape (size,), for scaled states v at the nodes.
+
+        The integrals are taken at the Gauss points, with v' of the piecewise polynomial v; zero where v is constant.
+        """
+        rates = np.einsum("qm,jma->jqa", self.basis.slope, self._local(reference))  # h v'
+        size = float(np.sum(self.basis.weights[:, None] * rates**2 / self._h[:, None, None]))
+        shares = np.einsum("q,qm,jqa->jma", self.basis.weights, self.basis.value, rates)
+        by_node = np.zeros((self.nodes.size, self._n))
+        np.add.at(by_node, self._by_interval, shares)
+        row = np.zeros(self.size)
+        row[: self.state_size] = by_node.ravel() / (size or 1.0)
+        return row
+
     def with_reference(self, x: Array) -> Collocation:
         """Return the same with x as the orbit that a phase condition refers to, where a kind of problem has one."""
         return self

@@ -58,14 +58,7 @@ class ConnectionCollocation(Collocation):
         """Return the same with v and Q of the orbit x."""
         other = self._with()
         other.reference = np.array(x)
-        states = other._scaled_states(x)
-        rates = np.einsum("qm,jma->jqa", other.basis.slope, other._local(states))  # h v' at the Gauss points
-        size = float(np.sum(other.basis.weights[:, None] * rates**2 / other._h[:, None, None]))
-        shares = np.einsum("q,qm,jqa->jma", other.basis.weights, other.basis.value, rates)
-        row = np.zeros((other.nodes.size, other._n))
-        np.add.at(row, other._by_interval, shares)
-        other._phase = np.zeros(other.size)
-        other._phase[: other.state_size] = row.ravel() / (size or 1.0)
+        other._phase = other.phase_row(other._scaled_states(x))
         other._target = float(other._phase @ x)
         other._bases = tuple(_orthonormal(left) for left in other._left_vectors(other.all_parameters(x)[None], None)[0])
         return other

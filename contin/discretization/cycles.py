@@ -208,14 +208,7 @@ class CycleCollocation(PeriodicCollocation):
     def _set_reference(self, reference: Array) -> None:
         """Take the phase row from an orbit, states at the nodes."""
         self.reference = reference
-        states = reference if self.scales is None else reference / self.scales.states
-        rates = np.einsum("qm,jma->jqa", self.basis.slope, self._local(states))  # h v' at the Gauss points
-        size = float(np.sum(self.basis.weights[:, None] * rates**2 / self._h[:, None, None]))
-        shares = np.einsum("q,qm,jqa->jma", self.basis.weights, self.basis.value, rates)
-        row = np.zeros((self.nodes.size, self._n))
-        np.add.at(row, self._by_interval, shares)
-        self._phase = np.zeros(self.size)
-        self._phase[: self.state_size] = row.ravel() / (size or 1.0)
+        self._phase = self.phase_row(reference if self.scales is None else reference / self.scales.states)
 
     # --- the discrete equations ----------------------------------------------------------------------------------
 
