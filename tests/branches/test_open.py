@@ -250,6 +250,7 @@ def test_a_stage_begins_at_the_node_of_the_one_before(tip):
     assert [index for *_, index in edges] == [0, 1, 0]
 
 
+@pytest.mark.full
 def test_points_that_later_stages_miss(tmp_path):
     """What was computed before is kept, and the reason is a sentence."""
     ring = "material: {law: rod, B1: 1, B2: 1, C: 0.8}\nclosed: {half_twists: 0}\nnumbers: {turn: 13}\n"
@@ -299,6 +300,7 @@ def test_ends_that_change(root, tmp_path):
     assert branch.plot(3).axes and len(branch.strains(len(branch.points) - 1))
 
 
+@pytest.mark.full
 def test_ends_that_let_go_of_a_moment(tmp_path):
     """The run ends with what is not carried, and keeps what was computed."""
     text = "material: {law: rod, B1: 1, B2: 4, C: 0.8}\nnumbers: {distance: 0.98}\nbegin: arch\n"

@@ -58,6 +58,7 @@ def test_all_states_at_the_numbers_of_a_point(twisted):
         assert state.point["turn"] == pytest.approx(5.5) and np.abs(state.point.system.residual(state.point.x)).max() < 1e-9
 
 
+@pytest.mark.full
 def test_nothing_is_printed_without_a_saddle(call, tmp_path):
     """A tip load below the critical one: the straight strip alone is stable."""
     text = "material: {law: flat rod, nu: 0.3}\nfinish: free\nstages: [{follow: force_width, to: -2}]\n"

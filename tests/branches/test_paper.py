@@ -54,6 +54,7 @@ def test_every_published_number_within_its_printed_digits(name, computed):
         assert all((tmp_path / f"{picture}{suffix}").stat().st_size > 10_000 for suffix in (".png", ".svg"))
 
 
+@pytest.mark.full
 def test_where_stable_buckled_states_exist(computed):
     """Ribbon: from the thresholds of (27) to the folds of the quadrature, and no others; one rod breaks the paper's rule."""
     rows = {row.what: row for row in computed("fig12b")[0].rows if "branch" in row.what}

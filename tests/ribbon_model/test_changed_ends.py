@@ -32,6 +32,7 @@ def _held(system, x, follow):
     return row, row @ x
 
 
+@pytest.mark.full
 def test_a_fold_in_the_moment_is_where_the_index_under_it_changes():
     """An arch whose end is bent back: with the moment prescribed instead of the angle, the index has one more where the moment
     falls with the angle (Maddocks 1987), and the two are equilibria of the same force, moment and energy.
@@ -79,6 +80,7 @@ def test_every_change_of_the_last_end_is_an_equilibrium_at_once(finish):
         assert math.isclose(again[name], point[name], rel_tol=1e-8, abs_tol=1e-8)
 
 
+@pytest.mark.full
 def test_what_no_load_replaces_is_said():
     arch = OpenStrip(ROD, CLAMP, CLAMP, {"distance": 0.9})
     point = arch.first_point(arch.arch())

@@ -74,6 +74,7 @@ def test_what_has_no_such_statement():
         variational_problem(RIBBON, CELL)
 
 
+@pytest.mark.full
 def test_a_law_that_states_its_gradient():
     """Finite width: the circle's bifurcation is that of the linear theory (`FiniteWidth.thresholds`)."""
     problem, Gamma = variational_problem(FINITE_WIDTH, HALF_LOOP), 10.0

@@ -96,6 +96,7 @@ def fold_and_flip(u, p):
     )  # fmt: skip
 
 
+@pytest.mark.full
 def test_a_fold_flip_lies_on_both_curves():
     """Folds at mu = -1/4, doublings at nu = 0."""
     problem = CycleProblem(fold_and_flip, ["x", "y", "a", "b"], {"mu": 0.3, "nu": -0.1})

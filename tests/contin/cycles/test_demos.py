@@ -128,6 +128,7 @@ def test_the_middle_family_of_abc():
         assert worst_trivial(branch) < 1e-9
 
 
+@pytest.mark.full
 def test_the_isola_of_plp():
     """At S0 = 111 the cycles have parted from both Hopf points: their branch closes, at another phase than it began."""
 

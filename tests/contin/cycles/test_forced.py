@@ -144,6 +144,7 @@ def test_a_stored_doubled_branch_goes_on(tmp_path):
     assert fourfold.points[0]["rounds"] == 4 and fourfold.points[0]["period"] == pytest.approx(8 * math.pi, abs=1e-12)
 
 
+@pytest.mark.full
 def test_the_demo_frc_against_auto():
     """FitzHugh and Nagumo's equations with a forcing, AUTO's demo ``frc``: first its amplitude, then its period to 5."""
 

@@ -59,7 +59,7 @@ def bratu(u, p, out):
 
 
 def fold(n):
-    problem = AlgebraicProblem(bratu, n, {"lam": 0.0}, count=n)
+    problem = AlgebraicProblem(bratu, n, {"lam": 0.0}, count=n, dynamics=False)
     branch = trace(solve(problem, [0.0] * n), free=["lam"], limits={"lam": (0, 4)}, max_points=12)
     return branch.labelled("LP")[0]
 

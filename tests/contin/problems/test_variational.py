@@ -125,6 +125,7 @@ def stiffening(m):
 stiffening.gradient = legendre_transform
 
 
+@pytest.mark.full
 def test_a_function_that_states_its_gradient():
     """A strip that stiffens as it bends, by its energy and by its Hamiltonian, which is a loop."""
     one, other = (
@@ -207,6 +208,7 @@ def test_twisted_clamped_rod():
     assert_special(twisted, "phi", [("BP", 2 * TANGENT / 0.8, 2, (0, 2))])
 
 
+@pytest.mark.full
 def test_twisted_clamped_rod_under_thrust():
     """Beam equation u'''' - i M u''' - T u'' = 0, u = u' = 0 at the ends: zero of its determinant (Love, sect. 272)."""
     moment = 0.8 * 1.0
