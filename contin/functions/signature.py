@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -69,7 +70,7 @@ def argument_count(function: Function) -> int:
 
 
 def result_count(function: Function, arguments: Arguments, what: str) -> int:
-    """Return how many values a function returns (0: a bare number), from one call in Python with numbers.
+    """Return how many values a function returns (0: a bare number), from calls in Python with numbers.
 
     Raises
     ------
@@ -98,5 +99,6 @@ def result_count(function: Function, arguments: Arguments, what: str) -> int:
     raise ProblemError(f"{what} cannot be called: {type(first).__name__}: {reason}") from first
 
 
-#: Numbers with which functions are called to see what they return: in the domain of most functions.
-_PROBES = (0.5, 1.5, -0.5, 0.0, 10.0)
+#: Numbers with which functions are called to see what they return: in the domain of most functions. NaN, the last, is in the
+#: domain of all, but a search may not end for it.
+_PROBES = (0.5, 1.5, -0.5, 0.0, 10.0, math.nan)

@@ -111,21 +111,6 @@ def test_a_doubling_of_lorenz():
     assert doubling["r"] == pytest.approx(229.40670855, abs=2e-8)
 
 
-@pytest.mark.full
-def test_doublings_of_roessler():
-    """Published: c = 2.832445 and 3.837358. The next two by their distance: Feigenbaum's ratio 4.669 is approached."""
-    orbit = contin.cycle(CycleProblem(roessler, ["x", "y", "z"], {"c": 2.0}), [1.0, 1.0, 0.0])
-    found, point = [], None
-    branch = contin.trace(orbit, free=["c"], limits={"c": (1.5, 6)})
-    for _ in range(4):
-        point = next(p for p in branch.labelled("PD") if not found or p["c"] > found[-1] + 1e-6)
-        found.append(point["c"])
-        branch = contin.trace(point, branch=1, limits={"c": (1.5, 6)})
-    assert found[:2] == pytest.approx([2.832445, 3.837358], abs=5e-7)
-    ratio = (found[2] - found[1]) / (found[3] - found[2])
-    assert 4.4 < ratio < 4.7
-
-
 @pytest.mark.parametrize(
     ("statement", "words"),
     [
