@@ -41,6 +41,7 @@ def test_an_isotropic_rod_stays_off_the_circle_until_its_end(m, n, nu, kappa_n):
         assert min(abs(last["kappa_n"] - value) for value in values) < 1e-9
 
 
+@pytest.mark.full
 def test_a_ribbon_goes_on_past_a_homoclinic_orbit():
     """(9, 1), nu = -.5: M2 falls to round-off from kappa_n = -30 on; the branch runs on to the limit."""
     found = branch("ribbon", 9, 1, -0.5)

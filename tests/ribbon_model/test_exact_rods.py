@@ -197,6 +197,7 @@ def test_refine_a_fold():
         assert float(kappa_star) == pytest.approx(fold.kappa_star, abs=1e-10)  # linear in the fold's own error
 
 
+@pytest.mark.full
 def test_refine_points_of_the_rods():
     """A circle gives (25b) in exact arithmetic; elsewhere kappa_n is kept and kappa* agrees with double precision."""
     with mpmath.workdps(25):

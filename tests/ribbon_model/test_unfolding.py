@@ -65,6 +65,7 @@ def test_limits_in_the_poisson_ratio():
     assert first_root(RIBBON, -0.3) is None
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("law", TABLE_2_LAWS, ids=lambda law: law.name)
 def test_the_root_as_an_eigenvalue_of_a_boundary_value_problem(law):
     """A third route: (20) with xi unknown and the mode normalised, by collocation."""

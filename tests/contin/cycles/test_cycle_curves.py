@@ -38,6 +38,7 @@ def labels(branch):
     return [point.label for point in branch if point.label]
 
 
+@pytest.mark.full
 def test_doublings_of_roessler():
     """AUTO-07p (ISW=2, NTST=200, NCOL=5, EPSL=EPSU=1e-8) prints these c and periods at a = .1 and a = .35."""
     orbit = contin.cycle(CycleProblem(roessler, ["x", "y", "z"], {"c": 2.0, "a": 0.2}), [1.0, 1.0, 0.0])

@@ -104,6 +104,7 @@ def test_lorenz_from_its_hopf_point_to_its_homoclinic_orbit():
     assert cycles.points[-1]["r"] == pytest.approx(13.926557, abs=1e-6)
 
 
+@pytest.mark.full
 def test_a_doubling_of_lorenz():
     """A cycle of large r, from an integration; AUTO-07p finds the doubling at r = 229.40670855."""
     orbit = contin.cycle(CycleProblem(lorenz, ["x", "y", "z"], {"r": 260.0}), [1.0, 1.0, 200.0], settle=60, intervals=60)

@@ -386,6 +386,7 @@ def test_guesses_that_determine_nothing(changed, message):
         contin.solve(stated(**changed), [0.0])
 
 
+@pytest.mark.full
 def test_the_run_ends_where_convexity_is_lost():
     """L = w^2/2 - w^4/12 is convex for |w| < 1, and w = b.y = a on this branch."""
     problem = stated(energy=lambda t, x, w, p: w.y**2 / 2 - w.y**4 / 12, ends=lambda a, b, p: (a.y, b.y - p.a))
