@@ -319,7 +319,9 @@ def test_killed_again_and_again(command, scene, undisturbed, tables):
     assert tables(path) == undisturbed(config)
 
 
-@pytest.mark.parametrize("option", ["--resume", "--overwrite", "--quiet"])
+@pytest.mark.parametrize(
+    "option", ["--resume", *(pytest.param(other, marks=pytest.mark.full) for other in ("--overwrite", "--quiet"))]
+)
 def test_a_second_run_on_the_same_file_is_refused(command, call, scene, undisturbed, tables, option):
     """With every option; the first run loses nothing."""
     path = command.folder / "x.h5"

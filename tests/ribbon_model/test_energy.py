@@ -54,6 +54,7 @@ def test_the_energy_alone_gives_states_and_index(law, domain):
         assert contin.point_of(system, x).second_variation().index() == kept.negative
 
 
+@pytest.mark.full
 def test_the_fold_of_the_paper_from_the_energy():
     """(1, 2): the circle's first bifurcation is that of the linear theory, the fold that of the quadrature."""
     problem = variational_problem(RIBBON, HALF_LOOP)

@@ -71,6 +71,7 @@ def test_the_elastica_beyond_buckling():
     assert contin.trace(second, branch=1, max_points=4).points[-1].index == 1  # Euler's mode j has index j - 1
 
 
+@pytest.mark.full
 def test_greenhill():
     """Twisted and clamped, the end slides: M L/2B = 4.4934..., two modes at once (Greenhill 1883; Love, sect. 272)."""
     rod = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})

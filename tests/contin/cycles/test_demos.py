@@ -164,6 +164,7 @@ def test_a_closed_branch_in_closed_form():
     assert [point["max_x"] for point in branch.labelled("LP")] == pytest.approx([1.15, 0.85], abs=1e-6)
 
 
+@pytest.mark.full
 def test_lor():
     """An asymmetric cycle at rho = 280 doubles at rho = 229.4 and again at 218.2."""
     problem = CycleProblem(lorenz, ["x", "y", "z"], {"rho": 280.0}, functionals={"square": square3})

@@ -44,7 +44,7 @@ def oscillators(*rates):
 @pytest.mark.parametrize(
     ("rates", "places"),
     [
-        ([(0.0, 1.0, 0.0), (-0.1, 1.0, 0.0)], [0.0, 0.1]),  # two pairs, one after the other
+        pytest.param([(0.0, 1.0, 0.0), (-0.1, 1.0, 0.0)], [0.0, 0.1], marks=pytest.mark.full),  # two pairs, one after the other
         ([(0.0, 1.0, 0.0), (0.6, -1.0, 0.0)], [0.0, 0.6]),  # one comes, another goes
         ([(0.0, 1.0, 0.0), (-0.1, 1.0, 0.0), (-0.2, 1.0, 0.0)], [0.0, 0.1, 0.2]),
         ([(0.16, 0.0, -1.0)], [-0.4, 0.4]),  # the same pair, out and back

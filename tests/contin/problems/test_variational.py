@@ -226,6 +226,7 @@ def test_twisted_clamped_rod_under_thrust():
     assert_special(thrust, "tension", [("BP", brentq(determinant, -38.5, -39.5, xtol=1e-13), 2, (0, 2))])
 
 
+@pytest.mark.full
 def test_twisted_pinned_rod():
     """Greenhill 1883: (M/2B)^2 - T/B = (pi/L)^2, from B u'' - i M u' - T u = 0, u = 0 at the ends."""
     pinned = VariationalProblem(
