@@ -22,11 +22,11 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from contin.analysis.extended import Borders, Extended
+from contin.analysis.extended import Borders, Extended, cosine
 from contin.arrays import Array, ComplexArray
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
@@ -124,7 +124,7 @@ class CriticalCurve(Extended):
     def _fit(self, v: ComplexArray, w: ComplexArray) -> bool:
         """Return whether the borders are close to the null vectors, or these are not finite."""
         (b, c), root = self.borders, np.sqrt(self.copy_shape[1])
-        return not min(_cosine(c / root, v * root), _cosine(b, w)) < _FITS
+        return not min(cosine(c / root, v * root), cosine(b, w)) < _FITS
 
     def _solved(self, x: Array) -> NullVectors:
         (equations, weights), copies = self.copy_shape, self.copies
@@ -219,8 +219,3 @@ def _largest_part(vector: ComplexArray) -> Array:
     turned = vector * np.exp(-0.5j * np.angle(vector @ vector))
     part: Array = turned.real
     return part / np.linalg.norm(part)
-
-
-def _cosine(border: Array, vector: Any) -> float:
-    """Return the cosine between a real vector and a complex one."""
-    return float(abs(border @ vector) / math.sqrt((border @ border) * float(np.vdot(vector, vector).real)))

@@ -112,9 +112,9 @@ class Extended(Discretization):
         return other, self.carrier(other)
 
 
-def cosine(a: Array, b: Array) -> float:
-    """Return the absolute cosine between two vectors."""
-    return float(abs(a @ b) / np.sqrt((a @ a) * (b @ b)))
+def cosine(a: Array, b: Any) -> float:
+    """Return the absolute cosine between a real vector and a real or complex one."""
+    return float(abs(a @ b) / np.sqrt((a @ a) * float(np.vdot(b, b).real)))
 
 
 def _found_elsewhere(u: Any, p: Any) -> Any:

@@ -9,12 +9,11 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.discretization.collocation import Collocation
+from contin.discretization.conditions import Conditioned
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
 from contin.errors import ConvergenceError
-from contin.linalg.condensation import Factorization
-from contin.linalg.factors import Factors
 from contin.problems.connection import ConnectionProblem
 
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
@@ -24,7 +23,7 @@ _MOVED = 1e-6
 _DIFFERENCE = 1e-6
 
 
-class ConnectionCollocation(Collocation):
+class ConnectionCollocation(Conditioned):
     """A `ConnectionProblem` on a mesh.
 
     The conditions beyond collocation are rows of their own,
@@ -125,36 +124,20 @@ class ConnectionCollocation(Collocation):
         by_states[-1] = self._phase[: self.state_size]
         return np.concatenate(values), by_states, by_parameters
 
-    def _rows(self, x: Array) -> tuple[Array, Array]:
+    def condition_values(self, x: Array) -> Array:
+        """Return the projection and phase conditions."""
+        return self._conditions_at_ends(x, ())[0]
+
+    def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
         """Return these conditions and their derivatives by x."""
         values, by_states, by_parameters = self._conditions_at_ends(x, self.free)
         return values, np.hstack([by_states, by_parameters * self.free_scales])
 
-    # --- the discrete equations ----------------------------------------------------------------------------------
+    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of these conditions by any parameters."""
+        return self._conditions_at_ends(x, names)[2]
 
-    def residual(self, x: Array) -> Array:
-        """Return the residual of the discrete equations at x, the projection and phase conditions last."""
-        return np.append(super().residual(x), self._conditions_at_ends(x, ())[0])
-
-    def linearize(
-        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
-    ) -> tuple[Array, Factors]:
-        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        values, own = self._rows(x)
-        own = np.hstack([own, columns[:, self._conditions :].T])
-        residual, blocks = self._blocks(x, np.vstack([own, rows]), np.ascontiguousarray(columns[:, : self._conditions]))
-        return np.append(residual, values), Factorization(self._layout, blocks)
-
-    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of the residual by any parameters, shape (equations, len(names))."""
-        return np.vstack([super().parameter_columns(x, names), self._conditions_at_ends(x, names)[2]])
-
-    def transposed_product(self, x: Array, w: Array) -> Array:
-        """Return F_x^T w, shape (size,)."""
-        product: Array = super().transposed_product(x, w[: self._conditions]) + self._rows(x)[1].T @ w[self._conditions :]
-        return product
+    # --- columns -------------------------------------------------------------------------------------------------
 
     def functionals(self, x: Array) -> Array:
         """Return the gap: the largest distance of an end from its equilibrium, over the size of the orbit."""

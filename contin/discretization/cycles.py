@@ -12,12 +12,11 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, ComplexArray, Indices
 from contin.discretization.collocation import Collocation
+from contin.discretization.conditions import Conditioned
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
-from contin.linalg.condensation import Factorization
-from contin.linalg.factors import Factors
 from contin.linalg.periodic import log_eigenvalues
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 
@@ -182,7 +181,7 @@ class ForcedCollocation(PeriodicCollocation):
         return None if _is_opposite(frequency) else ("TR", "torus")
 
 
-class CycleCollocation(PeriodicCollocation):
+class CycleCollocation(Conditioned, PeriodicCollocation):
     """An autonomous `CycleProblem` on a mesh.
 
     The phase condition, the integral of u . v' over that of v' . v', is linear: one row beside the collocation equations,
@@ -212,29 +211,17 @@ class CycleCollocation(PeriodicCollocation):
 
     # --- the discrete equations ----------------------------------------------------------------------------------
 
-    def residual(self, x: Array) -> Array:
-        """Return the residual of the discrete equations at x, the phase condition last."""
-        return np.append(super().residual(x), self._phase @ x)
+    def condition_values(self, x: Array) -> Array:
+        """Return the phase condition, shape (1,)."""
+        return np.array([self._phase @ x])
 
-    def linearize(
-        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
-    ) -> tuple[Array, Factors]:
-        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        phase = np.concatenate([self._phase, columns[:, -1]])
-        residual, blocks = self._blocks(x, np.vstack([phase, rows]), np.ascontiguousarray(columns[:, :-1]))
-        return np.append(residual, self._phase @ x), Factorization(self._layout, blocks)
+    def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
+        """Return the phase condition and its row."""
+        return self.condition_values(x), self._phase[None]
 
-    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of the residual by any parameters, shape (equations, len(names))."""
-        columns = super().parameter_columns(x, names)
-        return np.vstack([columns, np.zeros(columns.shape[1])])
-
-    def transposed_product(self, x: Array, w: Array) -> Array:
-        """Return F_x^T w, shape (size,)."""
-        product: Array = super().transposed_product(x, w[:-1]) + w[-1] * self._phase
-        return product
+    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return zeros: the phase condition contains no parameter."""
+        return np.zeros((1, len(names)))
 
     # --- stability -----------------------------------------------------------------------------------------------
 

@@ -1,0 +1,57 @@
+"""Collocation with conditions beyond those of the problem: each is a row of its own, and may depend on all unknowns."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.discretization.collocation import Collocation
+from contin.linalg.condensation import Factorization
+from contin.linalg.factors import Factors
+
+
+class Conditioned(Collocation):
+    """A boundary value problem on a mesh, and further conditions, which come last in the residual.
+
+    Subclasses add the number of them to ``equations`` and say what they are.
+    """
+
+    @abstractmethod
+    def condition_values(self, x: Array) -> Array:
+        """Return the quantities that vanish besides, shape (q,)."""
+
+    @abstractmethod
+    def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
+        """Return them, and their derivatives by x, shape (q, size)."""
+
+    @abstractmethod
+    def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return their derivatives by any parameters, shape (q, len(names))."""
+
+    def residual(self, x: Array) -> Array:
+        """Return the residual of the discrete equations at x, the further conditions last."""
+        return np.append(super().residual(x), self.condition_values(x))
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
+        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
+        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        values, own = self.conditions_with_rows(x)
+        own = np.hstack([own, columns[:, self._conditions :].T])
+        residual, blocks = self._blocks(x, np.vstack([own, rows]), np.ascontiguousarray(columns[:, : self._conditions]))
+        return np.append(residual, values), Factorization(self._layout, blocks)
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of the residual by any parameters, shape (equations, len(names))."""
+        return np.vstack([super().parameter_columns(x, names), self.condition_columns(x, names)])
+
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,)."""
+        own = self.conditions_with_rows(x)[1]
+        product: Array = super().transposed_product(x, w[: self._conditions]) + own.T @ w[self._conditions :]
+        return product
