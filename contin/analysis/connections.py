@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from contin import checks
-from contin.analysis.solving import solve, solved
+from contin.analysis.solving import solved
 from contin.arrays import Array
+from contin.detection.homoclinic import equilibrium_beside
 from contin.discretization.connections import ConnectionCollocation
 from contin.discretization.cycles import CycleCollocation
 from contin.discretization.mesh import MeshControl
-from contin.errors import ContinError, ProblemError
-from contin.problems.algebraic import AlgebraicProblem
+from contin.errors import ProblemError
 from contin.problems.connection import TIME, ConnectionProblem
 from contin.problems.cycle import PERIOD
 from contin.results.point import Point
@@ -48,7 +48,7 @@ def homoclinic(cycle: Point, free: Sequence[str], *, mesh: MeshControl | None = 
     if not isinstance(system, CycleCollocation):
         raise ProblemError("cycle: must be a point of a CycleProblem")
     states, names = system.states(cycle.x), system.problem.state_names
-    rest, unstable = _saddle(cycle, states)
+    rest, unstable = _saddle(system, cycle.x)
     parameters = {name: value for name, value in cycle.parameters.items() if name != PERIOD}
     problem = ConnectionProblem(system.problem.field, names, parameters, unstable=unstable)
     degree = system.degree
@@ -62,27 +62,20 @@ def homoclinic(cycle: Point, free: Sequence[str], *, mesh: MeshControl | None = 
     return solved(started.with_reference(x), x, MeshControl() if mesh is None else mesh, newton)
 
 
-def _saddle(cycle: Point, states: Array) -> tuple[Array, int]:
-    """Return the equilibrium that a cycle comes closest to, shape (n,), and the number of its unstable eigenvalues.
+def _saddle(system: CycleCollocation, x: Array) -> tuple[Array, int]:
+    """Return the equilibrium beside a cycle, shape (n,), and the number of its unstable eigenvalues.
 
     Raises
     ------
     ProblemError
         None is found from where the motion is slowest, or it is no saddle.
     """
-    system: Any = cycle.system
-    problem = system.problem
-    parameters = system.all_parameters(cycle.x)
-    rates = problem.batch("field").values(system.nodes, states, np.empty((0, states.shape[1])), parameters)
-    slowest = states[np.linalg.norm(rates, axis=1).argmin()]
-    equilibria = AlgebraicProblem(problem.field, problem.state_names, problem.parameters)
-    try:
-        rest = solve(equilibria, slowest, cycle.parameters)
-    except ContinError as error:
-        raise ProblemError(f"cycle: no equilibrium is found where it is slowest: {error}") from error
-    eigenvalues = np.linalg.eigvals(rest.system.jacobian(rest.x))  # type: ignore[attr-defined]
+    found = equilibrium_beside(system, x)
+    if found is None:
+        raise ProblemError("cycle: no equilibrium is found from where it is slowest; take a cycle of longer period")
+    states, eigenvalues = found
     unstable = int(np.count_nonzero(eigenvalues.real > 0))
     if unstable in (0, len(eigenvalues)):
         kind = "stable" if unstable == 0 else "a source"
         raise ProblemError(f"cycle: the equilibrium where it is slowest is {kind}, no saddle; take a cycle of longer period")
-    return rest.x, unstable
+    return states if system.scales is None else states * system.scales.states, unstable

@@ -19,6 +19,7 @@ from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.problems.statement import Statement, multipliers_of
+from contin.problems.vector_field import found_elsewhere
 
 #: Cosine between a border and the null vector that it stands for, below which it is renewed: the bordered matrix is then still
 #: far from singular (with a cosine of zero it is).
@@ -117,11 +118,6 @@ def cosine(a: Array, b: Any) -> float:
     return float(abs(a @ b) / np.sqrt((a @ a) * float(np.vdot(b, b).real)))
 
 
-def _found_elsewhere(u: Any, p: Any) -> Any:
-    """Stand for a column that the extended system computes."""
-    raise NotImplementedError
-
-
 @dataclasses.dataclass(frozen=True)
 class _ExtendedStatement:
     """The statement behind an extended system: that of the problem, but for the number of free parameters."""
@@ -143,7 +139,7 @@ class _ExtendedStatement:
     @property
     def functionals(self) -> Mapping[str, Function]:
         """Functionals of the problem, and columns of the curve."""
-        return {**self.problem.functionals, **dict.fromkeys(self.columns, _found_elsewhere)}
+        return {**self.problem.functionals, **dict.fromkeys(self.columns, found_elsewhere)}
 
     @property
     def multipliers(self) -> tuple[str, ...]:

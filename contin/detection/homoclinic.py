@@ -77,14 +77,19 @@ def _speeds(system: Any, x: Array) -> Array:
     return speeds
 
 
-def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
-    """Return the equilibrium near which a cycle spends most of its time; None where there is none."""
-    points, speeds = system.at_gauss_points(x), _speeds(system, x)
-    if not speeds.min() < _SLOW * speeds.max():
-        return None
+def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
+    """Return the equilibrium that Newton's method finds from where a cycle is slowest; None where it finds none.
+
+    Returns
+    -------
+    states : ndarray, shape (n,)
+        Divided by their sizes.
+    eigenvalues : ndarray of complex, shape (n,)
+        Those of the equilibrium, the largest real part first.
+    """
+    points = system.at_gauss_points(x)
     size = np.ptp(points, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    states = points[speeds.argmin()].copy()
+    states = points[_speeds(system, x).argmin()].copy()
     for _ in range(_UPDATES):
         try:
             update = np.linalg.solve(system.rates_by_states(x, states[None])[0], system.rates(x, states[None])[0])
@@ -95,12 +100,22 @@ def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
             break
     else:
         return None
-    near = np.abs((points - states) / size).max(axis=1) < _NEAR
+    eigenvalues = np.linalg.eigvals(system.rates_by_states(x, states[None])[0])
+    values: ComplexArray = np.asarray(eigenvalues, dtype=complex) / system.duration(x)
+    return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), values[np.argsort(-values.real)]
+
+
+def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
+    """Return the equilibrium near which a cycle spends most of its time; None where there is none."""
+    points, speeds = system.at_gauss_points(x), _speeds(system, x)
+    found = equilibrium_beside(system, x) if speeds.min() < _SLOW * speeds.max() else None
+    if found is None:
+        return None
+    states, eigenvalues = found
+    size = np.ptp(points, axis=0)
+    near = np.abs((points - states) / np.where(size > 0, size, 1.0)).max(axis=1) < _NEAR
     share = float(system.gauss_weights @ near)
     if share < _MOSTLY:
         return None
     scales = np.ones(len(states)) if system.scales is None else system.scales.states
-    eigenvalues: ComplexArray = np.linalg.eigvals(system.rates_by_states(x, states[None])[0]).astype(complex)
-    eigenvalues = eigenvalues / system.duration(x)
-    states = np.where(np.abs(states) > _NOTHING * size, states, 0.0)
-    return RestingPlace(states * scales, eigenvalues[np.argsort(-eigenvalues.real)], share)
+    return RestingPlace(states * scales, eigenvalues, share)

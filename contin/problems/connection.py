@@ -10,9 +10,10 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Signature, argument_count, result_count
+from contin.functions.signature import Signature
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
+from contin.problems.vector_field import check_field, found_elsewhere, generated, scaled
 
 #: The name, among the parameters, of the time that the computed part of the orbit takes.
 TIME = "time"
@@ -86,19 +87,14 @@ class ConnectionProblem(BoundaryValueProblem):
         for name in own:
             if name in parameters:
                 raise ProblemError(f"parameters: {name} is a parameter of every connection by itself")
-        signature = Signature(names, (*parameters, *own), times=False)
-        if argument_count(checks.function("field", field)) != 2:
-            raise ProblemError("field: must be a function of (u, p)")
-        found = result_count(field, signature.arguments, "field")
-        if found != count:
-            raise ProblemError(f"field returns {found} values for the {count} states {', '.join(names)}")
+        check_field(field, Signature(names, (*parameters, *own), times=False), "must be a function of (u, p)")
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "homoclinic", homoclinic)
         object.__setattr__(self, "unstable", unstable)
         object.__setattr__(self, "stable", count - unstable if stable is None else stable)
-        rhs, boundary = _scaled_by_time(field, count), _at_rest(field, names, homoclinic)
+        rhs, boundary = scaled(field, TIME, count), _at_rest(field, names, homoclinic)
         super().__init__(rhs, boundary, names, {**parameters, TIME: 1.0, **dict.fromkeys(own[1:], 0.0)})
-        object.__setattr__(self, "functionals", {"gap": _found_elsewhere})
+        object.__setattr__(self, "functionals", {"gap": found_elsewhere})
 
     @property
     def multipliers(self) -> tuple[str, ...]:
@@ -122,30 +118,13 @@ class ConnectionProblem(BoundaryValueProblem):
         return super()._compiled(name)
 
 
-def _found_elsewhere(u: Any, p: Any) -> Any:
-    """Stand for a column that is not an integral."""
-    raise NotImplementedError
-
-
-def _scaled_by_time(field: Function, count: int) -> Function:
-    """Return the field times the time; the text is generated because compiled code has tuples of fixed sizes."""
-    scope: dict[str, Any] = {"field": field, "__name__": __name__}
-    values = "".join(f"p.time * r[{i}], " for i in range(count))
-    exec(f"def rhs(t, u, p):\n    r = field(u, p)\n    return ({values})", scope)
-    found: Function = scope["rhs"]
-    return found
-
-
 def _at_rest(field: Function, names: Sequence[str], homoclinic: bool) -> Function:
     """Return the boundary conditions: the field vanishes at the equilibria."""
     state: Any = namedtuple("State", names)  # type: ignore[misc]  # noqa: PYI024
-    scope: dict[str, Any] = {"field": field, "State": state, "__name__": __name__}
     lines = ["def boundary(a, b, p):"]
     values = []
     for kind in ("from_",) if homoclinic else ("from_", "to_"):
         lines.append(f"    {kind} = field(State({''.join(f'p.{kind}{name}, ' for name in names)}), p)")
         values += [f"{kind}[{i}], " for i in range(len(names))]
     lines.append(f"    return ({''.join(values)})")
-    exec("\n".join(lines), scope)
-    found: Function = scope["boundary"]
-    return found
+    return generated("boundary", "\n".join(lines), {"field": field, "State": state})

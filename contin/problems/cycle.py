@@ -11,11 +11,15 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Signature, argument_count, result_count
+from contin.functions.signature import Signature, argument_count
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
+from contin.problems.vector_field import check_field, found_elsewhere, generated, scaled
 
+#: What is said of a field with other arguments.
+_FORCED = "must be a function of (t, u, p), as a period is given"
+_AUTONOMOUS = "must be a function of (u, p); one of (t, u, p) needs a period"
 #: The name of the period: of an autonomous field a parameter, of a forced one a column.
 PERIOD = "period"
 #: Of a forced field, the parameter that says after how many periods of the forcing the cycle closes.
@@ -93,17 +97,16 @@ class CycleProblem(BoundaryValueProblem):
         for name in (PERIOD, *extremes, *([ROUNDS] if forced else [])):
             if name in parameters or name in means:
                 raise ProblemError(f"parameters: {name} is a column of every cycle by itself")
-        count = _field_size(field, Signature(names, tuple(parameters), times=forced))
-        if count != len(names):
-            raise ProblemError(f"field returns {count} values for the {len(names)} states {', '.join(names)}")
+        check_field(field, Signature(names, tuple(parameters), times=forced), _FORCED if forced else _AUTONOMOUS)
+        count = len(names)
         found = None if period is None else _period_function(period, parameters)
-        rhs = _scaled_by_period(field, count) if found is None else _scaled_by_forcing(field, found, count)
+        rhs = scaled(field, PERIOD, count) if found is None else _scaled_by_forcing(field, found, count)
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "means", means)
         object.__setattr__(self, "period", found)
         super().__init__(rhs, _periodic(count), names, {**parameters, **({ROUNDS: 1.0} if forced else {PERIOD: 1.0})})
         columns = [*extremes, PERIOD] if forced else extremes
-        object.__setattr__(self, "functionals", {**dict.fromkeys(columns, _found_elsewhere), **means})
+        object.__setattr__(self, "functionals", {**dict.fromkeys(columns, found_elsewhere), **means})
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:
@@ -143,22 +146,6 @@ class CycleProblem(BoundaryValueProblem):
         return Batch(functions, [0] * len(functions), self.state_names, tuple(self.parameters))
 
 
-def _field_size(field: Function, signature: Signature) -> int:
-    """Return how many values a field has.
-
-    Raises
-    ------
-    ProblemError
-        It takes other arguments.
-    """
-    found = argument_count(checks.function("field", field))
-    if found != len(signature.arguments):
-        if signature.times:
-            raise ProblemError("field: must be a function of (t, u, p), as a period is given")
-        raise ProblemError("field: must be a function of (u, p); one of (t, u, p) needs a period")
-    return result_count(field, signature.arguments, "field")
-
-
 def _period_function(period: Period, parameters: Mapping[str, float]) -> Function:
     """Return the period of a forcing as a function of the parameters.
 
@@ -170,44 +157,25 @@ def _period_function(period: Period, parameters: Mapping[str, float]) -> Functio
     if isinstance(period, str):
         if period not in parameters:
             raise ProblemError(f"period: {checks.shown(period)} is no parameter; there are {', '.join(parameters) or 'none'}")
-        return _generated("period", f"def period(p):\n    return p.{period}\n", {})
+        return generated("period", f"def period(p):\n    return p.{period}\n", {})
     if callable(period):
         if argument_count(period) != 1:
             raise ProblemError("period: must be a function of p alone")
         return period
     checks.number("period", period, 0)
-    return _generated("period", f"def period(p):\n    return {float(period)!r}\n", {})
-
-
-def _found_elsewhere(u: Any, p: Any) -> Any:
-    """Stand for a column that is not an integral."""
-    raise NotImplementedError
-
-
-def _generated(name: str, source: str, names: Mapping[str, Any]) -> Function:
-    """Return a function from its text, which is generated because compiled code has tuples of fixed sizes."""
-    scope: dict[str, Any] = {**names, "__name__": __name__}
-    exec(source, scope)
-    found: Function = scope[name]
-    return found
-
-
-def _scaled_by_period(field: Function, count: int) -> Function:
-    """Return the field times the period."""
-    values = "".join(f"p.period * r[{i}], " for i in range(count))
-    return _generated("rhs", f"def rhs(t, u, p):\n    r = field(u, p)\n    return ({values})", {"field": field})
+    return generated("period", f"def period(p):\n    return {float(period)!r}\n", {})
 
 
 def _scaled_by_forcing(field: Function, period: Function, count: int) -> Function:
     """Return a forced field times the period, at the time from 0 to 1."""
     values = "".join(f"T * r[{i}], " for i in range(count))
     source = f"def rhs(t, u, p):\n    T = p.rounds * period(p)\n    r = field(T * t, u, p)\n    return ({values})"
-    return _generated("rhs", source, {"field": field, "period": period})
+    return generated("rhs", source, {"field": field, "period": period})
 
 
 def _periodic(count: int) -> Function:
     values = "".join(f"a[{i}] - b[{i}], " for i in range(count))
-    return _generated("boundary", f"def boundary(a, b, p):\n    return ({values})", {})
+    return generated("boundary", f"def boundary(a, b, p):\n    return ({values})", {})
 
 
 def _of_time(function: Function) -> Function:

@@ -1,0 +1,44 @@
+"""What statements of orbits have in common: a vector field u' = F(u, p), and functions generated from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from contin import checks
+from contin.arrays import Function
+from contin.errors import ProblemError
+from contin.functions.signature import Signature, argument_count, result_count
+
+
+def check_field(field: Function, signature: Signature, wrong: str) -> None:
+    """Check that a field takes these arguments and returns a value for each state; ``wrong`` is said of other arguments.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if argument_count(checks.function("field", field)) != len(signature.arguments):
+        raise ProblemError(f"field: {wrong}")
+    names, count = signature.states, result_count(field, signature.arguments, "field")
+    if count != len(names):
+        raise ProblemError(f"field returns {count} values for the {len(names)} states {', '.join(names)}")
+
+
+def generated(name: str, source: str, names: Mapping[str, Any]) -> Function:
+    """Return a function from its text, which is generated because compiled code has tuples of fixed sizes."""
+    scope: dict[str, Any] = {**names, "__name__": __name__}
+    exec(source, scope)
+    found: Function = scope[name]
+    return found
+
+
+def scaled(field: Function, by: str, count: int) -> Function:
+    """Return the right-hand side that is the field times a parameter."""
+    values = "".join(f"p.{by} * r[{i}], " for i in range(count))
+    return generated("rhs", f"def rhs(t, u, p):\n    r = field(u, p)\n    return ({values})", {"field": field})
+
+
+def found_elsewhere(u: Any, p: Any) -> Any:
+    """Stand for a column that the discretized problem computes: it is no integral, and never called."""
+    raise NotImplementedError
