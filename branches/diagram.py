@@ -11,7 +11,7 @@ from branches import diagram_graph
 from branches.config import Config, ConfigError, DiagramConfig, difference, dump, parse
 from branches.diagram_graph import Course
 from branches.executor import WAIT, executor, run_jobs, trouble
-from branches.files import StoreError, only_run, prepare, write_bytes
+from branches.files import ANOTHER_DIAGRAM, StoreError, another_scene, only_run, prepare, write_bytes
 from branches.names import DIAGRAM, primary_file
 from branches.read import read_branch
 
@@ -120,26 +120,19 @@ def _kept(config: DiagramConfig, folder: Path) -> dict[str, Course]:
     ours, kept = {primary_file(one): one for one in config.branches}, {}
     for name, scene in _stored_scenes(config, folder).items():
         if name not in ours:
-            raise _another_scene(folder, f"{name} is not a branch of this one")
+            raise another_scene(folder, f"{name} is not a branch of this one")
         if differs := difference(scene, ours[name]):
-            raise _another_scene(folder, f"{name}: {differs}")
+            raise another_scene(folder, f"{name}: {differs}")
     for name, one in ours.items():
         try:
             branch = read_branch(folder / name)
         except StoreError:  # there is none, or it cannot be read: it is computed
             continue
         if differs := difference(Config.model_validate(branch.config), one):
-            raise _another_scene(folder, f"{name}: {differs}")
+            raise another_scene(folder, f"{name}: {differs}")
         if branch.status == "complete":
             kept[name] = diagram_graph.course_of(branch)
     return kept
-
-
-_ADVICE = "--overwrite replaces its diagram, --out writes elsewhere"
-
-
-def _another_scene(folder: Path, reason: str) -> StoreError:
-    return StoreError(f"{str(folder)!r} holds another scene ({reason}); {_ADVICE}")
 
 
 def _stored_scenes(config: DiagramConfig, folder: Path) -> dict[str, Config]:
@@ -153,7 +146,7 @@ def _stored_scenes(config: DiagramConfig, folder: Path) -> dict[str, Config]:
         scene = parse(text, DIAGRAM)
         return {primary_file(one): one for one in scene.branches}
     except (StoreError, ConfigError, KeyError) as error:
-        raise StoreError(f"{str(folder)!r} holds a diagram that is not a result of branches.run; {_ADVICE}") from error
+        raise StoreError(f"{str(folder)!r} holds a diagram that is not a result of branches.run; {ANOTHER_DIAGRAM}") from error
 
 
 def _compute_missing(config, folder, graph, display, run, kept) -> tuple[dict[str, str], list[Config]]:

@@ -24,6 +24,15 @@ class StoreError(Exception):
     """A file that cannot be written or read; the message is one sentence."""
 
 
+#: What can be done where a folder holds another diagram.
+ANOTHER_DIAGRAM = "--overwrite replaces its diagram, --out writes elsewhere"
+
+
+def another_scene(folder: Path, reason: str) -> StoreError:
+    """Return what is raised where a folder holds the diagram of another scene."""
+    return StoreError(f"{str(folder)!r} holds another scene ({reason}); {ANOTHER_DIAGRAM}")
+
+
 def write_bytes(path: Path, data: bytes) -> None:
     """Replace the file ``path`` (or the file it links to) as a whole, with its mode, or leave it unchanged.
 

@@ -10,7 +10,7 @@ from branches import diagram_graph, open_graph
 from branches.config import ConfigError, difference, dump, parse
 from branches.display import Display
 from branches.executor import executor, run_jobs, trouble
-from branches.files import StoreError, only_run, prepare, write_bytes
+from branches.files import StoreError, another_scene, only_run, prepare, write_bytes
 from branches.names import DIAGRAM
 from branches.open_branch import OpenBranch
 from branches.open_config import OpenConfig
@@ -71,12 +71,10 @@ def _kept(config: OpenSweep, folder: Path) -> set[str]:
     StoreError
         A file in the folder would be replaced, or would no longer be in its diagram.
     """
-    advice = "--overwrite replaces its diagram, --out writes elsewhere"
     if (folder / DIAGRAM).exists():
         for _, data in diagram_graph.read_any(folder).nodes(data=True):
             if data.get("file") not in config.branches:
-                other = f"{data.get('file')} is not a branch of this one"
-                raise StoreError(f"{str(folder)!r} holds another scene ({other}); {advice}")
+                raise another_scene(folder, f"{data.get('file')} is not a branch of this one")
     kept = set()
     for name, one in config.branches.items():
         try:
@@ -85,7 +83,7 @@ def _kept(config: OpenSweep, folder: Path) -> set[str]:
             continue
         different = difference(branch.scene, one) if isinstance(branch, OpenBranch) else "it is of a closed strip"
         if different:
-            raise StoreError(f"{str(folder)!r} holds another scene ({name}: {different}); {advice}")
+            raise another_scene(folder, f"{name}: {different}")
         if branch.status == "complete":
             kept.add(name)
     return kept

@@ -100,8 +100,8 @@ def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, Compl
             break
     else:
         return None
-    eigenvalues = np.linalg.eigvals(system.rates_by_states(x, states[None])[0])
-    values: ComplexArray = np.asarray(eigenvalues, dtype=complex) / system.duration(x)
+    eigenvalues: ComplexArray = np.linalg.eigvals(system.rates_by_states(x, states[None])[0]).astype(complex)
+    values = eigenvalues / system.duration(x)
     return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), values[np.argsort(-values.real)]
 
 
