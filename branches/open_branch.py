@@ -16,8 +16,8 @@ from branches.labels import SPECIAL
 from branches.open_config import OpenConfig
 from branches.read_closed import StoredBranch
 from ribbon_model.ends import DIRECTIONS
-from ribbon_model.open_strip import shape_of, strains_of
-from ribbon_model.shape import Shape
+from ribbon_model.equilibrium import strains_of
+from ribbon_model.shape import Shape, shape_of
 
 #: What a person feels or sees where a number is followed: its conjugate, up to a sign. Others are shown with the energy.
 CONJUGATE = {

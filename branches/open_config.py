@@ -336,7 +336,9 @@ class OpenConfig(Strict):
 
     def _strip_with(self, start: EndConfig, finish: EndConfig, changed: bool):
         """Return the strip with these ends; once they have changed, with all loads that can replace reactions."""
-        from ribbon_model.open_strip import LOADS, STROKE, OpenStrip, Roller, replacing_loads
+        from ribbon_model.integral_conditions import Roller
+        from ribbon_model.loads import LOADS, STROKE, replacing_loads
+        from ribbon_model.open_strip import OpenStrip
 
         ends, where = (start.end(), finish.end()), self.directions
         directions, material = (where.weight, where.foundation, where.stroke), self._material()

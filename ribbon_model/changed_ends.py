@@ -19,7 +19,8 @@ import numpy as np
 from contin import Collocation, Point, correct, point_of
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, FREE, PLACE
-from ribbon_model.open_strip import FORCES, STROKE, OpenStrip
+from ribbon_model.loads import FORCES, STROKE
+from ribbon_model.open_strip import OpenStrip
 
 #: A condition at the ends that is missed by less, relative to 1 + the largest force or moment there, holds: states are known
 #: to 1e-9 and better.

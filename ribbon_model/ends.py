@@ -30,6 +30,8 @@ DIRECTIONS = {"width": (1.0, 0.0, 0.0), "normal": (0.0, 1.0, 0.0), "tangent": (0
 PLACE, ANGLES = ("shear", "rise", "distance"), ("turn", "bend", "swing")
 #: Rotations of an end.
 CLAMPED, HINGED, JOINT, FREE = "clamped", "hinged", "joint", "free"
+#: A part of a unit vector below this is zero.
+LOOSE = 1e-9
 #: A vector shorter than this has no direction.
 _SHORT = 1e-9
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from ribbon_model.laws import Law
 
 LENGTH = 2 * math.pi
@@ -105,3 +107,27 @@ def _functionals(law: Law, moment: Callable[..., tuple]) -> dict[str, Callable]:
         return M[0] * w1 + M[1] * w2 + M[2] * w3 - H
 
     return {"kappa_star": law.at_points(moment, kappa_star), "energy": law.at_points(moment, energy)}
+
+
+def strains_of(q: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Return strains (K, 3) from quaternions (K, 4) and their rates: the inverse of `spin`."""
+    q0, q1, q2, q3 = q.T
+    r0, r1, r2, r3 = rates[:, :4].T
+    return 2 * np.array([
+        q0 * r1 - q1 * r0 - q2 * r3 + q3 * r2, q0 * r2 - q2 * r0 - q3 * r1 + q1 * r3, q0 * r3 - q3 * r0 - q1 * r2 + q2 * r1
+    ]).T  # fmt: skip
+
+
+def moment_on_directors(q, lam) -> np.ndarray:
+    """Return the moment on the directors, shape (3, ...), from quaternions (4, ...) and their multipliers (4, ...).
+
+    2 M_i = lam . (q e_i).
+    """
+    rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)
+    return np.array([sum(a * b for a, b in zip(lam, rate)) for rate in rates])
+
+
+def moment_on_axes(q, lam) -> np.ndarray:
+    """Return the moment on the lab axes from the multipliers of the quaternion."""
+    result: np.ndarray = moment_on_directors(q, lam) @ np.array(directors(*q)).reshape(3, 3)
+    return result

@@ -19,7 +19,8 @@ from scipy.spatial.transform import Rotation
 from contin import Collocation
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, CLAMPED, HINGED, JOINT, PLACE
-from ribbon_model.open_strip import FORCES, STROKE, OpenStrip
+from ribbon_model.loads import FORCES, STROKE
+from ribbon_model.open_strip import OpenStrip
 from ribbon_model.second_variation import cross_matrix
 from ribbon_model.segments import Chain
 from ribbon_model.shape import frames

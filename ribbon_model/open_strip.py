@@ -10,101 +10,29 @@ from __future__ import annotations
 
 import functools
 import math
-from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 
-from contin import Collocation, ContinError, Point, ProblemError, TestFunction, Trial, VariationalProblem, solve
-from ribbon_model import ends
-from ribbon_model.ends import ANGLES, CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, PLACE, End
-from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, spin
-from ribbon_model.laws import FINITE_WIDTH, RIBBON
+from contin import Collocation, ContinError, Point, ProblemError, TestFunction, VariationalProblem, solve
+from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
+from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
+from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
+from ribbon_model.first_guesses import Guess
+from ribbon_model.integral_conditions import PHASES, Roller
+from ribbon_model.loads import FORCES, LOADS, STROKE
 from ribbon_model.material import Material
-from ribbon_model.shape import Shape, frames
+from ribbon_model.shape import Shape, shape_of
 
-#: Numbers of loads: dead force at the last end along the three directions, dead moment about its hinge, weight per length
-#: (along ``weight_direction``), stiffness per length of a foundation.
-FORCES = ("force_width", "force_normal", "force_tangent")
-LOADS = (*FORCES, "moment", "weight", "foundation")
-#: A further displacement of the last end, along ``stroke_direction``.
-STROKE = "stroke"
-#: Conditions that fix what symmetry leaves open: the angle about the tangent (a homogeneous ring, an isotropic rod between ends
-#: on one line), the place along a closed strip that is twisted to the right or to the left, and along a ring that buckles with
-#: two waves. Each is an integral condition that holds by symmetry, so its multiplier vanishes. (Of combinations of x1 and
-#: x2 sin(2 pi s), those with the factors -3 and 0 lose their slope on the way to a Moebius band of a flat strip; with +3 they
-#: keep it.)
-PHASES = {
-    "spin": lambda t, x: x.x1,
-    "shift, right": lambda t, x: x.x1 + 3 * x.x2 * math.sin(2 * math.pi * t),
-    "shift, left": lambda t, x: x.x1 - 3 * x.x2 * math.sin(2 * math.pi * t),
-    "shift, two waves": lambda t, x: x.x1 * math.sin(4 * math.pi * t),
-}
 #: Columns of the reactions.
 REACTIONS = tuple(
     f"{end}{what}_{direction}" for end in ("", "start_") for what in ("F", "M") for direction in DIRECTIONS
 )  # fmt: skip
-#: Largest angle of an arch that is a first guess: beyond it the strip passes through itself.
-_STEEPEST = 2.4
-#: Halvings of the interval in which its amplitude is looked for: to round-off. Ten times more change nothing.
-_HALVINGS = 50
 #: An eigenvalue of the second variation below this part of the largest is zero: a motion that costs no energy. Round-off
 #: leaves 1e-14, and slow branches near their birth have eigenvalues above 1e-8.
 _ZERO = 1e-10
-#: A rigid motion that moves what is held by less than this, relative to its size, is not held.
-_LOOSE = 1e-9
-
-
-#: Fewest intervals of the mesh of a strip with a roller, and the most that are added so that one ends there. It is not adapted.
-_FEWEST, _MOST = 20, 100
-
-
-@dataclass(frozen=True)
-class Roller:
-    """A support between the ends, which holds the place of one point of the strip along a direction.
-
-    Attributes
-    ----------
-    at : float
-        Arclength of this point, a multiple of 1/N for a whole number N up to 100.
-    direction : tuple of float
-        The strip's place there along it is the number ``roller``.
-
-    Raises
-    ------
-    ValueError
-        A field that does not fit; one sentence.
-
-    Notes
-    -----
-    The place is x(at) = the integral of d3 up to there, so a roller is an integral condition whose density jumps at a mesh
-    point. Its multiplier is the force of the roller on the strip, and the contact force before it is larger by this.
-    """
-
-    at: float
-    direction: ends.Vector
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", ends.unit("roller", self.direction))
-        if not 0 < self.at < 1 or self.intervals() == 0:
-            raise ValueError(f"roller: at: {self.at:g} must be a multiple of 1/N between 0 and 1, with N up to {_MOST}")
-
-    def intervals(self, least: int = _FEWEST) -> int:
-        """Return a number of equal intervals, not below ``least``, one of which ends at the roller; 0 if there is none."""
-        counts = range(max(least, _FEWEST), max(least, _FEWEST) + _MOST)
-        return next((count for count in counts if abs(self.at * count - round(self.at * count)) < _LOOSE), 0)
-
-    def density(self) -> Callable:
-        """Return g(t, x, p), whose integral over the strip vanishes where the roller holds it."""
-        at, (x, y, z) = self.at, self.direction
-
-        def density(t, state, p):
-            before = (1 - (t - at) / (abs(t - at) + 1e-300)) / 2
-            d31, d32, d33 = directors(*state[:4])[6:]
-            return before * (x * d31 + y * d32 + z * d33) - p.roller
-
-        return density
 
 
 @dataclass(frozen=True)
@@ -182,9 +110,9 @@ class OpenStrip:
     @property
     def known(self) -> tuple[str, ...]:
         """Names of the numbers that can be given here, besides those of the material."""
-        forces = forces_of(self.finish)
+        forces = loads.forces_of(self.finish)
         along = np.array(self.finish.held).reshape(-1, 3) @ self.stroke_direction
-        stroke = (STROKE,) if np.any(abs(along) > _LOOSE) else ()
+        stroke = (STROKE,) if np.any(abs(along) > LOOSE) else ()
         roller = () if self.roller is None else ("roller",)
         return (*ends.numbers_of(self.finish), *roller, *stroke, *forces, *(name for name in LOADS if name not in FORCES))
 
@@ -192,13 +120,13 @@ class OpenStrip:
     def parameters(self) -> dict[str, float]:
         """Names and values of all numbers that can be followed."""
         names = ends.numbers_of(self.finish)
-        natural = {} if set(names) <= set(self.numbers) else self._natural_numbers()
+        natural = {} if set(names) <= set(self.numbers) else natural_state.end_numbers(self.material)
         prescribed = {name: self.numbers[name] if name in self.numbers else natural[name] for name in names}
         if self.roller is not None:
-            place = self.natural_states([self.roller.at])[0, 4:] @ self.roller.direction
+            place = natural_state.states_at(self.material, [self.roller.at])[0, 4:] @ self.roller.direction
             prescribed["roller"] = self.numbers.get("roller", float(place))
-        loads = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
-        return {**prescribed, **loads, **self.material.parameters}
+        loaded = {name: self.numbers[name] for name in (STROKE, *LOADS) if name in self.numbers}
+        return {**prescribed, **loaded, **self.material.parameters}
 
     # --- the problem --------------------------------------------------------------------------------------------------
 
@@ -224,33 +152,20 @@ class OpenStrip:
         return len(self.phases) + (self.roller is not None)
 
     def _hamiltonian(self) -> Callable:
-        section, potential = self.material.hamiltonian(), self._potential()
-        phases = _together((*(_of_phase(name) for name in self.phases), *([self.roller.density()] if self.roller else [])))
+        section, inside = self.material.hamiltonian(), integral_conditions.densities(self.phases, self.roller)
+        potential = loads.distributed(
+            self.weight_direction if "weight" in self.numbers else None,
+            self.foundation_direction if "foundation" in self.numbers else None,
+        )
 
         def hamiltonian(t, x, lam, p):
             q, l0, l1, l2, l3, n1, n2, n3 = x[:4], *lam[:7]
             rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)  # q e_i / 2
             M1, M2, M3 = [l0 * r0 + l1 * r1 + l2 * r2 + l3 * r3 for r0, r1, r2, r3 in rates]
             d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(*q)
-            return section(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + phases(t, x, lam[7:], p)
+            return section(t, M1, M2, M3, p) + n1 * d31 + n2 * d32 + n3 * d33 - potential(x, p) + inside(t, x, lam[7:], p)
 
         return hamiltonian
-
-    def _potential(self) -> Callable:
-        """Return the potential of distributed loads per length, as a function of (x, p)."""
-        weight = self.weight_direction if "weight" in self.numbers else None
-        foundation = self.foundation_direction if "foundation" in self.numbers else None
-
-        def potential(x, p):
-            value = 0.0
-            if weight is not None:
-                value = value - p.weight * (weight[0] * x.x1 + weight[1] * x.x2 + weight[2] * x.x3)
-            if foundation is not None:
-                offset = foundation[0] * x.x1 + foundation[1] * x.x2 + foundation[2] * x.x3
-                value = value + p.foundation * offset * offset / 2
-            return value
-
-        return potential
 
     def _conditions(self) -> Callable:
         clamped = self.start.rotation == CLAMPED
@@ -284,58 +199,12 @@ class OpenStrip:
         return prescribed
 
     def _end_energy(self) -> Callable | None:
-        """Return the potential of the loads at the last end."""
-        along = [name in self.numbers for name in FORCES]
-        moment, angle = "moment" in self.numbers, ends.angle_of(self.finish)
-        frame, prescribed = ends.prescribed, self._prescribed()
-        if not any(along) and not moment:
-            return None
-        width, normal, tangent = along
-
-        def potential(a, b, p):
-            value = 0.0
-            if width:
-                value = value - p.force_width * b.x1
-            if normal:
-                value = value - p.force_normal * b.x2
-            if tangent:
-                value = value - p.force_tangent * b.x3
-            if moment:
-                value = value - p.moment * angle(b[:4], frame(*prescribed(p)[:3]))
-            return value
-
-        return potential
+        return loads.at_the_end(self.numbers, self.finish, self._prescribed())
 
     # --- first states -------------------------------------------------------------------------------------------------
 
-    def natural_states(self, t) -> np.ndarray:
-        """Return quaternion and centreline (K, 7) of the natural state at places t (K,) in [0, 1], from the first frame."""
-        data = [self.material.datum(name) for name in _STRAINS]
-        p, t = _Numbers(self.material.parameters), np.atleast_1d(np.asarray(t, dtype=float))
-        if not set(_STRAINS) & set(self.material.along):
-            return _helix(np.array([datum(0.0, p) for datum in data]), t)
-        from scipy.integrate import solve_ivp  # takes .5 s, and is needed where natural strains vary only
-
-        def rates(s, x):
-            return [*spin(*x[:4], *(datum(s, p) for datum in data), 1), *directors(*x[:4])[6:]]
-
-        order = np.argsort(t)
-        found = solve_ivp(rates, (0, 1), [1.0, 0, 0, 0, 0, 0, 0], "DOP853", t[order], rtol=1e-12, atol=1e-12).y.T
-        states = np.empty_like(found)
-        states[order] = found
-        return states
-
-    def _natural_numbers(self) -> dict[str, float]:
-        """Return place and angles of the last end in the natural state."""
-        if all(self.material.parameters.get(name, 0) == 0 and name not in self.material.along for name in _STRAINS):
-            return {**dict.fromkeys(PLACE + ANGLES, 0.0), "distance": 1.0}
-        state = self.natural_states([1.0])[0]
-        planar = abs(directors(*state[:4])[0] - 1) < _LOOSE
-        angles = (0.0, _winding(self.material), 0.0) if planar else ends.angles_of(state[:4])  # in the plane, the whole angle
-        return dict(zip(PLACE + ANGLES, (*map(float, state[4:]), *angles)))
-
-    def arch(self, distance: float | None = None, side: float = 1.0) -> Callable[[float], list[float]]:
-        """Return a guess of a planar state whose ends are nearer than its length: an Euler mode of these ends.
+    def arch(self, distance: float | None = None, side: float = 1.0) -> Guess:
+        """Return a guess of a planar state whose ends are nearer than its length (`first_guesses.arch`).
 
         Parameters
         ----------
@@ -345,39 +214,18 @@ class OpenStrip:
             +1 to the side of the normal, -1 to the other one.
         """
         distance = self.parameters.get("distance", 0.9) if distance is None else distance
-        mode = _euler_mode(self.start, self.finish)
-        s = np.linspace(0, 1, 2001)
-        mode_values = mode(s) / np.abs(mode(s)).max()
-        least = float(np.mean(np.cos(_STEEPEST * mode_values)))
-        if not least < distance <= 1:
-            raise ValueError(f"distance = {distance:g} must be above {least:.3g}, and at most 1")
-        amplitude, change = 0.0, _STEEPEST
-        for _ in range(_HALVINGS):  # the distance falls with the amplitude
-            change /= 2
-            amplitude += change if np.mean(np.cos((amplitude + change) * mode_values)) > distance else 0.0
-        angle = side * amplitude * mode_values
-        steps = np.diff(s)[:, None] * (np.column_stack([np.sin(angle), np.cos(angle)])[1:] + 0)
-        place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+        return self._with_multipliers(first_guesses.arch(self.start, self.finish, distance, side))
 
-        def guess(t):
-            a, y, z = (np.interp(t, s, column) for column in (angle, *place.T))
-            return [math.cos(a / 2), -math.sin(a / 2), 0, 0, 0, y, z, *[0] * self.conditions_inside]
-
-        return guess
-
-    def twisted(self, turn: float) -> Callable[[float], list[float]]:
+    def twisted(self, turn: float) -> Guess:
         """Return a guess of a straight strip that is evenly twisted."""
-        return lambda t: [math.cos(turn * t / 2), 0, 0, math.sin(turn * t / 2), 0, 0, t, *[0] * self.conditions_inside]
+        return self._with_multipliers(first_guesses.twisted(turn))
 
-    def twisted_circle(self, half_twists: float = 0) -> Callable[[float], list[float]]:
+    def twisted_circle(self, half_twists: float = 0) -> Guess:
         """Return a guess of a closed strip: a circle that bends about d1 at the start, evenly twisted by half twists."""
+        return self._with_multipliers(first_guesses.twisted_circle(half_twists))
 
-        def guess(t):
-            a, b, r = math.pi * t, math.pi * half_twists * t / 2, 1 / (2 * math.pi)
-            q = ends.product((math.cos(a), math.sin(a), 0, 0), (math.cos(b), 0, 0, math.sin(b)))
-            return [*q, 0, r * (math.cos(2 * a) - 1), r * math.sin(2 * a), *[0] * self.conditions_inside]
-
-        return guess
+    def _with_multipliers(self, guess: Guess) -> Guess:
+        return lambda t: [*guess(t), *[0] * self.conditions_inside]
 
     def first_point(self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=6, **options) -> Point:
         """Return the state near a guess (the natural state without one), as `contin.solve` does.
@@ -393,16 +241,16 @@ class OpenStrip:
         try:
             point = solve(self.problem, guess, values, **options)
         except ContinError as error:
-            loads = {name: 0.0 for name in LOADS if name in self.numbers}
-            if loads and str(error).startswith(_NO_CONVERGENCE):
-                self._check_unloaded(guess, {**(values or {}), **loads}, options)
+            unloaded = {name: 0.0 for name in LOADS if name in self.numbers}
+            if unloaded and str(error).startswith(_NO_CONVERGENCE):
+                self._check_unloaded(guess, {**(values or {}), **unloaded}, options)
             raise ProblemError(self._reason(error)) from error
         self.check_determined(point)
         return point
 
     def _natural_guess(self):
         s = np.linspace(0, 1, 401)
-        return s, np.hstack([self.natural_states(s), np.zeros((len(s), self.conditions_inside))])
+        return s, np.hstack([natural_state.states_at(self.material, s), np.zeros((len(s), self.conditions_inside))])
 
     def _check_unloaded(self, guess, values: Mapping[str, float], options: Mapping) -> None:
         """Raise ProblemError where the state without loads is not determined: then no search with them arrives."""
@@ -446,55 +294,17 @@ class OpenStrip:
         count = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
         by_ends = np.concatenate([jacobian[:count, :n], jacobian[:count, 2 * n : 3 * n]], axis=1)
         motions = np.array([np.concatenate([_moved(states[i, :7], k, n) for i in (0, -1)]) for k in range(6)])
-        return int(np.linalg.matrix_rank(by_ends @ motions.T, tol=_LOOSE)) < 6
+        return int(np.linalg.matrix_rank(by_ends @ motions.T, tol=LOOSE)) < 6
 
     # --- where the law ends -------------------------------------------------------------------------------------------
 
     def domain_tests(self) -> list[TestFunction]:
         """Return the test function that ends a run where the law ends; none for a law that is regular everywhere."""
-        law = self.material.of_paper
-        margin = {RIBBON.name: self._ribbon_margin, FINITE_WIDTH.name: self._convexity}.get(law.name) if law else None
-        return [TestFunction("EP", LAW_ENDS[law.name], margin, terminal=True)] if margin else []
+        return law_end.tests(self.material, self.strains)
 
     def explained(self, run) -> str:
         """Return why a run failed: the end of the law where its state is near it, else the run's own reason."""
-        for test in self.domain_tests():
-            state = run.state
-            if test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
-                return test.name
-        return str(run.stop)
-
-    def _ribbon_margin(self, trial: Trial) -> float:
-        """Return the least M1 + (1 + nu) kappa_n at the nodes, over the largest: the law holds where it is positive.
-
-        For an orthotropic plate see `Material.other_side`.
-
-        With p and a of `ribbon_hamiltonian`, the two roots a belong to omega_1 of either sign, and their H differ by
-        sqrt(p**2 + M3**2) (p + 2 nu kappa_n)/2. Where that is negative, bending to the other side lowers the energy at this
-        moment: strips with an inflection of this kind need the width.
-        """
-        system, x = trial.system, trial.x
-        states, p = system.states(x), _Numbers(dict(zip(system.problem.parameters, system.all_parameters(x))))
-        natural, n = self.material.datum("kappa_n"), self.problem.dimension
-        kappa_n = np.array([natural(t, p) for t in system.nodes])
-        moments = _components(states.T[:4], states.T[n : n + 4])[0]
-        values = moments + self.material.other_side(p) * kappa_n
-        return float(values.min() / max(abs(values).max(), _LOOSE))
-
-    def _convexity(self, trial: Trial) -> float:
-        """Return the least det D2U/(U_11 U_33) at the nodes and halfway between: positive where U is convex."""
-        system, x = trial.system, trial.x
-        p = _Numbers(dict(zip(system.problem.parameters, system.all_parameters(x))))
-        omega = self.strains(system, x)
-        if not np.all(np.isfinite(omega)):
-            return -1.0
-        places = np.concatenate([omega, (omega[1:] + omega[:-1]) / 2])
-        t = np.concatenate([system.nodes, (system.nodes[1:] + system.nodes[:-1]) / 2])
-        least = math.inf
-        for s, (w1, _, w3) in zip(t, places):
-            U11, U13, U33 = self.material.curvatures(s, w1, w3, p)
-            least = min(least, (U11 * U33 - U13**2) / (U11 * U33) if U11 > 0 and U33 > 0 else -1.0)
-        return least
+        return law_end.explained(self.material, self.strains, run)
 
     # --- what a state is ----------------------------------------------------------------------------------------------
 
@@ -510,17 +320,17 @@ class OpenStrip:
         before = np.zeros(3) if self.roller is None else roller * np.array(self.roller.direction)
         for row, sign, more in ((states[-1], 1.0, 0.0), (states[0], -1.0, before)):
             q, lam = row[:4], row[n : n + 7]
-            values += [*(sign * (lam[4:7] + more)), *(sign * _moment(q, lam[:4]))]
+            values += [*(sign * (lam[4:7] + more)), *(sign * moment_on_axes(q, lam[:4]))]
         found = dict(zip(REACTIONS, map(float, values)))
         return found if self.roller is None else {**found, "F_roller": roller}
 
     def potential(self, point: Point) -> float:
         """Return the energy with the potential of the dead loads at the last end: that of which the index is."""
-        loads = self._end_energy()
-        if loads is None:
+        loaded = self._end_energy()
+        if loaded is None:
             return point["energy"]
-        last = point.system.states(point.x)[-1]
-        return point["energy"] + float(loads(None, _LastEnd(*last[:7]), _Numbers(point.parameters)))
+        last = SimpleNamespace(**dict(zip((*FRAME, *CENTRELINE), point.system.states(point.x)[-1])))
+        return point["energy"] + float(loaded(None, last, SimpleNamespace(**point.parameters)))
 
     def strains(self, system: Collocation, x: np.ndarray) -> np.ndarray:
         """Return omega_1, omega_2 and omega_3 (K, 3) at the nodes of a discretized state."""
@@ -535,15 +345,6 @@ class OpenStrip:
         return shape_of(point.system.nodes, point.system.states(point.x), self.strains(point.system, point.x))
 
 
-#: Why a run ends where its law does.
-LAW_ENDS = {
-    RIBBON.name: "the end of the law 'ribbon', which has no value where the bending vanishes (omega_1 -> 0); the law "
-    "'finite width' goes on",
-    FINITE_WIDTH.name: "the end of the law 'finite width', whose energy is not convex at larger twist; the law 'flat rod' "
-    "goes on",
-}
-#: A run that fails with a smaller margin of its law has met the end of it. The margin falls like a square root there.
-_NEARLY_ENDED = 0.1
 #: Why a state is not determined.
 UNHELD = (
     "ends: the strip can move, turn about itself or change its shape without a change of energy, so nothing determines its "
@@ -563,70 +364,6 @@ NOT_FOUND = (
 )
 #: Place of the last end from the first one, as integrals over the strip.
 _PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))
-_STRAINS = ("kappa_n", "kappa_2", "tau_n")
-
-
-def _together(functions: tuple[Callable, ...]) -> Callable:
-    """Return the sum of these densities times their multipliers."""
-    if not functions:
-        return lambda t, x, lam, p: 0
-    rest, last, place = _together(functions[:-1]), functions[-1], len(functions) - 1
-    return lambda t, x, lam, p: rest(t, x, lam, p) + lam[place] * last(t, x, p)
-
-
-def _of_phase(name: str) -> Callable:
-    """Return the density of a phase as that of a roller is given."""
-    phase = PHASES[name]
-    return lambda t, x, p: phase(t, x)
-
-
-#: States of the last end, as the potential of its loads takes them.
-_LastEnd = namedtuple("_LastEnd", (*FRAME, *CENTRELINE))
-
-
-class _Numbers:
-    """Numbers by name as attributes, as users' functions read parameters."""
-
-    def __init__(self, values: Mapping[str, float]):
-        self.__dict__.update(values)
-
-
-def strains_of(q: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return strains (K, 3) from quaternions (K, 4) and their rates: the inverse of `equilibrium.spin`."""
-    q0, q1, q2, q3 = q.T
-    r0, r1, r2, r3 = rates[:, :4].T
-    return 2 * np.array([
-        q0 * r1 - q1 * r0 - q2 * r3 + q3 * r2, q0 * r2 - q2 * r0 - q3 * r1 + q1 * r3, q0 * r3 - q3 * r0 - q1 * r2 + q2 * r1
-    ]).T  # fmt: skip
-
-
-def shape_of(t: np.ndarray, states: np.ndarray, omega: np.ndarray) -> Shape:
-    """Return the shape of states (K, >= 7) with strains (K, 3) at places t (K,)."""
-    eta = np.divide(omega[:, 2], omega[:, 0], out=np.zeros(len(t)), where=omega[:, 0] != 0)
-    return Shape(np.asarray(t), states[:, 4:7], frames(states), eta)
-
-
-def _components(q, lam) -> np.ndarray:
-    """Return the moment on the directors, shape (3, ...), from quaternions (4, ...) and their multipliers (4, ...)."""
-    rates = spin(*q, 1, 0, 0, 1), spin(*q, 0, 1, 0, 1), spin(*q, 0, 0, 1, 1)
-    return np.array([sum(a * b for a, b in zip(lam, rate)) for rate in rates])
-
-
-def _moment(q, lam) -> np.ndarray:
-    """Return the moment on the lab axes from the multipliers of the quaternion."""
-    result: np.ndarray = _components(q, lam) @ np.array(directors(*q)).reshape(3, 3)
-    return result
-
-
-def _helix(strains: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Return quaternion and centreline (K, 7) at places t (K,) of a strip whose strains are constant."""
-    size = float(np.linalg.norm(strains))
-    axis, tangent = strains / (size or 1.0), np.array([0.0, 0.0, 1.0])
-    half, angle = size * t[:, None] / 2, size * t[:, None]
-    sine = np.sin(angle) / size if size else t[:, None]
-    cosine = 2 * np.sin(half) ** 2 / (size or 1.0)  # (1 - cos)/size without cancellation
-    place = axis * axis[2] * (t[:, None] - sine) + tangent * sine + np.cross(axis, tangent) * cosine
-    return np.hstack([np.cos(half), np.sin(half) * axis, place])
 
 
 def _mirrored(t, x):
@@ -645,49 +382,3 @@ def _moved(state, k: int, n: int) -> np.ndarray:
         change[:4] = ends.product((0, *axis / 2), state[:4])
         change[4:7] = np.cross(axis, state[4:7])
     return change
-
-
-def forces_of(finish: End) -> tuple[str, ...]:
-    """Return the names of the dead forces that can act on the last end: along directions in which its place is not held."""
-    return tuple(name for name, axis in zip(FORCES, DIRECTIONS.values()) if not _spanned(axis, finish.held))
-
-
-def replacing_loads(finish: End) -> tuple[str, ...]:
-    """Return the names of the dead loads that can replace reactions of the last end: forces, and the moment of a hinge."""
-    return (*forces_of(finish), *(("moment",) if finish.rotation in (HINGED, JOINT) else ()))
-
-
-def _spanned(axis, held) -> bool:
-    """Return whether a direction lies in the span of those that are held: a force along it would do nothing."""
-    if not held:
-        return False
-    rest = np.array(axis) - np.linalg.pinv(np.array(held)) @ np.array(held) @ np.array(axis)
-    return bool(np.linalg.norm(rest) < _LOOSE)
-
-
-def _winding(material: Material) -> float:
-    """Return the whole angle by which the natural state turns about the width: the integral of kappa_n."""
-    datum, p = material.datum("kappa_n"), _Numbers(material.parameters)
-    s, weights = np.polynomial.legendre.leggauss(60)
-    return float(sum(w / 2 * datum((x + 1) / 2, p) for x, w in zip(s, weights)))
-
-
-def _euler_mode(start: End, finish: End) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the angle along a column of these ends as it buckles, up to a factor."""
-    tangent = 4.493409457909064  # the first zero of tan x = x
-    turns_start, turns_finish = (_turns_about_width(end) for end in (start, finish))
-    if not finish.held and finish.rotation == FREE:
-        return lambda s: 1 - np.cos(math.pi * s / 2)
-    if turns_start and turns_finish:
-        return lambda s: np.cos(math.pi * s)
-    if turns_finish:
-        return lambda s: tangent * np.cos(tangent * (1 - s)) - math.sin(tangent)
-    if turns_start:
-        return lambda s: tangent * np.cos(tangent * s) - math.sin(tangent)
-    return lambda s: np.sin(2 * math.pi * s)
-
-
-def _turns_about_width(end: End) -> bool:
-    """Return whether an end can turn about the width."""
-    about = end.rotation == HINGED and abs(end.axis[0]) > 1 - _LOOSE
-    return about or end.rotation in (FREE, JOINT)

@@ -137,3 +137,9 @@ def quadrature_centreline(t, states, degree: int, length: float) -> np.ndarray:
     inside = length * h[:, None, None] * np.einsum("ij,ejk->eik", _integrals(degree), d3)
     inside[1:] += np.cumsum(inside[:, -1], axis=0)[:-1, None]
     return np.concatenate([np.zeros((1, 3)), inside.reshape(-1, 3)])
+
+
+def shape_of(t: np.ndarray, states: np.ndarray, omega: np.ndarray) -> Shape:
+    """Return the shape of states (K, >= 7) with strains (K, 3) at places t (K,)."""
+    eta = np.divide(omega[:, 2], omega[:, 0], out=np.zeros(len(t)), where=omega[:, 0] != 0)
+    return Shape(np.asarray(t), states[:, 4:7], frames(states), eta)

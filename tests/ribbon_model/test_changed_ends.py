@@ -8,8 +8,9 @@ import pytest
 import contin
 from ribbon_model.changed_ends import angles_near, with_ends
 from ribbon_model.ends import BALL, CLAMP, DIRECTIONS, End, hinge, prescribed
+from ribbon_model.loads import replacing_loads
 from ribbon_model.material import Material
-from ribbon_model.open_strip import OpenStrip, replacing_loads
+from ribbon_model.open_strip import OpenStrip
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
 ROD = Material("rod", {"B1": 1.0, "B2": 4.0, "C": 0.8})

@@ -8,8 +8,9 @@ import pytest
 
 import contin
 from ribbon_model.ends import CLAMP, DIRECTIONS, End, hinge
+from ribbon_model.loads import LOADS
 from ribbon_model.material import Material
-from ribbon_model.open_strip import LOADS, NOT_FOUND, UNDETERMINED, OpenStrip
+from ribbon_model.open_strip import NOT_FOUND, UNDETERMINED, OpenStrip
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
 ROD = Material("rod", {"B1": 1.0, "B2": 3.0, "C": 0.8, "kappa_n": 0.7})

@@ -8,8 +8,9 @@ from scipy.optimize import brentq
 
 import contin
 from ribbon_model.ends import CLAMP, DIRECTIONS, FREE_END, End, hinge
+from ribbon_model.integral_conditions import Roller
 from ribbon_model.material import Material
-from ribbon_model.open_strip import OpenStrip, Roller
+from ribbon_model.open_strip import OpenStrip
 
 WIDTH, NORMAL, TANGENT = DIRECTIONS.values()
 #: Stiff against bending in its plane, so that the columns buckle along the normal first.
