@@ -23,6 +23,7 @@ PURPOSE = {
     "analysis": "first solutions, curves in two parameters, diagrams, sensitivities",
     "continuation": "the loop: predict, correct, inspect, accept",
     "results": "points, branches, files, tables, plots",
+    "curves": "extended systems: folds, Hopf points and others in two parameters",
     "detection": "test functions, folds, branch points, Hopf points, error estimates",
     "stepping": "Newton's method, one step, settings, state of a run",
     "discretization": "collocation, mesh, assembly; the protocol of all systems",

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from contin import checks
-from contin.analysis.branch_point_curve import BranchPointCurve
-from contin.analysis.cycle_curves import DoublingCurve, TorusCurve
-from contin.analysis.extended import Extended
-from contin.analysis.fold_curve import FoldCurve
-from contin.analysis.hopf_curve import HopfCurve
 from contin.arrays import Array
 from contin.continuation.cycle_starts import frequency_of
 from contin.continuation.run import follow
+from contin.curves.branch_point_curve import BranchPointCurve
+from contin.curves.cycle_curves import DoublingCurve, TorusCurve
+from contin.curves.extended import Extended
+from contin.curves.fold_curve import FoldCurve
+from contin.curves.hopf_curve import HopfCurve
 from contin.detection.branch_point import BranchPoint
 from contin.detection.lyapunov import critical_pair
 from contin.discretization.algebraic import Algebraic

@@ -1,7 +1,7 @@
 """Extended systems of curves along which a pair of eigenvalues, or a multiplier other than one, is critical.
 
 The linearized problem has the eigenvalue lambda where L v = 0 has a solution, with lambda in the equations of L. As for folds
-(`contin.analysis.fold_curve`) a column b and a row c make the matrix regular, and a number g vanishes exactly where lambda is
+(`contin.curves.fold_curve`) a column b and a row c make the matrix regular, and a number g vanishes exactly where lambda is
 an eigenvalue. A complex pair makes g complex. With real borders v = v_1 + i r v_2 and g = g_1 + i r g_2, where r is the
 imaginary part of lambda, and real equations for the four of them contain lambda through one real number, ``kappa`` (omega^2 at
 Hopf points, the cosine of the angle at torus bifurcations):
@@ -26,12 +26,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contin.analysis.extended import Borders, Extended, cosine
 from contin.arrays import Array, ComplexArray
+from contin.curves.extended import Borders, Extended, cosine
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 
-#: Length of a central difference of Jacobians, and rounds that make borders, as in `contin.analysis.fold_curve`.
+#: Length of a central difference of Jacobians, and rounds that make borders, as in `contin.curves.fold_curve`.
 _DIFFERENCE, _ROUNDS = 1e-5, 3
 #: Cosine between a border and the complex vector that it stands for, below which it is renewed: it is .7 at least when it is
 #: made, and 0 where the bordered matrix is singular. Ten times smaller, the curves of the tests are the same.

@@ -21,10 +21,10 @@ from typing import cast
 
 import numpy as np
 
-from contin.analysis.critical_curve import CriticalCurve
-from contin.analysis.extended import Borders
-from contin.analysis.fold_curve import FoldCurve, shrinking
 from contin.arrays import Array
+from contin.curves.critical_curve import CriticalCurve
+from contin.curves.extended import Borders
+from contin.curves.fold_curve import FoldCurve, shrinking
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.lyapunov import Coefficient
 from contin.detection.test_functions import own_test_functions

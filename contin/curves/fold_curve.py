@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from contin.analysis.critical_curve import other_pairs, signed_smallest
-from contin.analysis.extended import FITS, Borders, Extended, cosine
 from contin.arrays import Array
+from contin.curves.critical_curve import other_pairs, signed_smallest
+from contin.curves.extended import FITS, Borders, Extended, cosine
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation

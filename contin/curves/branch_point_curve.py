@@ -10,14 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contin.analysis.extended import FITS, Borders, Extended, cosine
 from contin.arrays import Array
+from contin.curves.extended import FITS, Borders, Extended, cosine
 from contin.detection.bordered import BorderedMatrix
 from contin.detection.branch_point import locate_branch_point
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 
-#: As in `contin.analysis.fold_curve`.
+#: As in `contin.curves.fold_curve`.
 _DIFFERENCE = 1e-5
 
 

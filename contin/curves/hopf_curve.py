@@ -13,9 +13,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from contin.analysis.critical_curve import CriticalCurve, other_pairs, signed_smallest
-from contin.analysis.extended import Borders
 from contin.arrays import Array, ComplexArray
+from contin.curves.critical_curve import CriticalCurve, other_pairs, signed_smallest
+from contin.curves.extended import Borders
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.system import System
