@@ -1,7 +1,8 @@
-"""Curves of special points in two parameters."""
+"""Curves of special points in two parameters, and in more."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,35 +14,45 @@ from contin.continuation.cycle_starts import frequency_of
 from contin.continuation.run import follow
 from contin.curves.branch_point_curve import BranchPointCurve
 from contin.curves.cycle_curves import DoublingCurve, TorusCurve
+from contin.curves.event_curve import EventCurve
 from contin.curves.extended import Extended
+from contin.curves.extremum_curve import ExtremumCurve
 from contin.curves.fold_curve import FoldCurve
 from contin.curves.hopf_curve import HopfCurve
 from contin.detection.branch_point import BranchPoint
 from contin.detection.lyapunov import critical_pair
+from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.results.branch import Branch
-from contin.results.point import Point, system_of
+from contin.results.point import Point
 from contin.stepping.settings import Settings, settings_with
+from contin.stepping.trial import TestFunction
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          **options: Any) -> Branch:  # fmt: skip
-    """Follow the curve of special points of one kind through one of them, in two parameters.
+          event: TestFunction | None = None, **options: Any) -> Branch:  # fmt: skip
+    """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
     Parameters
     ----------
     start : Point
-        A fold (LP), branch point (BP), Hopf point of equilibria (HB), or a period doubling (PD) or torus bifurcation (TR) of
-        cycles, found on a branch.
+        A labelled point of a branch: a fold (LP), branch point (BP), Hopf point of equilibria (HB), period doubling (PD) or
+        torus bifurcation (TR) of cycles, an extremum (EX), or a point where a column reaches a value (UZ, EP). Or a labelled
+        point of a curve, which is then followed with one parameter more: an extremum of the column whose extrema the curve
+        consists of, the fold of a curve of folds with respect to its first parameter (both are again extrema, now in one
+        parameter more), a user zero, or a point of codimension two.
     second : str, optional
         The parameter that is free beside those of the branch.
     settings : Settings, optional
         Or any of its fields by name. Folds of the curve are with respect to ``primary`` (the second parameter by default).
+        ``branch_points`` is False by default.
     free : pair of str, optional
         Both parameters, in place of ``second``: the first takes the place of the one in which the start was found.
+    event : TestFunction, optional
+        The one that labelled the start, where that is one of yours (``test_functions``).
 
     Returns
     -------
@@ -52,8 +63,8 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         curves of period doublings: R2 (a second multiplier -1), GPD (the coefficient of the normal form is zero), LPPD
         (fold-flip). On curves of torus bifurcations, with the column ``angle``: the strong resonances R3 and R4, and R1 and R2,
         where the curve ends; CH (Chenciner: the coefficient is zero), LPTR (fold-torus). Both have the column ``normal_form``.
-        On curves of folds of cycles: R1, LPPD. Points of a curve of branch points carry their imperfection beta as the last
-        entry of x.
+        On curves of folds of cycles: R1, LPPD. On curves of extrema: EX, an extremum in one parameter more. Points of a curve
+        of branch points carry their imperfection beta as the last entry of x.
 
     Raises
     ------
@@ -72,25 +83,25 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     [('CP', True)]
     """
     checks.instance("start", start, Point, "a Point")
-    system = system_of(start, "start")
-    names = _free_parameters(start, system, second, free)
+    checks.instance("event", event, (TestFunction, type(None)), "a TestFunction")
+    names = _free_parameters(start, second, free)
     options.setdefault("primary", names[-1])
     options.setdefault("branch_points", False)
-    settings = settings_with(settings, options)
-    base, x = system.with_free(names, start.x)
-    for kind in _KINDS:
-        found = kind(start, base, x)
-        if found is not None:
-            return follow(*found, settings)
-    raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be one of {_STARTS}")
+    base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
+    found = _event(start, base, x, event) if event is not None else _first_of_curve(start, base, x)
+    if found is None:
+        raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be {_STARTS}")
+    return follow(*found, settings_with(settings, options))
 
 
-def _free_parameters(start: Point, system: System, second: str | None, free: Sequence[str] | None) -> tuple[str, ...]:
+def _free_parameters(start: Point, second: str | None, free: Sequence[str] | None) -> tuple[str, ...]:
     """Return the free parameters of a curve: that in which the start was found first, the second parameter last."""
+    system: Any = start.system
     if len(system.free) != system.problem.free_size:
         raise ProblemError("start: must be a point of a branch, with the free parameters of a curve")
     known = tuple(system.problem.parameters)
-    found_in = start.name if start.label == "LP" else system.free[0]
+    branch = isinstance(system, System)
+    found_in = start.name if start.label == "LP" and branch else system.free[0]
     if (second is None) == (free is None):
         raise ProblemError("curve: give the second parameter, or free=[first, second]")
     if free is None:
@@ -102,7 +113,7 @@ def _free_parameters(start: Point, system: System, second: str | None, free: Seq
     else:
         pair = tuple(checks.names("free", free))
     others = [name for name in system.free if name != found_in]
-    allowed = [name for name in known if name not in others]
+    allowed = [name for name in known if name not in others] if branch else list(known)
     if len(pair) != 2 or len({*pair} & {*allowed}) != 2:
         raise ProblemError(f"free: {', '.join(pair)} must be two of the parameters {', '.join(allowed)}")
     return (pair[0], *others, pair[1])
@@ -110,6 +121,12 @@ def _free_parameters(start: Point, system: System, second: str | None, free: Seq
 
 #: An extended system, and its first vector of unknowns.
 _First = tuple[Extended, Array]
+
+
+def _first_of_curve(start: Point, base: Any, x: Array) -> _First | None:
+    """Return the extended system of the kind of a point."""
+    kinds = _KINDS if isinstance(start.system, System) else _KINDS_ON_CURVES
+    return next((found for kind in kinds if (found := kind(start, base, x)) is not None), None)
 
 
 def _branch_points(start: Point, base: System, x: Array) -> _First | None:
@@ -141,6 +158,65 @@ def _tori(start: Point, base: System, x: Array) -> _First | None:
     return TorusCurve(base), np.append(x, np.cos(angle))
 
 
+def _extrema(start: Point, base: System, x: Array) -> _First | None:
+    return (ExtremumCurve(base, start.name), x) if start.label == "EX" else None
+
+
+def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
+    """An extremum along a curve of extrema; a fold with respect to the parameter of a curve of folds is one, too."""
+    if isinstance(base, ExtremumCurve):
+        objective = base.objective
+    elif isinstance(base, FoldCurve) and isinstance(base.base, System):
+        objective = base.free[0]
+    else:
+        return None
+    if start.label not in ("EX", "LP") or start.name != objective:
+        return None
+    return ExtremumCurve(base.base, objective), x[: base.base.size]
+
+
+def _values(start: Point, base: Any, x: Array) -> _First | None:
+    """A point whose name says that a column has a value."""
+    column, _, text = start.name.partition(" = ")
+    if column not in start.parameters and column not in start.functionals:
+        return None
+    value = start[column]
+    with contextlib.suppress(ValueError):
+        value = float(text) if abs(float(text) - value) <= _LOCATED * (1 + abs(value)) else value
+    known = base.column_gradient(x, column) is not None
+    gradient = (lambda system, x: system.column_gradient(x, column)) if known else None
+    return EventCurve(base, lambda trial: trial[column] - value, gradient), x
+
+
+def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
+    """A point that a test function of its curve has labelled."""
+    for test in own_test_functions(start.system):
+        if (test.label, test.name) == (start.label, start.name) and test.search is None:
+            return EventCurve(base, test.function), x
+    return None
+
+
+def _event(start: Point, base: Any, x: Array, event: TestFunction) -> _First:
+    """A zero of a user's test function.
+
+    Raises
+    ------
+    ProblemError
+        It is no zero of that.
+    """
+    found = EventCurve(base, event.function)
+    here, slope = found.value(x), found.gradient(x)
+    if not abs(here) <= _LOCATED * (1 + float(np.abs(slope) @ (1 + np.abs(x)))):
+        raise ProblemError(f"event: {event.name!r} is {here:.6g} at the start; it must be the function that labelled it")
+    return found, x
+
+
+#: A value at a located point differs from the one that was looked for by less than this, relative to 1 + its size.
+_LOCATED = 1e-6
 #: What a start may be, in words, and in the order in which it is asked.
-_STARTS = "LP, BP, HB (of equilibria), PD and TR"
-_KINDS = (_branch_points, _folds, _hopf_points, _doublings, _tori)
+_STARTS = (
+    "one of LP, BP, HB (of equilibria), PD, TR, EX, or one where a column has a value (UZ, EP); "
+    "for one of your own test functions, give it as event"
+)
+_KINDS = (_branch_points, _folds, _hopf_points, _doublings, _tori, _extrema, _values)
+_KINDS_ON_CURVES = (_extrema_of_extrema, _values, _of_codimension_two)

@@ -22,6 +22,7 @@ import numpy as np
 from contin import threads
 from contin.arrays import Array
 from contin.continuation.scaling import outgrown, scaled
+from contin.detection.extrema import extremum
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
@@ -151,14 +152,15 @@ class Continuation:
             raise ProblemError(f"primary: {primary!r} is not one of the free parameters {', '.join(system.free)}")
         known = (*system.problem.parameters, *system.problem.functionals)
         trivial = () if self.settings.trivial is None else (self.settings.trivial,)
-        for name in (*self.settings.limits, *self.settings.zeros, *trivial):
+        for name in (*self.settings.limits, *self.settings.zeros, *self.settings.extrema, *trivial):
             if name not in known:
                 raise ProblemError(f"{name!r} is neither a parameter nor a functional ({', '.join(known)})")
 
     def _general_test_functions(self) -> list[TestFunction]:
         """Return those of the settings."""
         settings = self.settings
-        return [*user_zeros(settings.zeros), *limits(settings.limits), *settings.monitors, *settings.test_functions]
+        found = [*user_zeros(settings.zeros), *limits(settings.limits), *map(extremum, settings.extrema)]
+        return [*found, *settings.monitors, *settings.test_functions]
 
     # --- the first point -----------------------------------------------------------------------------------------
 

@@ -35,6 +35,7 @@ class Extended(Discretization):
     Parameters
     ----------
     base : System
+        Or an extended system: it has what is used of a system here.
     borders : pair of ndarray, optional
         Made when they are first needed where they are not given.
     columns : sequence of str
@@ -74,6 +75,12 @@ class Extended(Discretization):
         """Return the states of the underlying system."""
         return self.base.states(x[: self.base.size])
 
+    def evaluate(self, x: Array, times: Array) -> Array:
+        """Return the states of the underlying boundary value problem at ``times`` (m,), shape (m, n)."""
+        base: Any = self.base
+        states: Array = base.evaluate(x[: base.size], times)
+        return states
+
     def all_parameters(self, x: Array) -> Array:
         """Return the values of all parameters."""
         return self.base.all_parameters(x[: self.base.size])
@@ -89,6 +96,16 @@ class Extended(Discretization):
     def functionals(self, x: Array) -> Array:
         """Return the functionals of the underlying problem."""
         return self.base.functionals(x[: self.base.size])
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a column of the underlying problem by x; None where they are not known."""
+        inside = self.base.column_gradient(x[: self.base.size], name)
+        return None if inside is None else np.append(inside, np.zeros(self.size - self.base.size))
+
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[Extended, Array]:
+        """Return the extended system with other free parameters (values from x), and x for it."""
+        base, inside = self.base.with_free(free, x[: self.base.size])
+        return self.on(base), np.append(inside, x[self.base.size :])
 
     def carrier(self, other: Any) -> Carrier:
         """Return the carrier of the underlying system's unknowns; it leaves the others as they are."""

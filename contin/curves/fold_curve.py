@@ -60,8 +60,9 @@ class FoldCurve(Extended):
     def null_vectors(self, x: Array) -> tuple[Array, Array, float]:
         """Return v (size,), w (equations of F,), and g; borders are made of v and w where there are none."""
         base = self.base
-        held = np.zeros((2, base.size + 1))  # both parameters stay where they are
-        held[[0, 1], [base.state_size, base.size - 1]] = 1.0
+        places = [base.state_size, *range(base.equations + 1, base.size)]  # parameters of the folds, and of the curve
+        held = np.zeros((len(places), base.size + 1))  # they stay where they are
+        held[np.arange(len(places)), places] = 1.0
         random = np.random.default_rng(11)
         renew = self.borders is None
         b, c = (random.standard_normal(base.equations), random.standard_normal(base.size)) if renew else self.borders

@@ -160,6 +160,18 @@ class Algebraic(System):
         values: Array = batch.values(_NO_TIME, self.states(x), _none(self.state_size), self.all_parameters(x))[0]
         return values
 
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a parameter or functional by x, shape (size,)."""
+        names = tuple(self.problem.functionals)
+        if name not in names:
+            return super().column_gradient(x, name)
+        batch = self._batch("functionals")
+        u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
+        gradient: Array = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.colouring(self._free))[1][
+            0, names.index(name)
+        ]
+        return gradient
+
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Algebraic, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
         scaled = self._with(scales=Scales(states, parameters, {"residual": np.ones(self.equations)}))

@@ -255,6 +255,28 @@ class Collocation(System):
         integrals: Array = self._quadrature @ values
         return integrals
 
+    @property
+    def _integrated(self) -> tuple[str, ...]:
+        """Names of the functionals that are integrals, in the order of the compiled functions."""
+        return tuple(self.problem.functionals)
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a parameter or functional by x, shape (size,); None where they are not known."""
+        if name not in self._integrated:
+            return super().column_gradient(x, name)
+        batch, at = self._functional_derivatives, self._integrated.index(name)
+        given = self._times, self.at_gauss_points(x), _NONE(self._n), self._scaled_parameters(x)
+        slopes = self._quadrature[:, None] * batch.jacobian(*given, batch.colouring(self._free))[1][:, at]
+        by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
+        by_node = np.zeros((self.nodes.size, self._n))
+        np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
+        return np.append(by_node.ravel(), slopes[:, self._n :].sum(axis=0))
+
+    @functools.cached_property
+    def _functional_derivatives(self) -> Any:
+        """Functionals with their derivatives, compiled."""
+        return self._batch("functional derivatives")
+
     # --- meshes --------------------------------------------------------------------------------------------------
 
     def carrier(self, other: Discretization) -> Carrier:

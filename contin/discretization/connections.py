@@ -139,6 +139,11 @@ class ConnectionCollocation(Conditioned):
 
     # --- columns -------------------------------------------------------------------------------------------------
 
+    @property
+    def _integrated(self) -> tuple[str, ...]:
+        """No functional is an integral."""
+        return ()
+
     def functionals(self, x: Array) -> Array:
         """Return the gap: the largest distance of an end from its equilibrium, over the size of the orbit."""
         states, places = self.states(x), self._places(self.all_parameters(x)[None])

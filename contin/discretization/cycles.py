@@ -66,6 +66,11 @@ class PeriodicCollocation(Collocation):
 
     # --- columns -------------------------------------------------------------------------------------------------
 
+    @property
+    def _integrated(self) -> tuple[str, ...]:
+        """Names of the functionals that are means over a period."""
+        return tuple(self.problem.means)
+
     def functionals(self, x: Array) -> Array:
         """Return the largest and smallest values of each state, and the means of the user's functionals."""
         extremes = np.stack([self._largest(x, 1.0), -self._largest(x, -1.0)], axis=1).ravel()

@@ -132,6 +132,15 @@ class System(Discretization):
         """Return the place of the free parameter ``name`` in x."""
         return self.state_size + self.free.index(name)
 
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a column (a parameter or functional) by x, shape (size,); None where they are not known."""
+        if name in self.free:
+            at = self.parameter_index(name)
+            unit = np.zeros(self.size)
+            unit[at] = self.free_scales[at - self.state_size]
+            return unit
+        return np.zeros(self.size) if name in self.problem.parameters else None
+
     @abstractmethod
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""

@@ -107,7 +107,10 @@ class BoundaryValueProblem(Restated):
         return self.boundary_size + self.integral_size - len(self.state_names) + 1
 
     def batch(self, name: str) -> Batch:
-        """Return the compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked."""
+        """Return the compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked.
+
+        ``"functional derivatives"`` are the functionals, compiled with derivatives: few runs need them.
+        """
         if name not in self._batches:
             self._batches[name] = self._compiled(name)
         return self._batches[name]
@@ -140,11 +143,12 @@ class BoundaryValueProblem(Restated):
         if name == "boundary":
             shape = _shape(self.boundary, self._of_ends, self.boundary_size)
             return Batch([self.boundary], [shape], u, p, ends=True, reads=self._reads([self.boundary]))
-        if name == "functionals":
+        if name in ("functionals", "functional derivatives"):
             functions = list(self.functionals.values())
             if any(argument_count(f) != 3 or result_count(f, self._of_point.arguments, "a functional") for f in functions):
                 raise ProblemError("functionals: each must be f(t, u, p) and return one number")
-            return Batch(functions, [0] * len(functions), u, p, derivatives=False, reads=self._reads(functions))
+            slopes = name != "functionals"
+            return Batch(functions, [0] * len(functions), u, p, derivatives=slopes, reads=self._reads(functions))
         functions = [f for f in (self.rhs, self.integrals) if f is not None]
         sizes = (len(u), self.integral_size)
         shapes = [_shape(f, self._of_point, size) for f, size in zip(functions, sizes)]

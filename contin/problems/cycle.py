@@ -140,7 +140,7 @@ class CycleProblem(BoundaryValueProblem):
         return float(value * parameters[ROUNDS])
 
     def _compiled(self, name: str) -> Batch:
-        if name != "functionals":
+        if name not in ("functionals", "functional derivatives"):
             return super()._compiled(name)
         functions = [_of_time(f) if self.period is None else _of_forcing(f, self.period) for f in self.means.values()]
         return Batch(functions, [0] * len(functions), self.state_names, tuple(self.parameters))

@@ -23,7 +23,7 @@ _MARKS = {
     "LP": ("*", "#D55E00"), "BP": ("o", "#000000"), "HB": ("s", "#009E73"), "UZ": ("D", "#CC79A7"), "CP": ("^", "#D55E00"),
     "PD": ("X", "#0072B2"), "TR": ("h", "#56B4E9"), "BT": ("v", "#000000"), "ZH": ("<", "#E69F00"), "HH": (">", "#56B4E9"),
     "GH": ("P", "#009E73"), "GPD": ("P", "#0072B2"), "CH": ("P", "#56B4E9"), "LPPD": ("d", "#D55E00"), "LPTR": ("d", "#56B4E9"),
-    "R1": ("p", "#E69F00"), "R2": ("p", "#CC79A7"), "R3": ("p", "#0072B2"), "R4": ("p", "#009E73"),
+    "EX": ("s", "#D55E00"), "R1": ("p", "#E69F00"), "R2": ("p", "#CC79A7"), "R3": ("p", "#0072B2"), "R4": ("p", "#009E73"),
 }  # fmt: skip
 _OTHER_MARK = (".", "#000000")
 #: Labels of points where a multiplier of a cycle lies on the unit circle: what is next to them says which side is stable.

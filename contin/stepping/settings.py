@@ -34,6 +34,8 @@ class Settings:
     zeros : mapping of str to sequence of float
         Points where a parameter or functional reaches one of these values are labelled (UZ). A value that is given twice counts
         once.
+    extrema : sequence of str
+        Parameters and functionals whose extrema along the branch are labelled (EX).
     trivial : str, optional
         A parameter or functional that vanishes on a known trivial branch only: the run ends where it changes sign.
     test_functions : sequence of TestFunction
@@ -87,6 +89,7 @@ class Settings:
     mesh: MeshControl = field(default_factory=MeshControl)
     test_functions: Sequence[TestFunction] = ()
     scales: Mapping[str, float] = field(default_factory=dict)
+    extrema: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -99,6 +102,7 @@ class Settings:
                 checks.instance(name, getattr(self, name), str, "a name")
         for name in ("folds", "branch_points", "errors"):
             checks.truth(name, getattr(self, name))
+        checks.names("extrema", self.extrema)
         for name in ("test_functions", "monitors"):
             for test in checks.sequence(name, getattr(self, name), "TestFunction"):
                 checks.instance(name, test, TestFunction, "a TestFunction")

@@ -1,0 +1,91 @@
+"""Curves along which a function keeps its value, through labelled points of branches and of curves in two parameters."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from contin import AlgebraicProblem, BoundaryValueProblem, ProblemError, TestFunction, curve, solve, trace
+
+
+@functools.cache
+def perturbed_gelfand():
+    return BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.lam * math.exp(u.u / (1 + p.eps * u.u))), lambda a, b, p: (a.u, b.u), ["u", "v"],
+        {"lam": 0.0, "eps": 0.2}, functionals={"mean": lambda t, u, p: u.u},
+    )  # fmt: skip
+
+
+def middle(trial):
+    return float(trial.system.evaluate(trial.x, np.array([0.5]))[0, 0]) - 2.0
+
+
+HOT = TestFunction("UZ", "hot", middle)
+
+
+@functools.cache
+def branch():
+    return trace(
+        solve(perturbed_gelfand(), [0, 0]), free=["lam"], limits={"lam": (0, 6), "mean": (-1, 3)}, zeros={"mean": [1.0]},
+        test_functions=[HOT],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["mean = 1", "mean = 3", "hot"])
+def test_user_zeros_in_two_parameters(name):
+    """At eps = .22 the curve is where the branch at that eps has the same label."""
+    start = next(point for point in branch() if point.name == name)
+    event = HOT if name == "hot" else None
+    followed = curve(start, "eps", event=event, limits={"eps": (0.15, 0.25)}, zeros={"eps": [0.22]})
+    assert followed.points[-1].name == "eps = 0.25"
+    there = trace(
+        solve(perturbed_gelfand(), [0, 0], {"eps": 0.22}), free=["lam"], limits={"lam": (0, 6), "mean": (-1, 3)},
+        zeros={"mean": [1.0]}, test_functions=[HOT],
+    )  # fmt: skip
+    known = next(point for point in there if point.name == name)
+    (found,) = followed.labelled("UZ")
+    assert (found["lam"], found["mean"]) == pytest.approx((known["lam"], known["mean"]), abs=1e-9)
+    assert found.errors["lam"] < 1e-8
+    for point in followed:
+        assert (
+            HOT.function(point) == pytest.approx(0, abs=1e-9)
+            if event
+            else point["mean"] == pytest.approx(float(name[-1]), abs=1e-9)
+        )
+
+
+@functools.cache
+def swallowtail():
+    """x^4 + a x^2 + b x + c; its fold curve at a = -6 from one cusp to the other."""
+    problem = AlgebraicProblem(lambda u, p: (u.x**4 + p.a * u.x**2 + p.b * u.x + p.c,), ["x"], {"a": -6.0, "b": 0.0, "c": 0.0})
+    fold = trace(solve(problem, [2.4]), free=["c"], limits={"c": (-10, 10)}).labelled("LP")[0]
+    return curve(fold, "b", limits={"b": (-20, 20)}, zeros={"b": [1.0]})
+
+
+def test_cusps_in_three_parameters():
+    """a = -6 x^2, b = 8 x^3, c = -3 x^4, which come together in the swallowtail at the origin."""
+    cusp = swallowtail().labelled("CP")[0]
+    assert abs(cusp["b"]) == pytest.approx(8, abs=1e-9)
+    cusps = curve(cusp, "a", limits={"a": (-10, 1), "b": (-20, 20)})
+    for point in cusps:
+        x = point.x[0]
+        assert (point["a"], point["b"], point["c"]) == pytest.approx((-6 * x**2, 8 * x**3, -3 * x**4), abs=1e-7)
+    assert min(point["b"] for point in cusps) < 0 < max(point["b"] for point in cusps)
+
+
+def test_a_user_zero_of_a_curve_in_three_parameters():
+    """Folds with b = 1: 4 x^3 + 2 a x + 1 = 0."""
+    found = curve(swallowtail().labelled("UZ")[0], "a", limits={"a": (-8, -5)})
+    for point in found:
+        x = point.x[0]
+        assert point["b"] == pytest.approx(1, abs=1e-10)
+        assert 4 * x**3 + 2 * point["a"] * x + 1 == pytest.approx(0, abs=1e-8)
+
+
+def test_wrong_events():
+    start = next(point for point in branch() if point.name == "hot")
+    with pytest.raises(ProblemError, match="for one of your own test functions, give it as event"):
+        curve(start, "eps")
+    with pytest.raises(ProblemError, match="event: 'cold' is 1 at the start; it must be the function that labelled it"):
+        curve(start, "eps", event=TestFunction("UZ", "cold", lambda trial: middle(trial) + 1.0))
