@@ -18,6 +18,7 @@ from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
 from contin.linalg.periodic import log_eigenvalues
+from contin.linalg.transitions import interval_matrices, transitions
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 
 #: A pair on the unit circle that is this near to -1, as an angle, is no torus bifurcation: round-off of a double one is its
@@ -97,30 +98,15 @@ class PeriodicCollocation(Collocation):
     # --- stability -----------------------------------------------------------------------------------------------
 
     def _jacobian_of_field(self, x: Array) -> Array:
-        """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N, d, n, n)."""
-        n = self._n
-        p, points = self._scaled_parameters(x), self.at_gauss_points(x)
+        """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N d, n, n)."""
         colours = self.problem.batch("field").colouring([])
-        jacobian: Array = self._field.jacobian(self._times, points, np.empty((0, n)), p, colours)[1][:, :n, :n]
-        return jacobian.reshape(self.intervals, self._d, n, n)
+        p, points = self._scaled_parameters(x), self.at_gauss_points(x)
+        jacobian: Array = self._field.jacobian(self._times, points, np.empty((0, self._n)), p, colours)[1]
+        return jacobian
 
     def interval_matrices(self, x: Array) -> Array:
         """Return the linearized collocation equations of each interval, shape (N, d n, (d + 1) n)."""
-        return self._interval_matrices(self._jacobian_of_field(x))
-
-    def _interval_matrices(self, jacobian: Array) -> Array:
-        n, d, N = self._n, self._d, self.intervals
-        matrix: Array = np.einsum("qm,ab->qamb", self.basis.slope, np.eye(n))[None] - np.einsum(
-            "j,qm,jqab->jqamb", self._h, self.basis.value, jacobian
-        )
-        return matrix.reshape(N, d * n, (d + 1) * n)
-
-    def _transitions(self, jacobian: Array) -> Array:
-        """Return the matrix that takes a perturbation over each interval, shape (N, n, n), from `_jacobian_of_field`."""
-        n = self._n
-        matrix: Any = self._interval_matrices(jacobian)
-        result: Array = np.linalg.solve(matrix[:, :, n:], -matrix[:, :, :n])[:, -n:]
-        return result
+        return interval_matrices(self.basis.value, self.basis.slope, self._h, self._jacobian_of_field(x))
 
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable.
@@ -132,8 +118,8 @@ class PeriodicCollocation(Collocation):
             if len(self._known) > _KEPT:
                 self._known.clear()
             jacobian = self._jacobian_of_field(x)
-            values = log_eigenvalues(self._transitions(jacobian))
-            total = float(self._quadrature @ np.trace(jacobian, axis1=2, axis2=3).ravel())
+            values = log_eigenvalues(transitions(self.basis.value, self.basis.slope, self._h, jacobian))
+            total = float(self._quadrature @ np.trace(jacobian, axis1=1, axis2=2))
             least = values.real <= values.real.min() + _EQUAL
             if not self._is_own_error(values, least):
                 # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one

@@ -128,7 +128,7 @@ def _ranges(step):
 
 
 @helper
-def _eliminate(block, step, pivots):
+def eliminate(block, step, pivots):
     """Factor the columns of a step by blocked LU with partial pivoting, in place, a panel of `PANEL` columns at a time.
 
     Return the sign of the product of the pivots, times -1 for each exchange of rows; NaN if a pivot is not finite. The result,
@@ -245,7 +245,7 @@ def _eliminate_interiors(layout, work, part, corner):
         copy_rows(at(edge, 0, width - k), at(corner, 0, 0), k, r)
         for g in range(groups):
             step = group_step(offsets, g, degree, width)
-            sign *= _eliminate(block, step, work.pivots[j])
+            sign *= eliminate(block, step, work.pivots[j])
             h = g + 1
             while h < groups:  # neighbours among the later groups are reduced together
                 begin = h
@@ -310,7 +310,7 @@ def _eliminate_point(block, carried, pivots):
     copy_rows(at(block, 2 * n, n), at(carried, n, 0), n, r)
     copy_rows(at(block, 2 * n, 3 * n), at(carried, n, 2 * n), k, r)
     step = point_step(n, block.shape[1])
-    sign = _eliminate(block, step, pivots)
+    sign = eliminate(block, step, pivots)
     _reduce(block, Range(2 * n, 2 * n + r), block, step)
     copy_rows(at(carried, 0, 0), at(block, n, n), 2 * n + k, n + r)
     return sign
@@ -370,7 +370,7 @@ def _eliminate_dense(carried, first, last, dense, pivots):
     copy_rows(at(dense, n, 0), at(first, 0, 0), n, conditions)
     copy_rows(at(dense, n, n), at(last, 0, 0), size - n, conditions)
     copy_rows(at(dense, n + conditions, 0), at(carried, n, 0), size, carried.shape[0] - n)
-    return _eliminate(dense, whole_step(size), pivots)
+    return eliminate(dense, whole_step(size), pivots)
 
 
 @kernel

@@ -12,122 +12,195 @@ size kept as a logarithm, so that groups of very different size do not meet.
 
 from __future__ import annotations
 
+import cmath
+import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, Stack, Vector
+from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 
 #: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the
 #: eigenvalues of a block with such a spread are accurate.
 _APART = 1e4
-#: Matrices of a smaller condition number are multiplied with each other as they are.
-_WELL = 30.0
 #: Below this the coupling of two groups is round-off; at most so many rounds.
 _COUPLED, _ROUNDS = 1e-14, 60
+#: The smallest number of full precision stands for zero in logarithms.
+_TINY = 2.2250738585072014e-308
+
+
+class Iterates(NamedTuple):
+    """The work space of an orthogonal iteration; bases are given by rows.
+
+    ``first`` and ``last`` (n, n) are Q_0 and Q_N, ``triangles`` (N, n, n) are R_j, ``coupling`` (n, n) is Q_0^T Q_N, ``product``
+    (n, n) one of the products of triangles, ``vectors`` (n, n) are columns of F_j Q_{j-1}, ``sizes`` (n,) logarithms.
+    """
+
+    first: Matrix
+    last: Matrix
+    triangles: Stack
+    coupling: Matrix
+    product: Matrix
+    vectors: Matrix
+    sizes: Vector
+
+
+class Groups(NamedTuple):
+    """Groups of eigenvalues of similar size: ``starts`` (n + 1,) are their first places, and n.
+
+    Those of group g are the eigenvalues of its diagonal block in ``blocks`` (n, n), times the exponential of ``sizes[g]``.
+    """
+
+    starts: IndexVector
+    blocks: Matrix
+    sizes: Vector
 
 
 def log_eigenvalues(factors: Array) -> ComplexArray:
     """Return the logarithms of the eigenvalues of F_N ... F_1, shape (n,), largest first; ``factors`` is (N, n, n), F_1 first.
 
-    The imaginary part is in (-pi, pi]; a zero eigenvalue gives -inf.
+    The imaginary part is in (-pi, pi]; a zero eigenvalue gives -inf. All are NaN where a factor is not finite.
 
     Examples
     --------
     >>> print(log_eigenvalues(np.array([np.diag([1e200, 1e-200]), np.diag([1e200, -1e-200])])).round(3))
     [ 921.034+0.j    -921.034+3.142j]
     """
-    n, factors = factors.shape[-1], _joined(factors)
-    start = np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0]
-    for _ in range(_ROUNDS):
-        end, triangles = _round(factors, start)
-        sizes = np.log(np.maximum(np.abs(triangles[:, range(n), range(n)]), np.finfo(float).tiny)).sum(axis=0)
-        coupling = start.T @ end
-        apart = [i for i in range(1, n) if sizes[i - 1] - sizes[i] > np.log(_APART)]
-        if all(np.abs(coupling[i:, :i]).max() < _COUPLED for i in apart):
-            break
-        start = end
-    found = [_of_block(coupling[a:b, a:b], triangles[:, a:b, a:b]) for a, b in zip([0, *apart], [*apart, n])]
-    values = np.concatenate(found)
-    return values[np.argsort(-values.real, kind="stable")]
+    count, n, _ = factors.shape
+    if not np.isfinite(factors).all():
+        return np.full(n, np.nan, dtype=complex)
+    matrices = np.empty((5, n, n))
+    matrices[0] = _first_basis(n)
+    first, last, coupling, product, vectors = matrices
+    iterates = Iterates(first, last, np.empty((count, n, n)), coupling, product, vectors, np.empty(n))
+    groups = Groups(np.empty(n + 1, np.int64), np.empty((n, n)), np.empty(n))
+    found = separate(factors, iterates, groups)
+    ends = groups.starts[: found + 1].tolist()
+    values: list[complex] = []
+    for size, a, b in zip(groups.sizes.tolist(), ends, ends[1:]):
+        values += [_logarithm(value, size) for value in _eigenvalues(groups.blocks[a:b, a:b])]
+    return np.array(sorted(values, key=lambda value: -value.real))
 
 
-def _joined(factors: Array) -> Array:
-    """Return fewer matrices with the same product: neighbours are multiplied while no digits are lost."""
-    while len(factors) > 1 and np.linalg.cond(factors).max() < _WELL:
-        pairs = factors[1::2] @ factors[: len(factors) // 2 * 2 : 2]
-        factors = np.concatenate([pairs, factors[-1:]]) if len(factors) % 2 else pairs
-    return factors
+@functools.lru_cache(maxsize=32)
+def _first_basis(n: int) -> Array:
+    """Return an orthogonal matrix to start from, always the same."""
+    basis: Array = np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0].T
+    return basis
 
 
-def _round(factors: Array, start: Array) -> tuple[Array, Array]:
-    """Return Q_N and all R_j (N, n, n)."""
-    q, triangles = start.copy(), np.zeros(factors.shape)
-    triangularize(np.ascontiguousarray(factors), q, triangles, np.empty(q.shape))
-    return q, triangles
+def _eigenvalues(block: Array) -> list[complex]:
+    """Return the eigenvalues of a matrix."""
+    if len(block) == 1:
+        return [complex(block[0, 0])]
+    found: list[complex] = np.linalg.eigvals(block).astype(complex).tolist()
+    return found
+
+
+def _logarithm(value: complex, size: float) -> complex:
+    """Return the logarithm of an eigenvalue times the exponential of a size."""
+    if value == 0 or size == -math.inf:
+        return complex(-math.inf, 0.0)
+    return cmath.log(value) + size
 
 
 @kernel(reorder=False)
-def triangularize(factors: Stack, q: Matrix, triangles: Stack, work: Matrix) -> None:
+def separate(factors: Stack, iterates: Iterates, groups: Groups) -> int:
+    """Iterate from the first basis until groups of eigenvalues are apart; fill the groups, and return their number."""
+    first, last, triangles, coupling, product, vectors, sizes = iterates
+    n, count = sizes.size, 1
+    for _ in range(_ROUNDS):
+        for a in range(n):
+            for b in range(n):
+                last[a, b] = first[a, b]
+        _triangularize(factors, last, triangles, vectors)
+        for a in range(n):
+            sizes[a] = 0.0
+            for j in range(triangles.shape[0]):
+                sizes[a] += math.log(max(abs(triangles[j, a, a]), _TINY))
+            for b in range(n):
+                coupling[a, b] = 0.0
+                for c in range(n):
+                    coupling[a, b] += first[a, c] * last[b, c]
+        count, coupled = 1, 0.0
+        for g in range(1, n):
+            if sizes[g - 1] - sizes[g] > math.log(_APART):
+                groups.starts[count] = g
+                count += 1
+                for a in range(g, n):
+                    for b in range(g):
+                        coupled = max(coupled, abs(coupling[a, b]))
+        if coupled < _COUPLED:
+            break
+        for a in range(n):
+            for b in range(n):
+                first[a, b] = last[a, b]
+    groups.starts[0], groups.starts[count] = 0, n
+    for g in range(count):
+        start, end = groups.starts[g], groups.starts[g + 1]
+        groups.sizes[g] = _multiply(triangles, start, end, product)
+        for a in range(start, end):
+            for b in range(start, end):
+                groups.blocks[a, b] = 0.0
+                for c in range(start, end):
+                    groups.blocks[a, b] += coupling[a, c] * product[c, b]
+    return count
+
+
+@helper
+def _triangularize(factors, q, triangles, work):
     """Overwrite Q_0 by Q_N, and fill all R_j, by Gram and Schmidt's method, each vector orthogonalized twice."""
     n = q.shape[0]
     for j in range(factors.shape[0]):
-        for a in range(n):
-            for b in range(n):
-                work[a, b] = 0.0
-                for c in range(n):
-                    work[a, b] += factors[j, a, c] * q[c, b]
         for b in range(n):
-            for _ in range(2):
-                for c in range(b):
-                    part = 0.0
-                    for a in range(n):
-                        part += q[a, c] * work[a, b]
-                    triangles[j, c, b] += part
-                    for a in range(n):
-                        work[a, b] -= part * q[a, c]
+            for a in range(n):
+                work[b, a] = 0.0
+                triangles[j, b, a] = 0.0
+                for c in range(n):
+                    work[b, a] += factors[j, a, c] * q[b, c]
+        for b in range(n):
+            for turn in range(2 * b):
+                c, part = turn % b, 0.0
+                for a in range(n):
+                    part += q[c, a] * work[b, a]
+                triangles[j, c, b] += part
+                for a in range(n):
+                    work[b, a] -= part * q[c, a]
             largest = 0.0  # the sum of squares may overflow
             for a in range(n):
-                largest = max(largest, abs(work[a, b]))
+                largest = max(largest, abs(work[b, a]))
             length = 0.0
             for a in range(n):
-                length += (work[a, b] / largest) ** 2 if largest > 0 else 0.0
+                length += (work[b, a] / largest) ** 2 if largest > 0 else 0.0
             length = largest * math.sqrt(length)
             triangles[j, b, b] = length
             for a in range(n):
-                q[a, b] = work[a, b] / length if length > 0 else 0.0
+                q[b, a] = work[b, a] / length if length > 0 else 0.0
 
 
-def _of_block(coupling: Array, triangles: Array) -> ComplexArray:
-    """Return the logarithms of the eigenvalues of a block of ``coupling`` times the product of ``triangles``."""
-    product, size = np.eye(len(coupling)), np.zeros(1)
-    multiply(np.ascontiguousarray(triangles), product, size)
-    if not np.isfinite(size[0]):
-        return np.full(len(coupling), -np.inf + 0j)
-    with np.errstate(divide="ignore"):
-        logs: ComplexArray = np.log(np.linalg.eigvals(coupling @ product).astype(complex)) + size[0]
-    return logs
-
-
-@kernel(reorder=False)
-def multiply(triangles: Stack, product: Matrix, size: Vector) -> None:
-    """Multiply ``product`` by all upper triangular matrices, from the left; its size is kept as a logarithm in ``size``."""
-    n = product.shape[0]
+@helper
+def _multiply(triangles, start, end, product):
+    """Fill the block from ``start`` to ``end`` of a product of upper triangular matrices; return its size as a logarithm."""
+    size = 0.0
+    for a in range(start, end):
+        for b in range(start, end):
+            product[a, b] = 1.0 if a == b else 0.0
     for j in range(triangles.shape[0]):
         largest = 0.0
-        for b in range(n):
-            for a in range(n):  # row a needs the rows below it as they were
+        for b in range(start, end):
+            for a in range(start, end):  # row a needs the rows below it as they were
                 value = 0.0
-                for c in range(a, n):
+                for c in range(a, end):
                     value += triangles[j, a, c] * product[c, b]
                 product[a, b] = value
                 largest = max(largest, abs(value))
         if largest == 0:
-            size[0] = -math.inf
-            return
-        for a in range(n):
-            for b in range(n):
+            return -math.inf
+        for a in range(start, end):
+            for b in range(start, end):
                 product[a, b] /= largest
-        size[0] += math.log(largest)
+        size += math.log(largest)
+    return size
