@@ -14,7 +14,7 @@ from contin.analysis.extended import Extended
 from contin.analysis.fold_curve import FoldCurve
 from contin.analysis.hopf_curve import HopfCurve
 from contin.arrays import Array
-from contin.continuation.cycle_starts import frequency_of
+from contin.continuation.cycle_starts import doubled, frequency_of, start_at
 from contin.continuation.run import follow
 from contin.detection.branch_point import BranchPoint
 from contin.detection.lyapunov import critical_pair
@@ -128,7 +128,7 @@ def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _doublings(start: Point, base: System, x: Array) -> _First | None:
-    return (DoublingCurve(base), x) if start.label == "PD" and isinstance(base, CycleCollocation) else None
+    return (DoublingCurve(base), x) if start_at(start) is doubled and isinstance(base, CycleCollocation) else None
 
 
 def _tori(start: Point, base: System, x: Array) -> _First | None:
