@@ -47,6 +47,8 @@ def homoclinic(cycle: Point, free: Sequence[str], *, mesh: MeshControl | None = 
     system: Any = cycle.system
     if not isinstance(system, CycleCollocation):
         raise ProblemError("cycle: must be a point of a CycleProblem")
+    if system.order > 1:
+        raise ProblemError("cycle: must be one without a symmetry; solve takes this one as a guess of such a CycleProblem")
     states, names = system.states(cycle.x), system.problem.state_names
     rest, unstable = _saddle(system, cycle.x)
     parameters = {name: value for name, value in cycle.parameters.items() if name != PERIOD}

@@ -11,7 +11,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.continuation.cycle_starts import doubled, from_hopf
+from contin.continuation.cycle_starts import start_at
 from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
@@ -30,9 +30,6 @@ from contin.stepping.settings import Settings, settings_with
 from contin.stepping.state import Stop
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-#: Special points where a branch of another kind begins, by label: cycles at Hopf points, doubled ones at period doublings.
-_SWITCHES = {"HB": from_hopf, "PD": doubled}
 
 
 @dataclass
@@ -148,7 +145,7 @@ class _Explorer:
             done += 1
             if junction.depth >= depth:
                 continue
-            if junction.point.label in _SWITCHES:
+            if start_at(junction.point) is not None:
                 self._switch(junction)
                 continue
             for which, tangent in enumerate(junction.point.details.tangents):
@@ -172,7 +169,9 @@ class _Explorer:
             return
         junction.taken[1][1] = len(self.result.branches)
         try:
-            system, x, tangent = _SWITCHES[junction.point.label](junction.point)
+            start = start_at(junction.point)
+            assert start is not None
+            system, x, tangent = start(junction.point)
             self._follow(self._run(system, x, self.settings, tangent), junction.depth + 1, junction)
         except ConvergenceError as error:
             junction.failed.append((1, 1, str(error)))
@@ -198,9 +197,10 @@ class _Explorer:
 
     def _is_known(self, point: Point, number: int, depth: int) -> bool:
         """Note a point that a run passes, if it is one to leave a branch at; return True if the way ahead was followed."""
-        if isinstance(point.details, (BranchPoint, MultiplePoint)) and point.label not in _SWITCHES:
+        switches = start_at(point) is not None
+        if isinstance(point.details, (BranchPoint, MultiplePoint)) and not switches:
             return bool(point.details.tangents) and self._arrived(point, number, depth)
-        return point.label in _SWITCHES and self._met(point, number, depth)
+        return switches and self._met(point, number, depth)
 
     def _met(self, point: Point, number: int, depth: int) -> bool:
         """Note a Hopf point or period doubling on a run; return True if it is known already."""

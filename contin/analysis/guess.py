@@ -14,14 +14,20 @@ from contin.analysis.multipliers import with_guessed_multipliers
 from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.kinds import discretized
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.names import exact_text
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.cycle import CycleProblem
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point
+
+#: A mesh point of a guess that lies closer to the end of the part that is computed is left out; Newton's method bears it ten
+#: times larger or smaller.
+_LEAST_INTERVAL = 1e-3
 
 Guess = Callable[[float], Any] | Point | Sequence[float] | tuple[Sequence[float] | Array, Any] | None
 
@@ -60,8 +66,9 @@ def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tu
 def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Options) -> tuple[System, Array]:
     a, b = problem.domain
     mesh, degree = np.linspace(a, b, options.intervals + 1), options.degree
+    order = problem.order if isinstance(problem, CycleProblem) else 1
     if isinstance(guess, Point):
-        mesh, degree = _meshed(guess).mesh, guess.system.degree
+        mesh, degree = _mesh_of(_meshed(guess), order), guess.system.degree
     elif _is_pair(guess):
         given = _numbers(guess[0])
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a or not given[-1] >= b:
@@ -69,7 +76,7 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
     system = discretized(problem, mesh, degree, options.free, options.parameters)
     if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
         return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
-    states = _sampled(guess, system.nodes, len(problem.state_names))
+    states = _sampled(guess, system.nodes / order, len(problem.state_names))
     x = system.pack(states, {**problem.parameters, **options.parameters})
     return system.with_reference(x), x
 
@@ -77,7 +84,7 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
 def _sampled(guess: Guess, nodes: Array, count: int) -> Array:
     """Return the states of a guess at the nodes, shape (K, count)."""
     if isinstance(guess, Point):
-        states = _meshed(guess).evaluate(guess.x, nodes)
+        states = _meshed(guess).evaluate(guess.x, nodes * _order(guess.system))
         if states.shape[1] != count:
             raise ProblemError(f"guess: a Point of {states.shape[1]} states for a problem of {count}")
         return states
@@ -113,6 +120,20 @@ def _meshed(guess: Point) -> Collocation:
     if not isinstance(guess.system, Collocation):
         raise ProblemError("guess: a Point must be a solution of a boundary value problem")
     return guess.system
+
+
+def _order(system: Any) -> int:
+    """Return into how many parts a symmetry divides a cycle; one part is the interval that is computed."""
+    return system.order if isinstance(system, PeriodicCollocation) else 1
+
+
+def _mesh_of(system: Collocation, order: int) -> Array:
+    """Return the mesh of a guess for a problem with a symmetry of this order, on the part that is computed."""
+    parts = _order(system)
+    if parts == order:
+        return system.mesh
+    whole = np.unique(np.arange(parts)[:, None] + system.mesh) * order / parts
+    return np.append(whole[whole < 1 - _LEAST_INTERVAL], 1.0)
 
 
 def _is_pair(guess: Guess) -> TypeGuard[tuple[Any, Any]]:

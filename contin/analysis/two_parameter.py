@@ -10,7 +10,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.continuation.cycle_starts import frequency_of
+from contin.continuation.cycle_starts import doubled, frequency_of, start_at
 from contin.continuation.run import follow
 from contin.curves.branch_point_curve import BranchPointCurve
 from contin.curves.cycle_curves import DoublingCurve, TorusCurve
@@ -145,7 +145,7 @@ def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _doublings(start: Point, base: System, x: Array) -> _First | None:
-    return (DoublingCurve(base), x) if start.label == "PD" and isinstance(base, CycleCollocation) else None
+    return (DoublingCurve(base), x) if start_at(start) is doubled and isinstance(base, CycleCollocation) else None
 
 
 def _tori(start: Point, base: System, x: Array) -> _First | None:

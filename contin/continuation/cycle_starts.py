@@ -1,8 +1,9 @@
-"""Where branches of cycles begin: at Hopf points of equilibria, and at period doublings of cycles."""
+"""Where branches of cycles begin: at Hopf points of equilibria, at period doublings of cycles, and where a symmetry breaks."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -54,11 +55,19 @@ def frequency_of(point: Point) -> float | None:
     return float(point.details["frequency"]) if known else None
 
 
+def start_at(point: Point) -> Callable[[Point], tuple[PeriodicCollocation, Array, Array]] | None:
+    """Return the function that finds the start of the other kind of branch at a point; None where none begins there."""
+    if point.label == "BP" and not isinstance(point.details, dict):
+        return None  # a branch point at which all branches are of one kind
+    return {"HB": from_hopf, "PD": doubled, "BP": doubled}.get(point.label)
+
+
 def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
     """Return the system of orbits of twice the period, a period-doubling point as such an orbit, and the tangent there.
 
     The orbit, traversed twice, is a branch point of that system; the new branch leaves along perturbations that change their
-    sign from one round to the next.
+    sign from one round to the next. With a symmetry S a round is one n-th of the period, the new orbits have the symmetry S^2
+    and, if n is even, about the same period.
 
     Raises
     ------
@@ -68,26 +77,26 @@ def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
         The branch point is not found.
     """
     system: Any = point.system
-    if point.label != "PD":
+    if start_at(point) is not doubled:
         raise ProblemError(f"start: a point with the label {point.label!r} is no period doubling")
     adapted = system.adapted(point.x, MeshControl())  # the point is located on a mesh finer than the run needs
     system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))
     mesh = np.concatenate([system.mesh, 1 + system.mesh[1:]]) / 2
-    longer = PERIOD if system.problem.period is None else ROUNDS
-    parameters = {**point.parameters, longer: 2 * point.parameters[longer]}
-    twice: Any = discretized(system.problem, mesh, system.degree, system.free, parameters, system.scales)
+    longer, factor = PERIOD if system.problem.period is None else ROUNDS, 2 if system.order % 2 else 1
+    parameters = {**point.parameters, longer: factor * point.parameters[longer]}
+    twice: Any = discretized(system.problem.doubled(), mesh, system.degree, system.free, parameters, system.scales)
     states = system.states(x)
-    x = twice.pack(np.concatenate([states, states[1:]]), parameters)
+    x = twice.pack(np.concatenate([states, states[1:] @ system.problem.symmetry.T]), parameters)
     found = locate_branch_point(twice.with_reference(x), x)
-    return twice.with_reference(found.x), found.x, _alternating(twice, found)
+    return twice.with_reference(found.x), found.x, _alternating(twice, found, system.problem.symmetry)
 
 
-def _alternating(twice: PeriodicCollocation, found: BranchPoint) -> Array:
-    """Return the tangent that changes most from one round to the next."""
+def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) -> Array:
+    """Return the tangent that changes most from one round to the next, turned by the symmetry."""
     half = twice.nodes.size // 2
 
     def change(tangent: Array) -> float:
         states = twice.states(tangent)
-        return float(np.abs(states[: half + 1] - states[half:]).max() / np.abs(states).max())
+        return float(np.abs(states[: half + 1] @ turn.T - states[half:]).max() / np.abs(states).max())
 
     return max(found.tangents, key=change)

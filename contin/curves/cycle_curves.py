@@ -98,8 +98,9 @@ class CycleCurve(CriticalCurve):
         return np.append(super().functionals(x), self.normal_form(x).value)
 
     def starts(self, right: Array) -> Array:
-        """Return right null vectors at t = 0."""
-        return right[..., : len(self.cycles.problem.state_names)]
+        """Return right null vectors at t = 0, turned by the symmetry: what P multiplies."""
+        found: Array = right[..., : len(self.cycles.problem.state_names)] @ self.cycles.turn.T
+        return found
 
 
 class DoublingCurve(CycleCurve):

@@ -19,7 +19,8 @@ Where L is singular, w.r = 0 for the left null vector w is the condition that de
                                             d T = w.(C(v, v, v*) + 2 B(v, h) + B(v*, k) - 2 a (J v - i theta v)) / 2
 
 The mean of |v|^2 over the period is one, and at folds v is normal to u0' in the mean. Products with w are those of the
-discrete equations, so that the coefficients converge with the cycle. Where c or the real part of d is negative, the bifurcation
+discrete equations, so that the coefficients converge with the cycle. With a symmetry of order n all this is done over one n-th
+of the period, with S v(0) for v(0). Where c or the real part of d is negative, the bifurcation
 is supercritical: the doubled cycle, or the torus, attracts on the centre manifold. The sign of b depends on that of v, and its
 absolute value is given; it vanishes at a cusp.
 """
@@ -161,4 +162,4 @@ class NormalForms:
 
     def _coefficient(self, terms: list[list[Any]], factor: int) -> Coefficient:
         """Return a coefficient per unit of time, from its terms by derivatives of sixth and of fourth order."""
-        return Coefficient.of(*np.array(terms) / (factor * self.system.parameter(self.x, PERIOD)))
+        return Coefficient.of(*np.array(terms) / (factor * self.system.unit_time(self.x)))

@@ -76,7 +76,7 @@ def floquet(system: PeriodicCollocation, x: Array, tangent: Array) -> Floquet:
         errors = np.full(values.shape, np.nan)
     if trivial is not None:
         errors[trivial] = abs(values[trivial])
-    return Floquet(values, errors, unstable(system, x))
+    return Floquet(system.whole_round(values), system.order * errors, unstable(system, x))
 
 
 def _corrected(system: PeriodicCollocation, x: Array, tangent: Array) -> Array:
@@ -112,9 +112,14 @@ def unstable(system: PeriodicCollocation, x: Array) -> int:
     return int(np.count_nonzero(outside))
 
 
-def doubling() -> TestFunction:
-    """Return the test function of period doublings: det(M + I), each factor divided by 1 + |multiplier|."""
-    return TestFunction("PD", "period doubling", _antiperiodic, search=_doublings, describe=_of_doubling)
+def doubling(order: int = 1) -> TestFunction:
+    """Return the test function of period doublings: det(M + I), each factor divided by 1 + |multiplier|.
+
+    With a symmetry of even order n, M being the map over one n-th of the period, the multiplier over the whole period is
+    (-1)^n = 1 there: cycles of the same period branch off that have lost the symmetry.
+    """
+    label, name = ("PD", "period doubling") if order % 2 else ("BP", "symmetry breaking")
+    return TestFunction(label, name, _antiperiodic, search=_doublings, describe=_of_doubling)
 
 
 def _antiperiodic(trial: Trial) -> float:
@@ -132,7 +137,7 @@ def _of_doubling(trial: Trial) -> dict[str, float]:
 
 def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the period doublings between places of a step, in order."""
-    test = doubling()
+    test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
     inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
     values = [test.function(trial) for _, trial in looked]

@@ -101,7 +101,7 @@ def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, Compl
     else:
         return None
     eigenvalues: ComplexArray = np.linalg.eigvals(system.rates_by_states(x, states[None])[0]).astype(complex)
-    values = eigenvalues / system.duration(x)
+    values = eigenvalues / system.unit_time(x)
     return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), values[np.argsort(-values.real)]
 
 

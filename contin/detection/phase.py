@@ -25,7 +25,7 @@ def in_phase(system: Discretization, x: Array, vectors: Sequence[Array], referen
 
 @in_phase.register
 def _of_cycles(system: CycleCollocation, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
-    times = (system.nodes + _shift(system, x, reference)) % 1.0
+    times = (system.nodes + _shift(system, x, reference)) % system.order
     size = system.state_size
 
     def moved(vector: Array) -> Array:
@@ -36,7 +36,7 @@ def _of_cycles(system: CycleCollocation, x: Array, vectors: Sequence[Array], ref
 
 def _shift(system: CycleCollocation, x: Array, reference: Array) -> float:
     """Return the s at which the integral of u(t + s) . v(t) is largest, v the reference."""
-    t = np.arange(_PLACES) / _PLACES
+    t = system.order * np.arange(_PLACES) / _PLACES
     ours, theirs = (np.fft.fft(system.evaluate_scaled(z, t), axis=0) for z in (x, reference))
     products = np.sum(ours * theirs.conj(), axis=1)
     frequencies = 2 * np.pi * np.fft.fftfreq(_PLACES, 1 / _PLACES)
@@ -47,4 +47,4 @@ def _shift(system: CycleCollocation, x: Array, reference: Array) -> float:
         if not bend < 0:
             break
         s -= slope / bend
-    return s
+    return system.order * s

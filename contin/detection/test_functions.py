@@ -72,7 +72,8 @@ def _of_boundary_value(system: Collocation) -> list[TestFunction]:
 
 @own_test_functions.register
 def _of_cycles(system: PeriodicCollocation) -> list[TestFunction]:
-    return [doubling(), torus(), homoclinic()] if isinstance(system, CycleCollocation) else [doubling(), torus()]
+    own = [doubling(system.order), torus()]
+    return [*own, homoclinic()] if isinstance(system, CycleCollocation) else own
 
 
 @own_test_functions.register
@@ -107,7 +108,7 @@ def _of_bifurcations_of_cycles(system: CycleCollocation, point: SpecialPoint) ->
     with np.errstate(all="ignore"):
         if point.label == "LP" and point.details is None and not point.name.startswith("possible"):
             return NormalForms(system, point.trial.x).fold()
-        if point.label == "PD" and _is_simple(point):
+        if point.label in ("PD", "BP") and _is_simple(point):
             return NormalForms(system, point.trial.x).period_doubling()
         if point.label == "TR" and _is_simple(point):
             return NormalForms(system, point.trial.x).torus(point.details["frequency"])
@@ -134,7 +135,7 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
 @own_end.register
 def _of_doubled_cycles(system: PeriodicCollocation, point: SpecialPoint) -> SpecialPoint:
     """Where a cycle comes to go twice round one of half its period the branch ends: beyond it is itself, half a period on."""
-    if point.label != "BP" or point.name == "start" or not system.is_doubled(point.trial.x):
+    if point.label != "BP" or point.name in ("start", "symmetry breaking") or not system.is_doubled(point.trial.x):
         return point
     stop = Stop("period doubling", "the cycles come to go twice round cycles of half the period, at a period doubling")
     return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)

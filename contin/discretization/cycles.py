@@ -50,16 +50,46 @@ class PeriodicCollocation(Collocation):
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         self._known: dict[bytes, ComplexArray] = {}
+        self.order = problem.order
+        sizes = np.ones(self._n) if scales is None else scales.states
+        self._turn: Array = problem.symmetry * sizes / sizes[:, None]
+
+    @property
+    def turn(self) -> Array:
+        """The matrix S of the symmetry u(1) = S u(0), of states divided by their sizes; the identity where there is none."""
+        return self._turn
 
     def duration(self, x: Array) -> float:
         """Return the period."""
         return self.problem.duration(dict(zip(self.problem.parameters, map(float, self.all_parameters(x)))))
 
+    def unit_time(self, x: Array) -> float:
+        """Return the time that the unit interval stands for: the period divided by the order of the symmetry."""
+        return self.duration(x) / self.order
+
     def is_doubled(self, x: Array) -> bool:
-        """Return whether a cycle goes twice round one of half its period, up to the square root of round-off."""
+        """Return whether a cycle goes twice round one of half its period, up to the square root of round-off.
+
+        With a symmetry S of odd order the part computed is then twice one with the symmetry S^((n + 1) / 2), whose square is
+        S; with one of even order, it never is.
+        """
+        if self.order % 2 == 0:
+            return False
         states = self.states(x)
-        later = self.evaluate(x, (self.nodes + 0.5) % 1.0)
+        half = np.linalg.matrix_power(self.problem.symmetry, (self.order + 1) // 2) if self.order > 1 else None
+        later = self.evaluate(x, (self.nodes + 0.5) % self.order)
+        states = states if half is None else states @ half.T
         return bool(np.all(np.abs(states - later).max(axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+
+    def _interpolated(self, x: Array, times: Array) -> Array:
+        """Return the piecewise polynomial of the values in x, beyond the unit interval by the symmetry."""
+        if self.order == 1 or (times.min() >= 0 and times.max() <= 1):
+            return super()._interpolated(x, times)
+        turns = np.floor(times).astype(int)
+        values = super()._interpolated(x, times - turns)
+        powers = np.array([np.linalg.matrix_power(self.turn, k) for k in range(self.order)])
+        found: Array = np.einsum("mab,mb->ma", powers[turns % self.order], values)
+        return found
 
     def evaluate_scaled(self, x: Array, times: Array) -> Array:
         """Return the states divided by their sizes at ``times`` (m,), shape (m, n); of perturbations, too."""
@@ -82,17 +112,19 @@ class PeriodicCollocation(Collocation):
     def _largest(self, x: Array, sign: float) -> Array:
         """Return the largest values of the states times a sign, shape (n,)."""
         parts = 4 * self.degree
-        t = (self.mesh[:-1, None] + self._h[:, None] * np.linspace(0, 1, parts, endpoint=False)).ravel()
+        once = (self.mesh[:-1, None] + self._h[:, None] * np.linspace(0, 1, parts, endpoint=False)).ravel()
+        t = (np.arange(self.order)[:, None] + once).ravel()
         values = sign * self.evaluate(x, t)
         known = values.max(axis=0)
-        at, apart = t[values.argmax(axis=0)], np.repeat(self._h / parts, parts)[values.argmax(axis=0)]
+        highest = values.argmax(axis=0)
+        at, apart = t[highest], np.repeat(self._h / parts, parts)[highest % once.size]
         for _ in range(_PARABOLAS):
-            near = np.concatenate([at - apart, at, at + apart]) % 1.0
+            near = np.concatenate([at - apart, at, at + apart]) % self.order
             before, here, behind = sign * np.diagonal(self.evaluate(x, near).reshape(3, at.size, -1), axis1=1, axis2=2)
             bend = before - 2 * here + behind
             move = np.where(bend < 0, (before - behind) / (2 * np.where(bend < 0, bend, 1.0)), 0.0)
             at, apart = at + apart * np.clip(move, -1, 1), apart / 10
-        found: Array = np.maximum(sign * np.diagonal(self.evaluate(x, at % 1.0)), known)
+        found: Array = np.maximum(sign * np.diagonal(self.evaluate(x, at % self.order)), known)
         return found
 
     # --- stability -----------------------------------------------------------------------------------------------
@@ -111,14 +143,18 @@ class PeriodicCollocation(Collocation):
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable.
 
-        That of a pair on the unit circle, to round-off, has the real part zero.
+        That of a pair on the unit circle, to round-off, has the real part zero. With a symmetry of order n they are those of
+        the map over one n-th of the period, S^-1 times its monodromy matrix; see `whole_round`.
         """
         key = x.tobytes()
         if key not in self._known:
             if len(self._known) > _KEPT:
                 self._known.clear()
             jacobian = self._jacobian_of_field(x)
-            values = log_eigenvalues(transitions(self.basis.value, self.basis.slope, self._h, jacobian))
+            matrices = transitions(self.basis.value, self.basis.slope, self._h, jacobian)
+            if self.order > 1:
+                matrices = np.concatenate([matrices, np.linalg.inv(self.turn)[None]])
+            values = log_eigenvalues(matrices)
             total = float(self._quadrature @ np.trace(jacobian, axis1=1, axis2=2))
             least = values.real <= values.real.min() + _EQUAL
             if not self._is_own_error(values, least):
@@ -126,6 +162,14 @@ class PeriodicCollocation(Collocation):
                 values[least] += (total - values.real.sum()) / np.count_nonzero(least)
             self._known[key] = _on_circle(values)
         return self._known[key]
+
+    def whole_round(self, values: ComplexArray) -> ComplexArray:
+        """Return the logarithms of the multipliers over the whole period, n times those over one n-th of it."""
+        if self.order == 1:
+            return values
+        angles = self.order * values.imag
+        found: ComplexArray = self.order * values.real + 1j * (math.pi - (math.pi - angles) % (2 * math.pi))
+        return found
 
     def _is_own_error(self, values: ComplexArray, least: Array) -> bool:
         """Return whether the smallest multipliers are those whose error shall show."""
@@ -267,9 +311,10 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         It is the product of both, without their means, over that of the reference with itself.
         """
         weights = self.weights[: self.state_size : self._n]
-        reference = self.reference - weights @ self.reference
+        group = sum(np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)) / self.order
+        reference = self.reference - group @ (weights @ self.reference)
         states = self.states(x)
-        product = np.einsum("k,ka,ka->", weights, reference, states - weights @ states)
+        product = np.einsum("k,ka,ka->", weights, reference, states - group @ (weights @ states))
         return float(product / np.einsum("k,ka,ka->", weights, reference, reference))
 
     # --- meshes and references -----------------------------------------------------------------------------------

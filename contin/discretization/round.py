@@ -1,5 +1,7 @@
 """The linearization of a cycle over one round, with any condition between its ends.
 
+With a symmetry S of the cycle a round is one n-th of the period, and E0 in the conditions stands for S E0.
+
 Collocated, v' = T F_u v has the rows C v = 0. With v(1) = P v(0) for several copies of v that the small matrix P couples (or
 one copy with the number P), a perturbation is multiplied by an eigenvalue of P in each round:
 
@@ -88,8 +90,9 @@ class Round:
         from scipy import sparse  # type: ignore[import-untyped]  # as above
 
         coupling = np.atleast_2d(coupling)
-        one, n = np.eye(len(coupling)), len(self.system.problem.state_names)
-        first = sparse.coo_array((np.ones(n), (np.arange(n) + self.ends.start, np.arange(n))), (self.size, self.size))
+        one = np.eye(len(coupling))
+        turn = sparse.coo_array(self.system.turn)
+        first = sparse.coo_array((turn.data, (turn.coords[0] + self.ends.start, turn.coords[1])), (self.size, self.size))
         matrix = sparse.kron(one, self._collocation()) - sparse.kron(coupling, first)
         if b is not None and c is not None:
             column, row = sparse.coo_array(b[:, None]), sparse.coo_array(c[None, :])

@@ -7,13 +7,16 @@ from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from contin import checks
-from contin.arrays import Function
+from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Signature, argument_count
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.cycle_symmetry import averaged, check_equivariance, linear, order_of, symmetry_matrix
 from contin.problems.statement import check_statement
 from contin.problems.vector_field import check_field, found_elsewhere, generated, scaled
 
@@ -52,11 +55,15 @@ class CycleProblem(BoundaryValueProblem):
         smallest value of each state are columns by themselves: ``max_`` and ``min_`` + name.
     period : float, str or callable, optional
         The period of a forced field: a number, the name of a parameter, or a function ``period(p)``.
+    symmetry : sequence of float or array, optional
+        Of an autonomous field, a matrix S, or its diagonal, with F(S u) = S F(u) and S^n = 1: cycles with u(t + T/n) = S u(t)
+        are looked for, n the smallest such number. One n-th of the cycle is computed, with u(1) = S u(0) on the unit interval
+        and the time T/n. Guesses, the period and all columns are those of the whole cycle.
 
     Raises
     ------
     ProblemError
-        A name, a period or a function that cannot be used.
+        A name, a period, a symmetry or a function that cannot be used.
 
     Examples
     --------
@@ -85,10 +92,12 @@ class CycleProblem(BoundaryValueProblem):
     field: Function
     means: Mapping[str, Function]
     period: Function | None
+    symmetry: Array
+    order: int
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *,
-        functionals: Mapping[str, Function] | None = None, period: Period | None = None,
+        functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: Any = None,
     ) -> None:  # fmt: skip
         means = dict(checks.mapping("functionals", functionals or {}, "functions"))
         names = check_statement(states, parameters, means)
@@ -99,12 +108,16 @@ class CycleProblem(BoundaryValueProblem):
                 raise ProblemError(f"parameters: {name} is a column of every cycle by itself")
         check_field(field, Signature(names, tuple(parameters), times=forced), _FORCED if forced else _AUTONOMOUS)
         count = len(names)
-        found = None if period is None else _period_function(period, parameters)
-        rhs = scaled(field, PERIOD, count) if found is None else _scaled_by_forcing(field, found, count)
+        turn = _turn(symmetry, forced, count)
+        check_equivariance(field, turn, names, parameters)
+        found, order = None if period is None else _period_function(period, parameters), order_of(turn)
+        rhs = scaled(field, PERIOD, count, order) if found is None else _scaled_by_forcing(field, found, count)
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "means", means)
         object.__setattr__(self, "period", found)
-        super().__init__(rhs, _periodic(count), names, {**parameters, **({ROUNDS: 1.0} if forced else {PERIOD: 1.0})})
+        object.__setattr__(self, "symmetry", turn)
+        object.__setattr__(self, "order", order)
+        super().__init__(rhs, _periodic(turn), names, {**parameters, **({ROUNDS: 1.0} if forced else {PERIOD: 1.0})})
         columns = [*extremes, PERIOD] if forced else extremes
         object.__setattr__(self, "functionals", {**dict.fromkeys(columns, found_elsewhere), **means})
 
@@ -112,6 +125,17 @@ class CycleProblem(BoundaryValueProblem):
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:
         """Return the cycles of the vector field whose equilibria a problem states."""
         return cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
+
+    def doubled(self) -> CycleProblem:
+        """Return the problem of cycles that close after twice the part computed here: with the symmetry S^2.
+
+        Of cycles without a symmetry, and with one of odd order, those are cycles of twice the period.
+        """
+        if self.order == 1:
+            return self
+        kept = {name: value for name, value in self.parameters.items() if name != PERIOD}
+        symmetry = self.symmetry @ self.symmetry if self.order > 2 else None
+        return CycleProblem(self.field, self.state_names, kept, functionals=self.means, symmetry=symmetry)
 
     @property
     def multipliers(self) -> tuple[str, ...]:
@@ -142,8 +166,28 @@ class CycleProblem(BoundaryValueProblem):
     def _compiled(self, name: str) -> Batch:
         if name not in ("functionals", "functional derivatives"):
             return super()._compiled(name)
-        functions = [_of_time(f) if self.period is None else _of_forcing(f, self.period) for f in self.means.values()]
+        functions = [self._mean(function) for function in self.means.values()]
         return Batch(functions, [0] * len(functions), self.state_names, tuple(self.parameters))
+
+    def _mean(self, function: Function) -> Function:
+        """Return a functional as a function of (t, u, p) whose mean over the part computed is that over the period."""
+        if self.period is not None:
+            return _of_forcing(function, self.period)
+        return _of_time(function) if self.order == 1 else averaged(function, self.symmetry, self.state_names, self.order)
+
+
+def _turn(symmetry: Any, forced: bool, count: int) -> Array:
+    """Return the matrix of a symmetry, the identity where there is none.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if symmetry is None:
+        return np.eye(count)
+    if forced:
+        raise ProblemError("symmetry: must be left out where a period is given; only autonomous fields may have one")
+    return symmetry_matrix(symmetry, count)
 
 
 def _period_function(period: Period, parameters: Mapping[str, float]) -> Function:
@@ -173,8 +217,9 @@ def _scaled_by_forcing(field: Function, period: Function, count: int) -> Functio
     return generated("rhs", source, {"field": field, "period": period})
 
 
-def _periodic(count: int) -> Function:
-    values = "".join(f"a[{i}] - b[{i}], " for i in range(count))
+def _periodic(turn: Array) -> Function:
+    """Return the boundary conditions S u(0) - u(1) = 0."""
+    values = "".join(f"{linear('a', row)} - b[{i}], " for i, row in enumerate(turn))
     return generated("boundary", f"def boundary(a, b, p):\n    return ({values})", {})
 
 

@@ -33,9 +33,10 @@ def generated(name: str, source: str, names: Mapping[str, Any]) -> Function:
     return found
 
 
-def scaled(field: Function, by: str, count: int) -> Function:
-    """Return the right-hand side that is the field times a parameter."""
-    values = "".join(f"p.{by} * r[{i}], " for i in range(count))
+def scaled(field: Function, by: str, count: int, parts: int = 1) -> Function:
+    """Return the right-hand side that is the field times a parameter, divided by a number of parts."""
+    part = f" / {parts}" if parts > 1 else ""
+    values = "".join(f"p.{by}{part} * r[{i}], " for i in range(count))
     return generated("rhs", f"def rhs(t, u, p):\n    r = field(u, p)\n    return ({values})", {"field": field})
 
 

@@ -76,10 +76,12 @@ def _course(point: Any, names: Sequence[str]) -> tuple[Array, Array, str]:
     """Return times in the user's units (K,), states (K, n), and the name of time."""
     system = point.system
     a, b = system.problem.domain
-    t = np.unique(np.concatenate([np.linspace(a, b, max(_FEWEST, _PER_INTERVAL * system.intervals)), system.mesh]))
+    cycle = isinstance(system, PeriodicCollocation)
+    once = np.unique(np.concatenate([np.linspace(a, b, max(_FEWEST, _PER_INTERVAL * system.intervals)), system.mesh]))
+    t = np.unique(np.arange(system.order)[:, None] + once) if cycle else once
     which = [system.problem.state_names.index(name) for name in names]
     states = system.evaluate(point.x, t)[:, which]
-    return (t * system.duration(point.x) if isinstance(system, PeriodicCollocation) else t), states, "t"
+    return (t * system.unit_time(point.x) if cycle else t), states, "t"
 
 
 def _portrait(point: Any, names: tuple[str, ...], axes: Any) -> None:

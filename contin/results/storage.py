@@ -22,6 +22,7 @@ from contin.errors import ProblemError
 from contin.files import write_whole
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.cycle import CycleProblem
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.state import Stop
@@ -84,11 +85,16 @@ def save(branch: Branch, path: str | Path) -> None:
     stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
     head = {
         "format": _FORMAT, "points": rows, "stop": stop, "free": first.free, "degrees": [s.degree for s in systems],
-        "states": first.problem.states, "names": list(first.problem.parameters),
+        "states": first.problem.states, "names": list(first.problem.parameters), "symmetry": _symmetry(first.problem),
     }  # fmt: skip
     image = io.BytesIO()
     np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
     write_whole(path, image.getvalue())
+
+
+def _symmetry(problem: Any) -> list[list[float]] | None:
+    """Return the matrix of the symmetry of cycles; None where none is declared."""
+    return problem.symmetry.tolist() if isinstance(problem, CycleProblem) and problem.order > 1 else None
 
 
 def _numbers(details: Any) -> dict[str, float] | None:
@@ -113,6 +119,8 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
     def branch(head: dict[str, Any], arrays: dict[str, Array]) -> Branch:
         if tuple(head["states"]) != problem.state_names or head["names"] != list(problem.parameters):
             raise ProblemError(f"{str(path)!r} is of a problem with states {head['states']} and parameters {head['names']}")
+        if head.get("symmetry") != _symmetry(problem):
+            raise ProblemError(f"{str(path)!r} is of a problem with the symmetry {head.get('symmetry')}")
         systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
         points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
         return Branch(points, Stop(*head["stop"]) if head["stop"] else None)

@@ -1,0 +1,98 @@
+"""Symmetries of cycles: u(t + T/n) = S u(t) with a matrix S that the field commutes with, F(S u) = S F(u), and S^n = 1."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array, Function
+from contin.errors import ProblemError
+from contin.problems.vector_field import generated
+
+#: The largest order of a symmetry: rings of more oscillators are rare, and one n-th of a cycle should be worth a mesh.
+_MOST = 60
+#: S^n is 1, and F(S u) is S F(u), up to this part of their size: entries like cos(2 pi / 3) are known to round-off. Ten times
+#: larger or smaller, the same matrices pass.
+_EQUAL = 1e-9
+#: Places at which the symmetry of a field is checked, from this seed, with states between -1 and 1.
+_PLACES, _SEED = 5, 7
+
+
+def symmetry_matrix(symmetry: Any, count: int) -> Array:
+    """Return the matrix of a symmetry that is given as a matrix or as its diagonal.
+
+    Raises
+    ------
+    ProblemError
+        It is neither, the identity, or of no order up to 60.
+    """
+    try:
+        given = np.array(symmetry, dtype=float)
+    except (TypeError, ValueError):
+        given = np.empty(0)
+    if given.shape not in ((count,), (count, count)) or not np.all(np.isfinite(given)):
+        raise ProblemError(f"symmetry: {checks.shown(symmetry)} must be {count} signs, or a matrix of {count} rows and columns")
+    matrix = np.diag(given) if given.ndim == 1 else given
+    if order_of(matrix) == 1:
+        raise ProblemError("symmetry: the identity is none; leave it out")
+    return matrix
+
+
+def order_of(matrix: Array) -> int:
+    """Return the smallest n with S^n = 1.
+
+    Raises
+    ------
+    ProblemError
+        There is none up to 60.
+    """
+    one, power = np.eye(len(matrix)), matrix
+    for order in range(1, _MOST + 1):
+        if np.abs(power - one).max(initial=0.0) <= _EQUAL:
+            return order
+        power = power @ matrix
+    raise ProblemError(f"symmetry: no power of the matrix up to {_MOST} is the identity")
+
+
+def check_equivariance(field: Function, matrix: Array, names: Sequence[str], parameters: Mapping[str, float]) -> None:
+    """Check F(S u) = S F(u) at some places, with the default parameters; where the field has no value nothing is checked.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if order_of(matrix) == 1:
+        return
+    of_state: Any = namedtuple("U", names)  # type: ignore[misc]  # noqa: PYI024
+    of_parameters: Any = namedtuple("P", tuple(parameters))  # type: ignore[misc]  # noqa: PYI024
+    p = of_parameters(**parameters)
+    for u in np.random.default_rng(_SEED).uniform(-1, 1, (_PLACES, len(names))):
+        try:
+            first, turned = (np.array(field(of_state(*map(float, v)), p), dtype=float) for v in (u, matrix @ u))
+        except (ArithmeticError, ValueError):
+            continue  # a root or logarithm of a negative number
+        gap = np.abs(turned - matrix @ first)
+        if np.any(gap > _EQUAL * (1 + np.abs(first).max())):
+            raise ProblemError(
+                f"symmetry: the field does not have it; the rate of {names[int(gap.argmax())]} at S u differs by "
+                f"{gap.max():.3g} from that of S F(u) for u = {', '.join(f'{value:.3g}' for value in u)}"
+            )
+
+
+def linear(name: str, row: Array) -> str:
+    """Return the text of the product of a row and the vector of a name."""
+    terms = [f"{name}[{j}]" if factor == 1 else f"{float(factor)!r} * {name}[{j}]" for j, factor in enumerate(row) if factor]
+    return "(" + " + ".join(terms) + ")" if len(terms) > 1 or terms[0][0] == "-" else terms[0]
+
+
+def averaged(function: Function, matrix: Array, names: Sequence[str], order: int) -> Function:
+    """Return the mean of a functional over u, S u, ..., S^(n-1) u, as a function of (t, u, p)."""
+    state: Any = namedtuple("State", tuple(names))  # type: ignore[misc]  # noqa: PYI024
+    powers = [np.linalg.matrix_power(matrix, k) for k in range(order)]
+    images = (f"function(State({''.join(linear('u', row) + ', ' for row in power)}), p)" for power in powers)
+    source = f"def mean(t, u, p):\n    return ({' + '.join(images)}) / {order}"
+    return generated("mean", source, {"function": function, "State": state})
