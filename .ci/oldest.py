@@ -1,6 +1,6 @@
 """``python .ci/oldest.py > oldest.txt``: constraints that select the oldest version of every dependency and extra.
 
-The versions are the lower bounds in pyproject.toml, so they stand in one place. ``pip install -c oldest.txt ".[test]"`` installs them.
+The versions are the lower bounds in pyproject.toml, so they stand in one place: ``pip install -c oldest.txt ".[test]"``.
 """
 
 import re
