@@ -34,6 +34,8 @@ from .stepping.settings import Settings
 from .stepping.state import State, Stop
 from .stepping.trial import Monitor, TestFunction, Trial
 
+__version__: str
+
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation",
     "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl",

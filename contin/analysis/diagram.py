@@ -82,8 +82,16 @@ class Diagram:
 
         Nodes are special points (attributes: label, name, parameters and functionals), shared where branches meet; edges are
         the pieces of branches between them (attributes: branch, points, parameter and functional columns).
+
+        Raises
+        ------
+        ImportError
+            networkx is not installed.
         """
-        import networkx
+        try:
+            import networkx
+        except ImportError as error:
+            raise ImportError("graph needs networkx, which is not installed: pip install networkx") from error
 
         graph = networkx.MultiGraph()
         for number, junction in enumerate(self.junctions):
