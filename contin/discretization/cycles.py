@@ -13,6 +13,7 @@ from contin import checks
 from contin.arrays import Array, ComplexArray, Indices
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
+from contin.discretization.extremes import extremes
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
@@ -33,8 +34,6 @@ _EQUAL, _KEPT = 1e-9, 50
 _ON_CIRCLE = 1e-12
 #: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
 _SHRUNK = 1e-7
-#: Parabolas through three places near the largest value of a state: the error falls with the sixth power of their distance.
-_PARABOLAS = 2
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
 _MOVED = 1e-6
 
@@ -69,26 +68,12 @@ class PeriodicCollocation(Collocation):
 
     def functionals(self, x: Array) -> Array:
         """Return the largest and smallest values of each state, and the means of the user's functionals."""
-        extremes = np.stack([self._largest(x, 1.0), -self._largest(x, -1.0)], axis=1).ravel()
+        found = extremes(self.degree, self.mesh, x, self._n)
+        if self.scales is not None:
+            found *= self.scales.states[:, None]
         own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
         means = super().functionals(x) if self.problem.means else np.empty(0)
-        return np.concatenate([extremes, own, means])
-
-    def _largest(self, x: Array, sign: float) -> Array:
-        """Return the largest values of the states times a sign, shape (n,)."""
-        parts = 4 * self.degree
-        t = (self.mesh[:-1, None] + self._h[:, None] * np.linspace(0, 1, parts, endpoint=False)).ravel()
-        values = sign * self.evaluate(x, t)
-        known = values.max(axis=0)
-        at, apart = t[values.argmax(axis=0)], np.repeat(self._h / parts, parts)[values.argmax(axis=0)]
-        for _ in range(_PARABOLAS):
-            near = np.concatenate([at - apart, at, at + apart]) % 1.0
-            before, here, behind = sign * np.diagonal(self.evaluate(x, near).reshape(3, at.size, -1), axis1=1, axis2=2)
-            bend = before - 2 * here + behind
-            move = np.where(bend < 0, (before - behind) / (2 * np.where(bend < 0, bend, 1.0)), 0.0)
-            at, apart = at + apart * np.clip(move, -1, 1), apart / 10
-        found: Array = np.maximum(sign * np.diagonal(self.evaluate(x, at % 1.0)), known)
-        return found
+        return np.concatenate([found.ravel(), own, means])
 
     # --- stability -----------------------------------------------------------------------------------------------
 
