@@ -118,7 +118,7 @@ def unstable(system: PeriodicCollocation, x: Array) -> int:
 
 def doubling() -> TestFunction:
     """Return the test function of period doublings: det(M + I), each factor divided by 1 + |multiplier|."""
-    return TestFunction("PD", "period doubling", _antiperiodic, search=_doublings, describe=_of_doubling)
+    return _DOUBLING
 
 
 def _antiperiodic(trial: Trial) -> float:
@@ -136,7 +136,7 @@ def _of_doubling(trial: Trial) -> dict[str, float]:
 
 def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the period doublings between places of a step, in order."""
-    test = doubling()
+    test = _DOUBLING
     known = [trial.value(test) for _, trial in knots]
     if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, _from_doubling):
         return []
@@ -150,6 +150,10 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     pieces = [(left, right) for left, right in itertools.pairwise(knots)
               if sign_changed(left[1].value(test), right[1].value(test))]  # fmt: skip
     return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
+
+
+#: One for all steps: a point that two steps share has its value once.
+_DOUBLING = TestFunction("PD", "period doubling", _antiperiodic, search=_doublings, describe=_of_doubling)
 
 
 def _comes_near(segment: Segment, distances: Callable[[list[complex]], list[float]]) -> bool:

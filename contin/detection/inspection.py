@@ -18,7 +18,7 @@ from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint
 from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
-from contin.detection.phase import in_phase
+from contin.detection.phase import in_phase, least_distance
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
 from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
@@ -57,10 +57,8 @@ _FEWEST = 3
 _SAME_WAY = 0.5
 #: ... and at a distance of this part of the step at most.
 _BACK = 0.1
-#: A first point inside a step is not further than so many steps from its end.
+#: A first point inside a step is not further than so many steps from its end, nor from both ends together.
 _REACH = 2
-#: Part of a norm that is its error on coarse meshes. Ten times larger, the first point is compared in more steps.
-_QUADRATURE = 1e-3
 #: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point.
 _SAME, _SAME_SHARE = 1e-4, 2e-3
 
@@ -307,16 +305,14 @@ class Inspection:
         return SpecialPoint(at, "EP", "closed", there, Stop("closed", "the branch closed on its first point"))
 
     def _is_elsewhere(self, home: Discretization, x: Array) -> bool:
-        """Return whether the first point is certainly not in this step: by its parameters, or by its norm.
+        """Return whether the first point is certainly not in this step: it is too far from both ends together.
 
-        No shift in time changes the norm. Without this each step would carry the first point to its mesh and bring it in phase.
+        Without this each step would carry the first point to its mesh and bring it in phase.
         """
-        system, end, reach = self.segment.trial.system, self.segment.trial.x, _REACH * self.segment.step
+        segment, system = self.segment, self.segment.trial.system
         if home.scales is not system.scales:
             return False
-        norm = np.sqrt(inner(home, x, x))
-        apart = abs(np.sqrt(inner(system, end, end)) - norm) - _QUADRATURE * norm
-        return bool(max(apart, np.max(np.abs(x[home.state_size :] - end[system.state_size :]))) > reach)
+        return sum(least_distance(system, end, home, x) for end in (segment.state.x, segment.trial.x)) > _REACH * segment.step
 
 
 def _same_place(point: SpecialPoint, found: list[SpecialPoint], step: float) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -277,7 +278,11 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         states = self.states(x)
         if not np.ptp(states, axis=0).any():
             raise ProblemError("guess: it is constant; a cycle needs a guess that goes round")
-        other = self._with()
+        return self._referring_to(states)
+
+    def _referring_to(self, states: Array) -> CycleCollocation:
+        """Return the same on the same mesh, with a reference given by its states at the nodes."""
+        other = copy.copy(self)
         other._set_reference(states)
         return other
 
@@ -288,7 +293,8 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
             states = self.states(x)
             if np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():
                 return None
-        other = self._with(mesh=self.mesh if mesh is None else mesh)
+            return self._referring_to(states), np.copy
+        other = self._with(mesh=mesh)
         other._set_reference(self._between(self.states(x), other.nodes))
         return other, self.carrier(other)
 

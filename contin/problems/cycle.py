@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -110,8 +111,11 @@ class CycleProblem(BoundaryValueProblem):
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:
-        """Return the cycles of the vector field whose equilibria a problem states."""
-        return cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
+        """Return the cycles of the vector field whose equilibria a problem states: one statement for each, with its functions."""
+        if problem not in _STATED:
+            found = cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
+            _STATED[problem] = found
+        return _STATED[problem]
 
     @property
     def multipliers(self) -> tuple[str, ...]:
@@ -144,6 +148,10 @@ class CycleProblem(BoundaryValueProblem):
             return super()._compiled(name)
         functions = [_of_time(f) if self.period is None else _of_forcing(f, self.period) for f in self.means.values()]
         return Batch(functions, [0] * len(functions), self.state_names, tuple(self.parameters))
+
+
+#: The cycles of vector fields that are still used: to state them anew would make their functions ready again.
+_STATED: weakref.WeakKeyDictionary[AlgebraicProblem, CycleProblem] = weakref.WeakKeyDictionary()
 
 
 def _period_function(period: Period, parameters: Mapping[str, float]) -> Function:
