@@ -9,9 +9,10 @@ stays on it, as in a conservative system, passes nothing.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +28,10 @@ from contin.stepping.trial import TestFunction, Trial, sign_changed
 
 #: Into how many parts a step is divided to look inside it, on the cubic.
 _PARTS = 4
+#: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens, ...
+_NEAR = 1.0
+#: ... or nearer than so many times its change over the step.
+_CHANGES = 3.0
 #: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
 #: to this part. Ten times smaller, two period doublings that nearly meet are passed.
 _DEEPER = 0.5
@@ -112,6 +117,7 @@ def unstable(system: PeriodicCollocation, x: Array) -> int:
     return int(np.count_nonzero(outside))
 
 
+@functools.cache  # one for all steps: a point that two steps share has its value once
 def doubling(order: int = 1) -> TestFunction:
     """Return the test function of period doublings: det(M + I), each factor divided by 1 + |multiplier|.
 
@@ -138,9 +144,12 @@ def _of_doubling(trial: Trial) -> dict[str, float]:
 def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the period doublings between places of a step, in order."""
     test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
+    known = [trial.value(test) for _, trial in knots]
+    if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, _from_doubling):
+        return []
     inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
-    values = [test.function(trial) for _, trial in looked]
+    values = [trial.value(test) for _, trial in looked]
     if not np.all(np.isfinite(values)) or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
         return []
     knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda place: place[0])
@@ -148,6 +157,45 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     pieces = [(left, right) for left, right in itertools.pairwise(knots)
               if sign_changed(left[1].value(test), right[1].value(test))]  # fmt: skip
     return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
+
+
+def _comes_near(segment: Segment, distances: Callable[[list[complex]], list[float]]) -> bool:
+    """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
+    ends = [_without_trivial(trial) for trial in (segment.before, segment.trial)]
+    for here, there in (ends, ends[::-1]):
+        for value, distance in zip(here, distances(here)):
+            if not distance > max(_NEAR, _CHANGES * min(abs(_difference(value, other)) for other in there)):
+                return True
+    return False
+
+
+def _without_trivial(trial: Trial) -> list[complex]:
+    """Return the logarithms of the multipliers of a cycle but for the one that is 1."""
+    system: Any = trial.system
+    values, trivial = system.eigenvalues(trial.x).tolist(), _trivial(system, trial.x)
+    return [value for place, value in enumerate(values) if place != trivial]
+
+
+def _difference(value: complex, other: complex) -> complex:
+    """Return the difference of two logarithms: angles are alike up to full turns."""
+    gap = value - other
+    return complex(gap.real, math.remainder(gap.imag, 2 * math.pi)) if math.isfinite(gap.real) else gap
+
+
+def _from_doubling(values: list[complex]) -> list[float]:
+    """Return how far each logarithm is from that of -1."""
+    return [abs(complex(value.real, math.pi - abs(value.imag))) for value in values]
+
+
+def _from_torus(values: list[complex]) -> list[float]:
+    """Return how far each logarithm is from that of a complex pair on the unit circle; real ones can meet, and form a pair."""
+    angles = [abs(value.imag) for value in values]
+    sizes = [abs(value.real) for value in values]
+    found = []
+    for place, (size, angle) in enumerate(zip(sizes, angles)):
+        partners = [sizes[other] for other in range(len(values)) if other != place and angles[other] == angle]
+        found.append(max(size, min(partners, default=math.inf)))
+    return found
 
 
 def _dips(places: list[Place], values: list[float]) -> list[tuple[float, float]]:
@@ -219,6 +267,9 @@ def torus() -> TestFunction:
 
 def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
+    same = unstable(segment.before.system, segment.before.x) == unstable(segment.trial.system, segment.trial.x)
+    if same and not _comes_near(segment, _from_torus):
+        return []
     return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
 
 

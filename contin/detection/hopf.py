@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import ComplexArray
+from contin.arrays import Array, ComplexArray, Indices
 from contin.detection.root import find_zero
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.errors import ConvergenceError
@@ -73,7 +73,7 @@ def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the Hopf points between places of a step, in order."""
     inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda knot: knot[0])
-    if any(len(_changes(left[1], right[1])[0]) for left, right in itertools.pairwise(looked)):
+    if any(_passes_as_pair(left[1], right[1]) for left, right in itertools.pairwise(looked)):
         knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda knot: knot[0])
     found: list[SpecialPoint] = []
     for left, right in itertools.pairwise(knots):
@@ -81,27 +81,41 @@ def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     return _joined(sorted(found, key=lambda point: point.at), segment)
 
 
+def _passes_as_pair(left: Trial, right: Trial) -> bool:
+    """Return whether an eigenvalue that is complex at one of two places changed the side of the imaginary axis."""
+    first, last = _changes(left, right)
+    return bool(np.any(_half_plane(first)) or np.any(_half_plane(last)))
+
+
 def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
     """Return the eigenvalues at both ends that changed the side of the imaginary axis."""
-    from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]  # takes .1 s; only equilibria need it
-
     system: Any = left.system
     first, last = system.eigenvalues(left.x), system.eigenvalues(right.x)
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(last))):
         return np.empty(0, complex), np.empty(0, complex)
-    ours, theirs = linear_sum_assignment(np.abs(first[:, None] - last))
-    first, last = first[ours], last[theirs]
+    last = last[_nearest_to_each(np.abs(first[:, None] - last))]
     changed = (first.real > 0) != (last.real > 0)
     upper = (first.imag > -_REAL * (1 + np.abs(first))) | (last.imag > -_REAL * (1 + np.abs(last)))
     return first[changed & upper], last[changed & upper]
 
 
+def _nearest_to_each(gaps: Array) -> Indices:
+    """Return the column that belongs to each row of a square matrix, so that the sum of these entries is the least."""
+    nearest = gaps.argmin(axis=1)
+    if len(set(nearest.tolist())) == len(nearest):
+        return nearest
+    from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]  # takes .1 s; most steps do without
+
+    columns: Indices = linear_sum_assignment(gaps)[1]
+    return columns
+
+
 def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
     """Return the Hopf points between two places."""
+    if not _passes_as_pair(left[1], right[1]):
+        return []
     first, last = _changes(left[1], right[1])
     one, other = _half_plane(first), _half_plane(last)
-    if not (np.any(one) or np.any(other)):
-        return []
     if np.all(one == other):
         located = [_located(segment, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
         found = [point for point in located if point is not None]

@@ -18,7 +18,7 @@ from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint
 from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
-from contin.detection.phase import in_phase
+from contin.detection.phase import in_phase, least_distance
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
 from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
@@ -57,6 +57,8 @@ _FEWEST = 3
 _SAME_WAY = 0.5
 #: ... and at a distance of this part of the step at most.
 _BACK = 0.1
+#: A first point inside a step is not further than so many steps from its end, nor from both ends together.
+_REACH = 2
 #: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point.
 _SAME, _SAME_SHARE = 1e-4, 2e-3
 
@@ -281,7 +283,7 @@ class Inspection:
         segment = self.segment
         state, trial, step = segment.state, segment.trial, segment.step
         home, x, tangent = self.start
-        if state.accepted < _FEWEST:
+        if state.accepted < _FEWEST or self._is_elsewhere(home, x):
             return None
         if home is not state.system:
             carry = home.carrier(state.system)
@@ -289,7 +291,7 @@ class Inspection:
             if home.scales is not state.system.scales:
                 tangent = tangent / np.sqrt(inner(state.system, tangent, tangent))
         size = state.system.state_size
-        if np.max(np.abs(x[size:] - trial.x[size:])) > 2 * step:
+        if np.max(np.abs(x[size:] - trial.x[size:])) > _REACH * step:
             return None
         first, (leaving,) = in_phase(state.system, x, (tangent,), trial.x)
         passed = [inner(state.system, end - first, leaving) for end in (state.x, trial.x)]
@@ -301,6 +303,16 @@ class Inspection:
             return None
         there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
         return SpecialPoint(at, "EP", "closed", there, Stop("closed", "the branch closed on its first point"))
+
+    def _is_elsewhere(self, home: Discretization, x: Array) -> bool:
+        """Return whether the first point is certainly not in this step: it is too far from both ends together.
+
+        Without this each step would carry the first point to its mesh and bring it in phase.
+        """
+        segment, system = self.segment, self.segment.trial.system
+        if home.scales is not system.scales:
+            return False
+        return sum(least_distance(system, end, home, x) for end in (segment.state.x, segment.trial.x)) > _REACH * segment.step
 
 
 def _same_place(point: SpecialPoint, found: list[SpecialPoint], step: float) -> bool:

@@ -18,6 +18,30 @@ _STEPS = 5
 
 
 @functools.singledispatch
+def least_distance(system: Discretization, x: Array, home: Discretization, reference: Array) -> float:
+    """Return a lower bound of the distance between a solution and another one, given by ``home``, for any shift in time."""
+    gaps = x[system.state_size :] - reference[home.state_size :]
+    return float(np.sqrt(gaps @ gaps))
+
+
+@least_distance.register
+def _between_cycles(system: CycleCollocation, x: Array, home: CycleCollocation, reference: Array) -> float:
+    """The distance of parameters, means, and norms of what is left: no shift changes them."""
+    gaps = _lasting(system, x) - _lasting(home, reference)
+    return float(np.sqrt(gaps @ gaps))
+
+
+def _lasting(system: CycleCollocation, x: Array) -> Array:
+    """Return free parameters, means of the states, and the norm of the cycle without its mean."""
+    size, n = system.state_size, len(system.problem.state_names)
+    states = x[:size].reshape(-1, n)
+    weights = system.weights[:size:n]
+    means = weights @ states
+    square = weights @ np.einsum("ka,ka->k", states, states) - means @ means
+    return np.concatenate([x[size:], means, [np.sqrt(max(square, 0.0))]])
+
+
+@functools.singledispatch
 def in_phase(system: Discretization, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
     """Return a solution and vectors at it as they are; an autonomous cycle shifted in time to lie closest to another one."""
     return x, list(vectors)

@@ -33,7 +33,7 @@ class Conditioned(Collocation):
 
     def residual(self, x: Array) -> Array:
         """Return the residual of the discrete equations at x, the further conditions last."""
-        return np.append(super().residual(x), self.condition_values(x))
+        return np.concatenate([super().residual(x), self.condition_values(x)])
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
@@ -42,9 +42,10 @@ class Conditioned(Collocation):
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
         values, own = self.conditions_with_rows(x)
-        own = np.hstack([own, columns[:, self._conditions :].T])
-        residual, blocks = self._blocks(x, np.vstack([own, rows]), np.ascontiguousarray(columns[:, : self._conditions]))
-        return np.append(residual, values), Factorization(self._layout, blocks)
+        if len(columns):
+            own = np.concatenate([own, columns[:, self._conditions :].T], axis=1)
+        residual, blocks = self._blocks(x, np.concatenate([own, rows]), np.ascontiguousarray(columns[:, : self._conditions]))
+        return np.concatenate([residual, values]), Factorization(self._layout, blocks)
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of the residual by any parameters, shape (equations, len(names))."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ from contin import checks
 from contin.arrays import Array, ComplexArray, Indices
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
+from contin.discretization.extremes import extremes
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
@@ -33,8 +35,6 @@ _EQUAL, _KEPT = 1e-9, 50
 _ON_CIRCLE = 1e-12
 #: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
 _SHRUNK = 1e-7
-#: Parabolas through three places near the largest value of a state: the error falls with the sixth power of their distance.
-_PARABOLAS = 2
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
 _MOVED = 1e-6
 
@@ -104,28 +104,22 @@ class PeriodicCollocation(Collocation):
 
     def functionals(self, x: Array) -> Array:
         """Return the largest and smallest values of each state, and the means of the user's functionals."""
-        extremes = np.stack([self._largest(x, 1.0), -self._largest(x, -1.0)], axis=1).ravel()
+        found = extremes(self.degree, *self._whole(x), self._n)
+        if self.scales is not None:
+            found *= self.scales.states[:, None]
         own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
         means = super().functionals(x) if self.problem.means else np.empty(0)
-        return np.concatenate([extremes, own, means])
+        return np.concatenate([found.ravel(), own, means])
 
-    def _largest(self, x: Array, sign: float) -> Array:
-        """Return the largest values of the states times a sign, shape (n,)."""
-        parts = 4 * self.degree
-        once = (self.mesh[:-1, None] + self._h[:, None] * np.linspace(0, 1, parts, endpoint=False)).ravel()
-        t = (np.arange(self.order)[:, None] + once).ravel()
-        values = sign * self.evaluate(x, t)
-        known = values.max(axis=0)
-        highest = values.argmax(axis=0)
-        at, apart = t[highest], np.repeat(self._h / parts, parts)[highest % once.size]
-        for _ in range(_PARABOLAS):
-            near = np.concatenate([at - apart, at, at + apart]) % self.order
-            before, here, behind = sign * np.diagonal(self.evaluate(x, near).reshape(3, at.size, -1), axis1=1, axis2=2)
-            bend = before - 2 * here + behind
-            move = np.where(bend < 0, (before - behind) / (2 * np.where(bend < 0, bend, 1.0)), 0.0)
-            at, apart = at + apart * np.clip(move, -1, 1), apart / 10
-        found: Array = np.maximum(sign * np.diagonal(self.evaluate(x, at % self.order)), known)
-        return found
+    def _whole(self, x: Array) -> tuple[Array, Array]:
+        """Return the mesh and the values at the nodes over the whole orbit, on the unit interval."""
+        if self.order == 1:
+            return self.mesh, x
+        states = x[: len(self.nodes) * self._n].reshape(-1, self._n)
+        parts = [states @ np.linalg.matrix_power(self.turn, k).T for k in range(self.order)]
+        values = np.concatenate([*(part[:-1] for part in parts), parts[-1][-1:]])
+        mesh = (np.arange(self.order)[:, None] + self.mesh[:-1]).ravel() / self.order
+        return np.append(mesh, 1.0), values.ravel()
 
     # --- stability -----------------------------------------------------------------------------------------------
 
@@ -342,7 +336,11 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         states = self.states(x)
         if not np.ptp(states, axis=0).any():
             raise ProblemError("guess: it is constant; a cycle needs a guess that goes round")
-        other = self._with()
+        return self._referring_to(states)
+
+    def _referring_to(self, states: Array) -> CycleCollocation:
+        """Return the same on the same mesh, with a reference given by its states at the nodes."""
+        other = copy.copy(self)
         other._set_reference(states)
         return other
 
@@ -353,7 +351,8 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
             states = self.states(x)
             if np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():
                 return None
-        other = self._with(mesh=self.mesh if mesh is None else mesh)
+            return self._referring_to(states), np.copy
+        other = self._with(mesh=mesh)
         other._set_reference(self._between(self.states(x), other.nodes))
         return other, self.carrier(other)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -123,8 +124,11 @@ class CycleProblem(BoundaryValueProblem):
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:
-        """Return the cycles of the vector field whose equilibria a problem states."""
-        return cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
+        """Return the cycles of the vector field whose equilibria a problem states, one statement for each."""
+        if problem not in _STATED:
+            found = cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
+            _STATED[problem] = found
+        return _STATED[problem]
 
     def doubled(self) -> CycleProblem:
         """Return the problem of cycles that close after twice the part computed here: with the symmetry S^2.
@@ -188,6 +192,10 @@ def _turn(symmetry: Any, forced: bool, count: int) -> Array:
     if forced:
         raise ProblemError("symmetry: must be left out where a period is given; only autonomous fields may have one")
     return symmetry_matrix(symmetry, count)
+
+
+#: The cycles of vector fields that are still used: to state them anew would make their functions ready again.
+_STATED: weakref.WeakKeyDictionary[AlgebraicProblem, CycleProblem] = weakref.WeakKeyDictionary()
 
 
 def _period_function(period: Period, parameters: Mapping[str, float]) -> Function:
