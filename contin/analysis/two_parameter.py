@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from contin import checks
+from contin.analysis.codimension_two import leaving
 from contin.arrays import Array
 from contin.continuation.cycle_starts import frequency_of
 from contin.continuation.run import follow
@@ -28,32 +30,37 @@ from contin.stepping.settings import Settings, settings_with
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          **options: Any) -> Branch:  # fmt: skip
+          kind: str | None = None, branch: int = 0, **options: Any) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters.
+
+    From a point of such a curve it goes on; at points of codimension two of equilibria (labels BT, GH, ZH, HH) ``kind`` takes
+    another curve that leaves there: ``start.curves`` lists them.
 
     Parameters
     ----------
     start : Point
         A fold (LP), branch point (BP), Hopf point of equilibria (HB), or a period doubling (PD) or torus bifurcation (TR) of
-        cycles, found on a branch.
+        cycles, found on a branch; or a point of a curve.
     second : str, optional
         The parameter that is free beside those of the branch.
     settings : Settings, optional
         Or any of its fields by name. Folds of the curve are with respect to ``primary`` (the second parameter by default).
     free : pair of str, optional
         Both parameters, in place of ``second``: the first takes the place of the one in which the start was found.
+    kind : str, optional
+        From a point of codimension two: ``"LP"``, ``"HB"``, ``"TR"`` or ``"homoclinic"``, as in `Point.curves`. Curves that
+        begin there (of cycles, of homoclinic orbits, and of Hopf points at BT) go one way; the first point of those of cycles
+        and of homoclinic orbits lies a little beside.
+    branch : int
+        With ``kind="TR"`` at a double Hopf point: 0 for the cycles of the pair on whose curve it was found, 1 for the other.
 
     Returns
     -------
     Branch
-        Points with labels LP (the curve turns) and, on curves of folds: CP (cusp), BP (fold meets a branch point) and, of
-        equilibria, BT (Bogdanov-Takens), ZH (zero-Hopf). On curves of Hopf points: GH (generalized Hopf: the first Lyapunov
-        coefficient is zero), ZH, HH (double Hopf), and BT, where the curve ends; columns ``frequency`` and ``lyapunov``. On
-        curves of period doublings: R2 (a second multiplier -1), GPD (the coefficient of the normal form is zero), LPPD
-        (fold-flip). On curves of torus bifurcations, with the column ``angle``: the strong resonances R3 and R4, and R1 and R2,
-        where the curve ends; CH (Chenciner: the coefficient is zero), LPTR (fold-torus). Both have the column ``normal_form``.
-        On curves of folds of cycles: R1, LPPD. Points of a curve of branch points carry their imperfection beta as the last
-        entry of x.
+        Points with labels LP (the curve turns) and those of codimension two: CP, BP, BT, GH, ZH and HH of equilibria, CP, GPD,
+        CH, R1 to R4, LPPD and LPTR of cycles; the page on cycles says what they mean. Columns: ``frequency`` and ``lyapunov`` on
+        curves of Hopf points, ``normal_form`` on those of period doublings and torus bifurcations, ``angle`` on the latter.
+        Points of a curve of branch points carry their imperfection beta as the last entry of x.
 
     Raises
     ------
@@ -72,10 +79,24 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     [('CP', True)]
     """
     checks.instance("start", start, Point, "a Point")
+    options.setdefault("branch_points", False)
+    if isinstance(start.system, Extended):
+        if second is not None or free is not None:
+            raise ProblemError("curve: second and free must not be given, as the start is a point of a curve with both")
+        options.setdefault("primary", start.system.free[-1])
+        return _from_curve(start, kind, branch, settings_with(settings, options))
+    if kind is not None:
+        raise ProblemError("kind: must not be given, as the start is no point of codimension two of a curve")
+    return _from_branch(start, second, free, settings, options)
+
+
+def _from_branch(
+    start: Point, second: str | None, free: Sequence[str] | None, settings: Settings | None, options: dict[str, Any]
+) -> Branch:
+    """Follow the curve of a special point of a branch."""
     system = system_of(start, "start")
     names = _free_parameters(start, system, second, free)
     options.setdefault("primary", names[-1])
-    options.setdefault("branch_points", False)
     settings = settings_with(settings, options)
     base, x = system.with_free(names, start.x)
     for kind in _KINDS:
@@ -83,6 +104,20 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         if found is not None:
             return follow(*found, settings)
     raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be one of {_STARTS}")
+
+
+def _from_curve(start: Point, kind: str | None, branch: int, settings: Settings) -> Branch:
+    """Follow the curve of a point further, or another one that leaves there. The first point has the label of the start."""
+    checks.instance("kind", kind, (str, type(None)), "a name")
+    checks.whole("branch", branch, 0, 1)
+    if kind is None:
+        return follow(start.system, start.x, settings)
+    system, x, tangent = leaving(start, kind, branch)
+    beside = tangent is not None and kind != "HB"
+    found = follow(system, x, settings, tangent, singular=False)
+    if not beside:
+        found.points[0] = dataclasses.replace(found.points[0], label=start.label, name=start.name)
+    return found
 
 
 def _free_parameters(start: Point, system: System, second: str | None, free: Sequence[str] | None) -> tuple[str, ...]:
