@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from contin import checks
+from contin.analysis.codimension_two import leaving
 from contin.arrays import Array
 from contin.continuation.cycle_starts import doubled, frequency_of, start_at
 from contin.continuation.run import follow
@@ -33,8 +35,11 @@ from contin.stepping.trial import TestFunction
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          event: TestFunction | None = None, **options: Any) -> Branch:  # fmt: skip
+          event: TestFunction | None = None, kind: str | None = None, branch: int = 0, **options: Any) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
+
+    From a point of such a curve, without a further parameter, it goes on; at points of codimension two of equilibria (labels
+    BT, GH, ZH, HH) ``kind`` takes another curve that leaves there: ``start.curves`` lists them.
 
     Parameters
     ----------
@@ -53,18 +58,21 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         Both parameters, in place of ``second``: the first takes the place of the one in which the start was found.
     event : TestFunction, optional
         The one that labelled the start, where that is one of yours (``test_functions``).
+    kind : str, optional
+        From a point of codimension two: ``"LP"``, ``"HB"``, ``"TR"`` or ``"homoclinic"``, as in `Point.curves`. Curves that
+        begin there (of cycles, of homoclinic orbits, and of Hopf points at BT) go one way; the first point of those of cycles
+        and of homoclinic orbits lies a little beside.
+    branch : int
+        With ``kind="TR"`` at a double Hopf point: 0 for the cycles of the pair on whose curve it was found, 1 for the other.
 
     Returns
     -------
     Branch
-        Points with labels LP (the curve turns) and, on curves of folds: CP (cusp), BP (fold meets a branch point) and, of
-        equilibria, BT (Bogdanov-Takens), ZH (zero-Hopf). On curves of Hopf points: GH (generalized Hopf: the first Lyapunov
-        coefficient is zero), ZH, HH (double Hopf), and BT, where the curve ends; columns ``frequency`` and ``lyapunov``. On
-        curves of period doublings: R2 (a second multiplier -1), GPD (the coefficient of the normal form is zero), LPPD
-        (fold-flip). On curves of torus bifurcations, with the column ``angle``: the strong resonances R3 and R4, and R1 and R2,
-        where the curve ends; CH (Chenciner: the coefficient is zero), LPTR (fold-torus). Both have the column ``normal_form``.
-        On curves of folds of cycles: R1, LPPD. On curves of extrema: EX, an extremum in one parameter more. Points of a curve
-        of branch points carry their imperfection beta as the last entry of x.
+        Points with labels LP (the curve turns) and those of codimension two: CP, BP, BT, GH, ZH and HH of equilibria, CP, GPD,
+        CH, R1 to R4, LPPD and LPTR of cycles; the page on cycles says what they mean. On curves of extrema: EX, an extremum in
+        one parameter more. Columns: ``frequency`` and ``lyapunov`` on curves of Hopf points, ``normal_form`` on those of period
+        doublings and torus bifurcations, ``angle`` on the latter. Points of a curve of branch points carry their imperfection
+        beta as the last entry of x.
 
     Raises
     ------
@@ -84,14 +92,33 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     """
     checks.instance("start", start, Point, "a Point")
     checks.instance("event", event, (TestFunction, type(None)), "a TestFunction")
+    checks.instance("kind", kind, (str, type(None)), "a name")
+    checks.whole("branch", branch, 0, 1)
+    options.setdefault("branch_points", False)
+    if isinstance(start.system, Extended) and second is None and free is None and event is None:
+        options.setdefault("primary", start.system.free[-1])
+        return _from_curve(start, kind, branch, settings_with(settings, options))
+    if kind is not None:
+        raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
     names = _free_parameters(start, second, free)
     options.setdefault("primary", names[-1])
-    options.setdefault("branch_points", False)
     base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
     found = _event(start, base, x, event) if event is not None else _first_of_curve(start, base, x)
     if found is None:
         raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be {_STARTS}")
     return follow(*found, settings_with(settings, options))
+
+
+def _from_curve(start: Point, kind: str | None, branch: int, settings: Settings) -> Branch:
+    """Follow the curve of a point further, or another one that leaves there. The first point has the label of the start."""
+    if kind is None:
+        return follow(start.system, start.x, settings)
+    system, x, tangent = leaving(start, kind, branch)
+    beside = tangent is not None and kind != "HB"
+    found = follow(system, x, settings, tangent, singular=False)
+    if not beside:
+        found.points[0] = dataclasses.replace(found.points[0], label=start.label, name=start.name)
+    return found
 
 
 def _free_parameters(start: Point, second: str | None, free: Sequence[str] | None) -> tuple[str, ...]:

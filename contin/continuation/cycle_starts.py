@@ -10,7 +10,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint, locate_branch_point
-from contin.detection.lyapunov import critical_pair
+from contin.detection.lyapunov import CriticalPair, critical_pair
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.kinds import discretized
@@ -36,17 +36,25 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
     system: Any = point.system
     if point.label != "HB" or not isinstance(system, Algebraic):
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
-    frequency, vector, _ = critical_pair(system.jacobian(point.x), frequency_of(point))
-    problem = CycleProblem.of(system.problem)
-    parameters = {**point.parameters, PERIOD: 2 * math.pi / frequency}
+    pair = critical_pair(system.jacobian(point.x), frequency_of(point))
+    cycles, x, tangent = small_cycle(system, point.x, pair, 0.0)
+    return cycles.with_reference(x + tangent), x, tangent
+
+
+def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) -> tuple[CycleCollocation, Array, Array]:
+    """Return the system of cycles beside a Hopf point x, the ellipse of this size as one, and the direction in which it grows.
+
+    The free parameters are those of ``system`` and, after the first, the period.
+    """
+    first, *others = system.free
+    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
+    parameters[PERIOD] = 2 * math.pi / pair.frequency
     mesh = np.linspace(0, 1, _INTERVALS + 1)
-    cycles = CycleCollocation(problem, mesh, _DEGREE, (system.free[0], PERIOD), parameters)
+    cycles = CycleCollocation(CycleProblem.of(system.problem), mesh, _DEGREE, (first, PERIOD, *others), parameters)
     wave = np.exp(2j * math.pi * cycles.nodes)[:, None]
-    ellipse = (wave * vector).real
-    rest = np.tile(system.states(point.x), (cycles.nodes.size, 1))
-    x = cycles.pack(rest, parameters)
-    tangent = cycles.pack(ellipse, dict.fromkeys(cycles.free, 0.0))
-    return cycles.with_reference(cycles.pack(rest + ellipse, parameters)), x, tangent
+    rest = cycles.pack(np.tile(system.states(x), (cycles.nodes.size, 1)), parameters)
+    tangent = cycles.pack((wave * pair.right).real, dict.fromkeys(cycles.free, 0.0))
+    return (cycles.with_reference(rest + size * tangent) if size else cycles), rest + size * tangent, tangent
 
 
 def frequency_of(point: Point) -> float | None:

@@ -93,6 +93,8 @@ class Continuation:
     settings : Settings
     tangent : ndarray, shape (size,), optional
         Where to go; needed when x is a branch point. Its sign is then kept.
+    singular : bool
+        With ``tangent``: x is a branch point.
     state : State, optional
         Continue from here instead (x and tangent are then not used).
     start : tuple (system, x, tangent), optional
@@ -122,13 +124,14 @@ class Continuation:
         tangent: Array | None = None,
         state: State | None = None,
         start: Start | None = None,
+        singular: bool = True,
     ) -> None:
         self.settings = settings
         self.stop: Stop | None = None
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         self._check(system)
         self.primary = settings.primary or system.free[0]
-        self.state = state or self._first(system, np.asarray(x, dtype=float), tangent)
+        self.state = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
         self._fold = fold(self.primary) if settings.folds else None
         self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
         self._at_start: dict[str, float] = {}
@@ -164,11 +167,12 @@ class Continuation:
 
     # --- the first point -----------------------------------------------------------------------------------------
 
-    def _first(self, system: Discretization, x: Array, tangent: Array | None) -> State:
+    def _first(self, system: Discretization, x: Array, tangent: Array | None, singular: bool) -> State:
         settings = self.settings
         if tangent is not None:
             unit = tangent / np.sqrt(inner(system, tangent, tangent))
-            return dataclasses.replace(standing_at(system, x, unit, settings.step), singular=True)
+            state = dataclasses.replace(standing_at(system, x, unit, settings.step), singular=singular)
+            return state if singular else dataclasses.replace(state, sign=system.linearize(x, (state.row,))[1].sign)
         for _ in range(_ROUNDS):
             x, row = self._first_correction(system, x)
             adapted = system.adapted(x, settings.mesh)
@@ -518,8 +522,10 @@ def follow_until_interrupted(
     return branch
 
 
-def follow(system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None) -> Branch:
+def follow(
+    system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None, singular: bool = True
+) -> Branch:
     """Run to the end and return the branch: `Continuation` as one call."""
-    run = Continuation(system, x, settings, tangent)
+    run = Continuation(system, x, settings, tangent, singular=singular)
     points = list(run)
     return Branch(points, run.stop, run.notes)

@@ -30,6 +30,8 @@ class BranchPointCurve(Extended):
         With one free parameter more than a curve of solutions needs: the last one is the second parameter.
     """
 
+    kind = "BP"
+
     def __init__(self, base: System, borders: Borders | None = None) -> None:
         super().__init__(base, borders)
         self.size = base.size + 1

@@ -106,7 +106,7 @@ class CycleCurve(CriticalCurve):
 class DoublingCurve(CycleCurve):
     """Period doublings: the multiplier -1; the column ``normal_form`` is its coefficient c."""
 
-    copies = 1
+    kind, copies = "PD", 1
 
     def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
         super().__init__(base, borders, size, ("normal_form",))
@@ -131,7 +131,7 @@ class DoublingCurve(CycleCurve):
 class TorusCurve(CycleCurve):
     """Torus bifurcations: the multipliers exp(-+ i theta); columns ``normal_form``, Re d, and ``angle``, theta."""
 
-    copies = 2
+    kind, copies = "TR", 2
 
     def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
         super().__init__(base, borders, size, ("normal_form", "angle"))

@@ -47,6 +47,9 @@ class Extended(Discretization):
         The problem has a column of such a name.
     """
 
+    #: The label of the special points that the curve consists of.
+    kind = ""
+
     def __init__(self, base: System, borders: Borders | None, columns: Sequence[str] = ()) -> None:
         for name in columns:
             if name in base.problem.parameters or name in base.problem.functionals:

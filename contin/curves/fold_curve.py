@@ -49,6 +49,8 @@ class FoldCurve(Extended):
         With one free parameter more than a curve of solutions needs: the first is the one of the folds.
     """
 
+    kind = "LP"
+
     def __init__(self, base: System, borders: Borders | None = None) -> None:
         super().__init__(base, borders)
         self.equations = base.equations + 1

@@ -29,7 +29,7 @@ _NO_FREQUENCY = 1e-10
 class HopfCurve(CriticalCurve):
     """Hopf points of an `Algebraic` system made by `as_field`; columns ``frequency`` and ``lyapunov`` (l1)."""
 
-    copies = 2
+    kind, copies = "HB", 2
 
     def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
         super().__init__(base, borders, size, ("frequency", "lyapunov"))

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from contin.arrays import Array
+from contin.curves.extended import Extended
 from contin.detection.floquet import Floquet, floquet
 from contin.detection.second_variation import SecondVariation, index_of, second_variation
+from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
@@ -16,6 +18,8 @@ from contin.errors import ProblemError
 from contin.results import portrait
 from contin.stepping.trial import Trial
 
+#: Kinds of curves in two parameters that begin at, or pass, points of codimension two of equilibria.
+_LEAVING = {"BT": ("LP", "HB", "homoclinic"), "GH": ("LP",), "ZH": ("LP", "HB", "TR"), "HH": ("HB", "TR")}
 #: So many columns stand in the representation of a point.
 _SHOWN = 8
 
@@ -116,6 +120,18 @@ class Point:
         which is zero at a cusp. Its estimated error is ``details["normal_form_error"]``.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
+
+    @property
+    def curves(self) -> tuple[str, ...]:
+        """Kinds of curves that leave from a point of codimension two of equilibria, for ``contin.curve(point, kind=...)``.
+
+        ``"LP"`` (of equilibria, at a generalized Hopf point of cycles), ``"HB"`` (at a double Hopf point of the other pair),
+        ``"TR"`` (of cycles) and ``"homoclinic"``; the one on which the point was found is not among them.
+        """
+        if not isinstance(self.system, Extended) or not isinstance(self.system.base, Algebraic):
+            return ()
+        own = self.system.kind if self.label != "HH" else ""
+        return tuple(kind for kind in _LEAVING.get(self.label, ()) if kind != own)
 
     def plot(self, what: str | None = None, states: Sequence[str] | None = None, axes: Any = None) -> Any:
         """Draw the solution: its phase portrait, its states over time and, of a cycle, its Floquet multipliers.
