@@ -86,19 +86,9 @@ def fold_curve() -> tuple[np.ndarray, tuple[float, float]]:
     fold = branch.labelled("LP")[0]
     limits = {"Gamma": (4.0, 2000.0), "M2": (1e-3, 50.0)}
     up, down = (curve(fold, "Gamma", direction=sense, limits=limits, zeros={"Gamma": CHECKED[1:]}) for sense in (1, -1))
-    (meets,) = down.labelled("BP")
-    kept = [point for point in down.points[: down.points.index(meets)] if point.label != "CP"]
-    fold = np.array([(point["Gamma"], point["kappa_n"]) for point in [*reversed(kept), *up.points[1:]]])
-    birth = _born(fold)
-    return np.vstack([birth, fold]), birth
-
-
-def _born(fold: np.ndarray) -> tuple[float, float]:
-    """Where the curve of folds touches that of thresholds: Gamma is smooth in the root of their distance, the amplitude."""
-    distance = np.array([kappa_n - threshold(1, 2, Gamma) for Gamma, kappa_n in fold])
-    near = np.flatnonzero((distance > 1e-6) & (distance < 0.1))[:5]
-    Gamma = float(np.polyfit(np.sqrt(distance[near]), fold[near, 0], len(near) - 1)[-1])
-    return Gamma, threshold(1, 2, Gamma)
+    (birth,) = down.labelled("BP")  # the last point
+    fold = np.array([(point["Gamma"], point["kappa_n"]) for point in [*reversed(down.points), *up.points[1:]]])
+    return fold, (birth["Gamma"], birth["kappa_n"])
 
 
 # --- pictures ---------------------------------------------------------------------------------------------------------

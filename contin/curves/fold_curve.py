@@ -13,6 +13,7 @@ is the change of F_y^T w along v.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,11 +22,14 @@ import numpy as np
 from contin.arrays import Array
 from contin.curves.critical_curve import other_pairs, signed_smallest
 from contin.curves.extended import FITS, Borders, Extended, cosine
+from contin.detection.interpolated import interpolated_zero
+from contin.detection.segment import Segment, SpecialPoint
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
+from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
 
 #: Length of a central difference of Jacobians along v, as its largest component: the cube root of round-off, where the error of
@@ -36,6 +40,11 @@ _DIFFERENCE = 1e-5
 _SHRUNK = 0.1
 #: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
 _REAL = 1e-12
+#: w.F_mu is interpolated to the zero of w.F_lambda only where its first estimate there is below this part of its values at the
+#: ends of the step; the location decides. Ten times smaller, long steps miss the zero.
+_SMALL = 0.3
+#: Parameters turn at a point where their part of the unit tangent is below this: interpolated tangents are better known.
+_TURNS = 1e-4
 #: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
 _ROUNDS = 3
 
@@ -120,17 +129,52 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
         v, w, _ = system.null_vectors(trial.x)
         return float(system.gradient(trial.x, v, w) @ v)
 
-    def crossing(trial: Trial) -> float:
-        system: Any = trial.system
-        _, w, _ = system.null_vectors(trial.x)
-        return float(system.base.transposed_product(trial.x, w)[system.base.state_size])
-
-    found = [TestFunction("CP", "cusp", cusp), TestFunction("BP", "fold meets a branch point", crossing)]
+    found = [
+        TestFunction("CP", "cusp", cusp, search=lambda segment, _: None if _singular_point(segment) is None else []),
+        TestFunction("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment)),
+    ]
     if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
         found += _of_equilibria()
     if isinstance(system.base, CycleCollocation):
         found += _of_cycles()
     return found
+
+
+def _by_first(trial: Trial) -> float:
+    """Return w.F_lambda of the parameter of the folds."""
+    system: Any = trial.system
+    _, w, _ = system.null_vectors(trial.x)
+    return float(system.base.transposed_product(trial.x, w)[system.base.state_size])
+
+
+def _by_last(trial: Trial) -> float:
+    """Return w.F_mu of the second parameter."""
+    system: Any = trial.system
+    _, w, _ = system.null_vectors(trial.x)
+    return float(system.base.transposed_product(trial.x, w)[-1])
+
+
+@functools.lru_cache(maxsize=1)
+def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
+    """Return the point inside a step where both w.F_lambda and w.F_mu vanish, in a list; None where there is none.
+
+    The extended system is singular there. At a pitchfork the curve turns back as its mirror image, so that the run ends; at a
+    transcritical bifurcation it goes on.
+    """
+    a, b = (_by_first(trial) for trial in (segment.before, segment.trial))
+    if not a * b < 0:
+        return None
+    near = segment.low + (segment.step - segment.low) * a / (a - b)
+    largest = max(abs(_by_last(trial)) for trial in (segment.before, segment.trial))
+    if abs(_by_last(segment.guessed(near))) > _SMALL * largest:
+        return None
+    found = interpolated_zero(segment, (_by_first, _by_last), near)
+    if found is None:
+        return None
+    system, name = segment.state.system, "fold meets a branch point"
+    turns = np.abs(found.trial.tangent[[system.state_size, system.size - 1]]).max() < _TURNS
+    stop = Stop("pitchfork", "the folds end on a pitchfork: beyond it the curve is its own mirror image") if turns else None
+    return [SpecialPoint(found.at, "BP", name, found.trial, stop, found, TestFunction("BP", name, _by_first))]
 
 
 def shrinking() -> TestFunction:

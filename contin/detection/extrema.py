@@ -87,15 +87,14 @@ class Stationarity:
     def orthonormal(self) -> Array:
         """Return an orthonormal basis of the tangents, shape (j, size), in the inner product of the system."""
         root = np.sqrt(self._system.weights)
-        basis: Array = np.linalg.qr((self.kernel * root).T)[0].T / root
+        basis: Array = np.asarray(np.linalg.qr((self.kernel * root).T)[0].T / root, dtype=float)
         return basis
 
     def curvatures(self) -> Array:
         """Return the eigenvalues of the second derivatives on orthonormal tangents, shape (j,)."""
         change = np.linalg.lstsq(self.kernel.T, self.orthonormal().T)[0]
         hessian = change.T @ (self.gradients() @ self.kernel.T) @ change
-        values: Array = np.linalg.eigvalsh(np.asarray(hessian + hessian.T, dtype=float) / 2)
-        return values
+        return np.asarray(np.linalg.eigvalsh((hessian + hessian.T) / 2), dtype=float)
 
 
 def gradient_of(system: System, x: Array, column: str) -> Array:

@@ -171,8 +171,9 @@ class Inspection:
     def _zeros(self, test: TestFunction, crossings: list[SpecialPoint]) -> list[SpecialPoint]:
         """Return the zeros of a test function, looked for between the folds. At a fold or branch point they lie right there."""
         if test.search is not None:
-            points: list[SpecialPoint] = test.search(self.segment, self._knots())
-            return points
+            points: list[SpecialPoint] | None = test.search(self.segment, self._knots())
+            if points is not None:
+                return points
         state = self.segment.state
         same = [point for point in (*self._folds, *crossings) if self._coincides(test, point)]
         found = [self._at_special(test, point) for point in same]

@@ -9,6 +9,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint, locate_branch_point
+from contin.detection.interpolated import InterpolatedZero
 from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
 from contin.detection.segment import SpecialPoint
 from contin.discretization.protocol import Carrier, Discretization, inner
@@ -97,6 +98,9 @@ def _again(
         again = locate_multiple_point(system, carry(trial.x), home, details.dimension, newton)
         assert again.x is not None
         return Trial(system, again.x, Linearization(carry(trial.tangent), np.nan)), again
+    if isinstance(details, InterpolatedZero):
+        zero = details.again(system, carry, newton)
+        return zero.trial, zero
     if isinstance(details, BranchPoint) or (point.label == "BP" and point.test is None):
         found = _branch_point_again(system, carry, trial.x, details, newton)
         return Trial(system, found.x, Linearization(carry(trial.tangent), np.nan)), found

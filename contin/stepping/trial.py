@@ -168,7 +168,7 @@ class TestFunction:
         The run must not go where the function is positive: a start on the limit, too, is left inwards only.
     search : callable, optional
         ``search(segment, places)`` returns the special points between places of a step (`contin.detection.segment`), where a
-        sign does not tell them all.
+        sign does not tell them all; None where it does.
     looks : int
         Number of places inside a step where the sign is looked at, too: two zeros in one step leave it as it was at the ends.
     unless : str

@@ -78,6 +78,42 @@ def test_fold_meets_a_branch_point():
         assert point["mu"] ** 2 + point["lam"] == pytest.approx(0, abs=1e-10)
 
 
+def test_a_curve_of_folds_ends_at_a_pitchfork():
+    """x (mu + a x^2 - x^4) = 0: folds at a = 2 x^2, mu = -x^4. At x = 0 the extended system is singular."""
+    problem = AlgebraicProblem(lambda u, p: (u.x * (p.mu + p.a * u.x**2 - u.x**4),), ["x"], {"mu": 0.0, "a": 1.0})
+    fold = trace(solve(problem, [1.0]), free=["mu"], direction=-1, limits={"mu": (-3, 3)}).labelled("LP")[0]
+    found = curve(fold, "a", direction=-1, limits={"a": (-2, 2)})
+    assert [point.label for point in found if point.label] == ["EP", "BP"]
+    assert "beyond it the curve is its own mirror image" in found.stop.message
+    end = found.points[-1]
+    assert (end["a"], end["mu"], end.x[0]) == pytest.approx((0, 0, 0), abs=1e-12)
+
+
+def test_a_curve_of_folds_ends_at_the_pitchfork_of_a_boundary_value_problem():
+    """u'' + lam (u + c u^3 - u^5) = 0 with u = 0 at both ends branches off u = 0 at pi^2, downwards where c > 0."""
+    problem = BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.lam * (u.u + p.c * u.u**3 - u.u**5)), lambda a, b, p: (a.u, b.u), ["u", "v"],
+        {"lam": 5.0, "c": 1.0}, functionals={"size": lambda t, u, p: u.u**2},
+    )  # fmt: skip
+    buckling = trace(solve(problem, [0, 0]), free=["lam"], limits={"lam": (5, 12)}).labelled("BP")[0]
+    fold = trace(buckling, branch=1, limits={"lam": (1, 30), "size": (-1, 4)}).labelled("LP")[0]
+    runs = [curve(fold, "c", direction=sense, limits={"c": (-2, 2)}) for sense in (1, -1)]
+    (end,) = [point for run in runs for point in run.labelled("BP")]
+    assert end["lam"] == pytest.approx(math.pi**2, abs=1e-11)
+    assert abs(end["c"]) < 1e-10
+    assert abs(end["c"]) < 10 * end.errors["c"] < 1e-9
+
+
+def test_a_curve_of_folds_goes_through_a_transcritical_bifurcation():
+    """x (mu + a x - x^2) = 0: folds at mu = -x^2, a = 2 x; at x = 0 the extended system is singular."""
+    problem = AlgebraicProblem(lambda u, p: (u.x * (p.mu + p.a * u.x - u.x**2),), ["x"], {"mu": 1.0, "a": 1.0})
+    fold = trace(solve(problem, [1.5]), free=["mu"], direction=-1, limits={"mu": (-3, 3)}).labelled("LP")[0]
+    found = curve(fold, "a", direction=-1, limits={"a": (-2, 2)})
+    (meeting,) = found.labelled("BP")
+    assert (meeting["a"], meeting["mu"], meeting.x[0]) == pytest.approx((0, 0, 0), abs=1e-12)
+    assert found.points[-1]["a"] == pytest.approx(-2, abs=1e-12)
+
+
 def test_borders_follow_a_curve_of_folds_that_turns_fast():
     """Stale borders make test functions jump: "possible" special points where nothing happens."""
     fold = opt.circle().labelled("LP")[0]
