@@ -18,11 +18,13 @@ Functions are replaced where a `Rewriter` meets them (`ComplexStep`), operators 
 from __future__ import annotations
 
 import math
+import types
 from typing import Any
 
 import numpy as np
 
 from contin.arrays import Function
+from contin.errors import CompilationError
 from contin.functions.rewriting import Rewriter
 
 
@@ -117,6 +119,8 @@ _OF_NUMPY: dict[Any, Function] = {getattr(math, name): getattr(np, name) for nam
 _OF_NUMPY |= {getattr(math, name): function for name, function in _OTHER_NAMES.items()}
 
 
+#: Why a function with complex numbers is not compiled.
+_OWN_COMPLEX = "it computes with complex numbers, which compiled code needs for derivatives"
 #: Functions that make an array of a shape, and of the shape of another one; ``full`` has a value, too.
 MAKERS: tuple[Any, ...] = (np.zeros, np.empty, np.ones, np.full)
 MAKERS_LIKE: tuple[Any, ...] = (np.zeros_like, np.empty_like, np.ones_like, np.full_like)
@@ -136,7 +140,22 @@ def makers(kind: type) -> dict[Any, Function]:
 
 
 class ComplexStep(Rewriter):
-    """Rewrite functions for the complex step."""
+    """Rewrite functions for the complex step.
+
+    A function that computes with complex numbers of its own is refused: their real parts, conjugates and absolute values are
+    not analytic, and both values and derivatives would be wrong.
+    """
+
+    def _names(self, code: types.CodeType) -> tuple[set[str], set[str]]:
+        attributes, loaded = super()._names(code)
+        if "complex" in loaded or any(isinstance(constant, complex) for constant in code.co_consts):
+            raise CompilationError(_OWN_COMPLEX)
+        return attributes, loaded
+
+    def _value(self, value: Any, attributes: set[str]) -> object:
+        if isinstance(value, (complex, np.complexfloating)) or (isinstance(value, np.ndarray) and value.dtype.kind == "c"):
+            raise CompilationError(_OWN_COMPLEX)
+        return super()._value(value, attributes)
 
     def stand_in(self, value: Any) -> Any:
         """Return the function that takes the place of one that is not analytic; None for all other values."""

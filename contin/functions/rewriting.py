@@ -12,8 +12,6 @@ import dis
 import types
 from typing import Any
 
-import numpy as np
-
 from contin import checks
 from contin.arrays import Function
 from contin.errors import CompilationError
@@ -199,10 +197,9 @@ def _is_object(value: Any) -> bool:
     """Return whether a value is an object of a user's class, whose attributes may be constants of a problem."""
     if type(value).__module__.partition(".")[0] in ("numpy", "scipy"):
         return False
-    written = bool(type(value).__flags__ & _HEAP_TYPE) and not isinstance(
-        value, (tuple, list, dict, type, np.generic, np.ndarray)
-    )
-    return isinstance(value, types.SimpleNamespace) or (written and not callable(value))
+    if isinstance(value, (tuple, list, dict, type)) or callable(value):
+        return False
+    return isinstance(value, types.SimpleNamespace) or bool(type(value).__flags__ & _HEAP_TYPE)
 
 
 #: The flag of classes that a class statement made (CPython: Py_TPFLAGS_HEAPTYPE).
