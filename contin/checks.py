@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,17 @@ from contin.names import exact_text
 
 #: Characters of a value that a message shows: with the rest of the sentence it fits on one line.
 _SHOWN = 60
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names as a message shows them: the first of many."""
+    found = list(names)
+    more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
+    return ", ".join(found[:_LISTED]) + more
+
+
+#: So many names stand in a message. Ten times more would hide what the message says.
+_LISTED = 20
 
 
 def shown(value: object) -> str:

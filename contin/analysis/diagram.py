@@ -186,7 +186,7 @@ class _Explorer:
 
     def _run(self, system: Discretization, x: Array, settings: Settings, tangent: Array | None = None) -> Continuation:
         """Return a run; settings that name columns of the other kind of branch (equilibria, cycles) do not count."""
-        known = (*system.problem.parameters, *system.problem.functionals)
+        known = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
         limits, zeros = ({name: given[name] for name in given if name in known} for given in (settings.limits, settings.zeros))
         return Continuation(system, x, dataclasses.replace(settings, limits=limits, zeros=zeros), tangent)
 
@@ -358,9 +358,11 @@ def diagram(
 def _check_columns(problem: Any, settings: Settings) -> None:
     """Require that limits and zeros name columns of the problem or, of equilibria, of the cycles that begin there."""
     known = [*problem.parameters, *problem.functionals]
+    if isinstance(problem, AlgebraicProblem):
+        known += problem.state_names
     if isinstance(problem, AlgebraicProblem) and problem.dynamics:
         cycles = CycleProblem.of(problem)
         known += [name for name in (*cycles.parameters, *cycles.functionals) if name not in known]
     for name in (*settings.limits, *settings.zeros):
         if name not in known:
-            raise ProblemError(f"{name!r} is neither a parameter nor a functional ({', '.join(known)})")
+            raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)})")

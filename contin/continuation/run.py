@@ -19,7 +19,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from contin import threads
+from contin import checks, threads
 from contin.arrays import Array
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.extrema import extremum
@@ -153,11 +153,11 @@ class Continuation:
         primary = self.settings.primary
         if primary is not None and primary not in system.free:
             raise ProblemError(f"primary: {primary!r} is not one of the free parameters {', '.join(system.free)}")
-        known = (*system.problem.parameters, *system.problem.functionals)
+        known = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
         trivial = () if self.settings.trivial is None else (self.settings.trivial,)
         for name in (*self.settings.limits, *self.settings.zeros, *self.settings.extrema, *trivial):
             if name not in known:
-                raise ProblemError(f"{name!r} is neither a parameter nor a functional ({', '.join(known)})")
+                raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)})")
 
     def _general_test_functions(self) -> list[TestFunction]:
         """Return those of the settings."""

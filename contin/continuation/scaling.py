@@ -88,8 +88,9 @@ def _with_faint(system: System, x: Array, size: Array, free: Array) -> tuple[Arr
     faint = size <= _FAINT * size.max()
     if not faint.any() and free.all():
         return size, free
-    states = x[: system.state_size].reshape(-1, len(size)) * ~faint
-    z, known = np.concatenate([states.ravel(), x[system.state_size :]]), np.concatenate([np.where(faint, 0.0, size), free])
+    states, values = x[: system.state_size].reshape(-1, len(size)) * ~faint, x[system.state_size :]
+    aside = np.where(values == 0, free, values)  # a load that enters as its square shows nothing where it is zero
+    z, known = np.concatenate([states.ravel(), aside]), np.concatenate([np.where(faint, 0.0, size), free])
     found = _balanced(system, z, known)
     balanced = found[: len(size)]
     if not np.any(known[: len(size)]):

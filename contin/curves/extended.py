@@ -74,6 +74,11 @@ class Extended(Discretization):
         """Nodes of the underlying system."""
         return self.base.nodes
 
+    @property
+    def named_states(self) -> tuple[str, ...]:
+        """Names of the states that are columns of the underlying system."""
+        return self.base.named_states
+
     def states(self, x: Array) -> Array:
         """Return the states of the underlying system."""
         return self.base.states(x[: self.base.size])

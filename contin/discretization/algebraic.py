@@ -53,6 +53,11 @@ class Algebraic(System):
         """One place, shape (1,)."""
         return _NO_TIME
 
+    @property
+    def named_states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return self.problem.state_names
+
     def states(self, x: Array) -> Array:
         """Return the states, shape (1, n)."""
         states = x[: self.state_size].reshape(1, -1)

@@ -70,6 +70,11 @@ class Discretization(Equations, Protocol):
     def nodes(self) -> Array:
         """Values of t at the nodes, where the states are given; shape (K,)."""
 
+    @property
+    def named_states(self) -> tuple[str, ...]:
+        """Names of the states that are columns: those that are numbers, no functions of t."""
+        return ()
+
     @abstractmethod
     def states(self, x: Array) -> Array:
         """Return the states at the nodes, shape (K, n)."""

@@ -22,24 +22,48 @@ from numba.extending import overload
 
 from contin.arrays import Function
 from contin.errors import CompilationError
-from contin.functions.complex_step import REPLACED, ComplexStep
+from contin.functions.array_makers import ARRAYS, COMPLEX, REAL
+from contin.functions.complex_step import REPLACED, ComplexStep, stand_in_of
 from contin.functions.kernel import Kernel
 from contin.functions.pointwise import parts, searches
+from contin.functions.signature import argument_count
 
 #: Starts of messages of numba that say what is wrong with a user's function; the lines before them are about numba itself.
 _REASONS = ("No implementation", "Untyped", "Unknown", "Invalid")
 
 
 class _Compiled(ComplexStep):
-    """Rewrite functions for the complex step, and let numba compile them."""
+    """Rewrite functions for numbers of one kind, real or for the complex step, and let numba compile them."""
+
+    def __init__(self, kind: str) -> None:
+        super().__init__()
+        self.flavour = kind
 
     def finished(self, copy: python_types.FunctionType) -> Any:
         """Return the function as compiled code calls it, with operators replaced."""
         inside: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # only compiled code calls it
         return numba.njit(copy, error_model="numpy", pipeline_class=AnalyticCompiler, **inside)
 
+    def finished_method(self, copy: python_types.FunctionType, owner: python_types.ModuleType) -> Any:
+        """Return a function that calls the method with a number in place of its object, which the compiler replaces."""
+        copy.__dict__["contin_owner"] = owner
+        names = [f"a{i}" for i in range(argument_count(copy) - 1)]
+        method = f"def {copy.__name__}_of({', '.join(names)}):\n    return method({', '.join(['0', *names])})"
+        scope: dict[str, Any] = {"method": self.finished(copy), "__name__": __name__}
+        exec(method, scope)
+        return self.finished(scope[copy.__name__ + "_of"])
+
+    def finished_dictionary(self, copy: dict[str, Any]) -> Any:
+        """Return a module with the entries: the compiler replaces ``values["a"]`` by ``values.a``."""
+        module = python_types.ModuleType("dictionary")
+        module.__dict__.update(copy)
+        return module
+
     def stand_in(self, value: Any) -> Any:
         """Return the stand-in as compiled code calls it."""
+        arrays = stand_in_of(value, ARRAYS[self.flavour])
+        if arrays is not None:
+            return arrays
         found = super().stand_in(value)
         return numba.njit(_with_helpers(found)) if found in REPLACED.values() else found
 
@@ -60,11 +84,13 @@ def compile_batch(kernel: Kernel, functions: Sequence[Function]) -> Any:
     CompilationError
         The message says which function cannot be compiled, and why.
     """
-    rewriter = _Compiled()
-    compiled = {f"function{i}": rewriter.function(parts(function)[0]) for i, function in enumerate(functions)}
-    compiled |= {f"solve{k}": rewriter.function(solve) for k, solve in enumerate(searches(functions))}
-    kernel.function.__globals__.update(compiled)
     try:
+        for name, kind in (("function", REAL), ("step", COMPLEX)):
+            rewriter = _Compiled(kind)
+            compiled = {f"{name}{i}": rewriter.function(parts(function)[0]) for i, function in enumerate(functions)}
+            if kind == REAL:
+                compiled |= {f"solve{k}": rewriter.function(solve) for k, solve in enumerate(searches(functions))}
+            kernel.function.__globals__.update(compiled)
         return kernel.compiled
     except Exception as error:  # besides its own exceptions, numba lets others through where it meets what it does not expect
         names = " and ".join(function.__name__ for function in functions)
@@ -233,6 +259,76 @@ _STAND_INS = {
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
+class _UsePlainForms(FunctionPass):
+    """Replace what numba does not know by what it knows.
+
+    ========================================  ==========================================
+    ``values["a"]``                           ``values.a``
+    ``np.concatenate([u, v])`` and alike      ``np.concatenate((u, v))``
+    the first argument of a method            a module with the attributes of its object
+    ========================================  ==========================================
+    """
+
+    _name = "contin_use_plain_forms"
+
+    def __init__(self):
+        FunctionPass.__init__(self)
+
+    def run_pass(self, state):
+        code, owner, changed = state.func_ir, getattr(state.func_id.func, "contin_owner", None), False
+        lists = _joined_lists(code)
+        for block in code.blocks.values():
+            for statement in block.body:
+                value: Any = getattr(statement, "value", None)
+                if not isinstance(statement, ir.Assign):
+                    continue
+                if owner is not None and isinstance(value, ir.Arg) and value.index == 0:
+                    statement.value = ir.Global("owner", owner, value.loc)
+                elif isinstance(value, ir.Expr) and value.op == "getitem" and _defined(code, value.index, ir.Const, str):
+                    name = code.get_definition(value.index).value
+                    statement.value = ir.Expr.getattr(value.value, name, value.loc)
+                elif statement.target.name in lists:
+                    statement.value = ir.Expr.build_tuple(value.items, value.loc)
+                else:
+                    continue
+                changed = True
+        if changed:
+            code._definitions = build_definitions(code.blocks)
+        return changed
+
+
+def _defined(code, variable, kind, of):
+    """Return whether a variable has one definition, of this kind and with a value of this type."""
+    try:
+        found = code.get_definition(variable)
+    except KeyError:
+        return False
+    return isinstance(found, kind) and isinstance(getattr(found, "value", None), of)
+
+
+def _joined_lists(code):
+    """Return the names of lists that are written as the first argument of a function that joins arrays."""
+    found = set()
+    for block in code.blocks.values():
+        for statement in block.body:
+            call: Any = getattr(statement, "value", None)
+            if not (isinstance(call, ir.Expr) and call.op == "call" and call.args):
+                continue
+            try:
+                function, first = code.get_definition(call.func), code.get_definition(call.args[0])
+            except KeyError:
+                continue
+            joins = isinstance(function, ir.Expr) and function.op == "getattr" and function.attr in _JOINING
+            if joins and isinstance(first, ir.Expr) and first.op == "build_list":
+                found.add(call.args[0].name)
+    return found
+
+
+#: Functions of numpy that join arrays.
+_JOINING = ("concatenate", "stack", "hstack", "vstack", "column_stack")
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
 class _UseStandIns(FunctionPass):
     """Replace binary operators by calls of their stand-ins."""
 
@@ -267,5 +363,6 @@ class AnalyticCompiler(CompilerBase):
     def define_pipelines(self):
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
         manager.add_pass_after(_UseStandIns, IRProcessing)
+        manager.add_pass_after(_UsePlainForms, IRProcessing)
         manager.finalize()
         return [manager]

@@ -27,8 +27,8 @@ from contin.functions.interpreted import Interpreted
 from contin.functions.kernel import Kernel
 from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, Vector
 from contin.functions.machine_code import Raised
-from contin.functions.pointwise import parts, searches
-from contin.functions.signature import Signature
+from contin.functions.pointwise import Pointwise, parts, searches
+from contin.functions.signature import Signature, named_values, takes_arrays
 from contin.functions.sparsity import sparsity_pattern
 
 #: The generated kernel. What it says is part of the fingerprint: an edit compiles every problem anew.
@@ -117,8 +117,9 @@ class Batch:
         self._reads: Indices = np.array([list(parameters).index(name) for name in read], dtype=np.int64)
         self._parameters, self._derivatives = len(parameters), derivatives
         self.count = sum(max(count, 1) for count in counts)
-        self._functions, self._counts = tuple(functions), tuple(counts)
-        if not self._functions or len(self._functions) != len(self._counts):
+        self._functions = tuple(_filling(function, count, self.signature) for function, count in zip(functions, counts))
+        self._counts = tuple(counts)
+        if not self._functions or len(functions) != len(counts):
             raise ProblemError("functions: there must be at least one, with a count for each")
         self._colourings: dict[tuple[int, ...], Colouring] = {}
         self._seconds: dict[int, float] = {}  # a place takes, by the number of colours
@@ -134,14 +135,24 @@ class Batch:
         ------
         CompilationError
         """
+        rewriter = self._rewritten()
+        source = _source(self.signature, self._functions, self._counts, derivatives)
+        rewriter.note(source, self.signature.states, self.signature.parameters)
+        return _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
+
+    def _rewritten(self) -> ComplexStep:
+        """Return the rewriter that has met all functions, and everything that they read.
+
+        Raises
+        ------
+        CompilationError
+        """
         rewriter = ComplexStep()
         for function in self._functions:
             rewriter.function(parts(function)[0])
         for solve in searches(self._functions):
             rewriter.function(solve)
-        source = _source(self.signature, self._functions, self._counts, derivatives)
-        rewriter.note(source, self.signature.states, self.signature.parameters)
-        return _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
+        return rewriter
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
@@ -235,6 +246,26 @@ class Batch:
         return pattern
 
 
+def _filling(function: Function, count: int, signature: Signature) -> Function:
+    """Return a function that takes states as arrays only as one that fills an array; any other one as it is."""
+    if isinstance(function, Pointwise) or signature.fills(function) or not takes_arrays(function, signature.arguments):
+        return function
+    before = ["t"] * signature.times + ["u", "v"][: 1 + signature.ends]
+    named = f"P({''.join(f'p[{i}], ' for i in range(len(signature.parameters)))})"
+    lines = [f"def filling({', '.join([*before, 'p', 'out'])}):", f"    r = function({', '.join([*before, named])})"]
+    if count <= _WRITTEN_OUT:
+        lines += [f"    out[{i}] = r[{i}]" for i in range(count)] or ["    out[0] = r"]
+    else:
+        lines += [f"    for i in range({count}):", "        out[i] = r[i]"]
+    scope: dict[str, Any] = {"function": function, "P": named_values(signature.parameters), "__name__": __name__}
+    exec("\n".join(lines), scope)
+    scope["filling"].__name__ = getattr(function, "__name__", "function")
+    found: Function = scope["filling"]
+    return found
+
+
+#: So many values are written one by one, as a tuple of different types needs it.
+_WRITTEN_OUT = 16
 #: Stand for a colouring and a Jacobian that are not asked for.
 _NO_INPUTS, _NO_OWNER, _NO_WORK = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0)
 _NO_JACOBIAN = np.empty((0, 0, 0))
@@ -272,8 +303,8 @@ def _source(signature: Signature, functions: Sequence[Function], counts: Sequenc
             real.append(f"out[i, {row} : {row + size}] = r")
             step += [f"for j in range({size}):", f"    work[{signature.inputs + row} + j] = r[j].imag"]
         else:
-            for lines, kind in ((real, "float64"), (step, "complex128")):
-                lines.append(f"r = function{index}({', '.join(_arguments(signature, kind) + found)})")
+            for lines, name, kind in ((real, "function", "float64"), (step, "step", "complex128")):
+                lines.append(f"r = {name}{index}({', '.join(_arguments(signature, kind) + found)})")
             values = [f"r[{j}]" for j in range(count)] or ["r"]
             real += [f"out[i, {row + j}] = {value}" for j, value in enumerate(values)]
             step += [f"work[{signature.inputs + row + j}] = complex({value}).imag" for j, value in enumerate(values)]
@@ -314,7 +345,8 @@ def _filled(signature: Signature, index: int, count: int, found: list[str], kind
         lines.append(f"    {given}[j] = {number}")
         slot += size
         arguments.append(given)
-    return [*lines, f"r = np.zeros({count}, np.{kind})", f"function{index}({', '.join([*arguments, *found, 'r'])})"]
+    called = "step" if kind == "complex128" else "function"
+    return [*lines, f"r = np.zeros({count}, np.{kind})", f"{called}{index}({', '.join([*arguments, *found, 'r'])})"]
 
 
 #: Compiled kernels of this process, by their keys.

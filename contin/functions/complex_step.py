@@ -8,7 +8,8 @@ only, by ones that are analytic in the real part's branch:
 - ``atan2`` is turned by its real angle;
 - ``floor``, ``ceil`` and ``trunc`` are of the real part, and so is the quotient in ``%`` and ``//``;
 - ``erf``, ``erfc``, ``gamma`` and ``lgamma`` are the value at the real part and the exact first derivative;
-- functions of ``math``, which exist for real numbers only, become those of numpy.
+- functions of ``math``, which exist for real numbers only, become those of numpy;
+- arrays that a function makes and fills (``np.zeros``, ``np.empty_like``, ...) hold complex numbers.
 
 Functions are replaced where a `Rewriter` meets them (`ComplexStep`), operators by a pass of the compiler
 (`contin.functions.analytic`).
@@ -17,11 +18,13 @@ Functions are replaced where a `Rewriter` meets them (`ComplexStep`), operators 
 from __future__ import annotations
 
 import math
+import types
 from typing import Any
 
 import numpy as np
 
 from contin.arrays import Function
+from contin.errors import CompilationError
 from contin.functions.rewriting import Rewriter
 
 
@@ -116,8 +119,43 @@ _OF_NUMPY: dict[Any, Function] = {getattr(math, name): getattr(np, name) for nam
 _OF_NUMPY |= {getattr(math, name): function for name, function in _OTHER_NAMES.items()}
 
 
+#: Why a function with complex numbers is not compiled.
+_OWN_COMPLEX = "it computes with complex numbers, which compiled code needs for derivatives"
+#: Functions that make an array of a shape, and of the shape of another one; ``full`` has a value, too.
+MAKERS: tuple[Any, ...] = (np.zeros, np.empty, np.ones, np.full)
+MAKERS_LIKE: tuple[Any, ...] = (np.zeros_like, np.empty_like, np.ones_like, np.full_like)
+
+
+def makers(kind: type) -> dict[Any, Function]:
+    """Return functions that take the place of `MAKERS` and `MAKERS_LIKE`: arrays of real numbers become those of a kind."""
+
+    def replaced(maker: Any) -> Function:
+        def make(*given: Any, **options: Any) -> Any:
+            made = maker(*given, **options)
+            return made.astype(kind) if made.dtype.kind == "f" or maker in MAKERS_LIKE else made
+
+        return make
+
+    return {maker: replaced(maker) for maker in MAKERS + MAKERS_LIKE}
+
+
 class ComplexStep(Rewriter):
-    """Rewrite functions for the complex step."""
+    """Rewrite functions for the complex step.
+
+    A function that computes with complex numbers of its own is refused: their real parts, conjugates and absolute values are
+    not analytic, and both values and derivatives would be wrong.
+    """
+
+    def _names(self, code: types.CodeType) -> tuple[set[str], set[str]]:
+        attributes, loaded = super()._names(code)
+        if "complex" in loaded or any(isinstance(constant, complex) for constant in code.co_consts):
+            raise CompilationError(_OWN_COMPLEX)
+        return attributes, loaded
+
+    def _value(self, value: Any, attributes: set[str]) -> object:
+        if isinstance(value, (complex, np.complexfloating)) or (isinstance(value, np.ndarray) and value.dtype.kind == "c"):
+            raise CompilationError(_OWN_COMPLEX)
+        return super()._value(value, attributes)
 
     def stand_in(self, value: Any) -> Any:
         """Return the function that takes the place of one that is not analytic; None for all other values."""
@@ -126,7 +164,12 @@ class ComplexStep(Rewriter):
 
 def analytic(value: Any) -> Function | None:
     """Return what stands for a function that is not analytic, or exists for real numbers only; None for all others."""
+    return stand_in_of(value, _OF_NUMPY) or stand_in_of(value, REPLACED)
+
+
+def stand_in_of(value: Any, stand_ins: dict[Any, Function]) -> Function | None:
+    """Return what stands for a function; None for all other values."""
     try:
-        return _OF_NUMPY.get(value) or REPLACED.get(value)
-    except TypeError:  # unhashable: an array or a list, never one of these functions
+        return stand_ins.get(value)
+    except TypeError:  # unhashable: an array or a list, never a function
         return None

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import sys
 import warnings
-from collections import namedtuple
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,7 +17,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import InterpretedWarning, ProblemError
-from contin.functions.signature import Signature
+from contin.functions.signature import Signature, named_values
 
 #: What names of this package's modules begin with.
 _PACKAGE = __name__.partition(".")[0] + "."
@@ -38,7 +37,7 @@ class Interpreted:
 
     def __init__(self, functions: Sequence[Function], counts: Sequence[int], signature: Signature, reason: str) -> None:
         self._functions, self._counts, self._signature, self._reason = tuple(functions), tuple(counts), signature, reason
-        self._tuples = [None if names is None else _tuple(names) for names in signature.arguments]
+        self._tuples = [None if names is None else named_values(tuple(names)) for names in signature.arguments]
         self._for_arrays: dict[int, bool] = {}
         self._complex: bool | None = None
         self._sizes = np.zeros(signature.inputs)
@@ -191,10 +190,6 @@ def _users_level() -> int:
     while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(_PACKAGE):
         frame, level = frame.f_back, level + 1
     return level
-
-
-def _tuple(names: tuple[str, ...]) -> Any:
-    return namedtuple("Values", names)  # noqa: PYI024
 
 
 def _beside(x: Array) -> Array:

@@ -21,8 +21,12 @@ from contin.functions.fingerprint import Fingerprint
 class Rewriter:
     """Rewrite functions and what they call, and take a fingerprint of them all.
 
-    Subclasses override `finished` and `stand_in`.
+    Subclasses override `finished`, `finished_method` and `stand_in`. Attributes of objects and entries of dictionaries count as
+    globals do: they are read when the function is rewritten.
     """
+
+    #: Tells copies apart that differ in their stand-ins.
+    flavour = ""
 
     def __init__(self) -> None:
         self._done: dict[object, tuple[Any, str]] = {}
@@ -31,6 +35,14 @@ class Rewriter:
 
     def finished(self, copy: types.FunctionType) -> Any:
         """Return what a rewritten function becomes."""
+        return copy
+
+    def finished_method(self, copy: types.FunctionType, owner: types.ModuleType) -> Any:
+        """Return what a rewritten method becomes; ``owner`` holds what the method reads of its object."""
+        return types.MethodType(copy, owner)
+
+    def finished_dictionary(self, copy: dict[str, Any]) -> Any:
+        """Return what a dictionary becomes whose entries are rewritten."""
         return copy
 
     def stand_in(self, value: Any) -> Any:
@@ -57,19 +69,23 @@ class Rewriter:
             It is no plain Python function, or it calls itself.
         """
         function = getattr(function, "py_func", function)
-        if not isinstance(function, types.FunctionType):
+        plain, owner = getattr(function, "__func__", function), getattr(function, "__self__", None)
+        if not isinstance(plain, types.FunctionType):
             raise CompilationError(f"{checks.shown(function)} is no plain Python function (def or lambda)")
-        if function in self._open:
-            raise CompilationError(f"function {function.__name__!r} calls itself; write a loop instead")
-        if function not in self._done:
-            self._open.add(function)
+        key = plain, None if owner is None else id(owner)
+        if key in self._open:
+            raise CompilationError(f"function {plain.__name__!r} calls itself; write a loop instead")
+        if key not in self._done:
+            self._open.add(key)
             self._fingerprints.append(Fingerprint())
-            copy = self._copy(function)
+            self.note(self.flavour)
+            copy = self._copy(plain)
+            stand_in = None if owner is None else self._object(owner, _attributes(plain.__code__))
             digest = self._fingerprints.pop().text()
             copy.__name__ = copy.__qualname__ = f"user_{digest[:32]}"
-            self._done[function] = self.finished(copy), digest
-            self._open.discard(function)
-        kept, digest = self._done[function]
+            self._done[key] = self.finished(copy) if stand_in is None else self.finished_method(copy, stand_in), digest
+            self._open.discard(key)
+        kept, digest = self._done[key]
         self.note(digest)
         return kept
 
@@ -115,10 +131,15 @@ class Rewriter:
         if replaced is not None:
             self.note(value)
             return replaced
-        if isinstance(getattr(value, "py_func", value), types.FunctionType):
+        if isinstance(getattr(value, "py_func", value), (types.FunctionType, types.MethodType)):
             return self.function(value)
         if isinstance(value, types.ModuleType):
             return self._module(value, attributes)
+        if isinstance(value, dict) and value and all(isinstance(key, str) and key.isidentifier() for key in value):
+            self.note(*value)
+            return self.finished_dictionary({key: self._value(entry, attributes) for key, entry in value.items()})
+        if _is_object(value):
+            return self._object(value, attributes)
         self.note(value)
         return value
 
@@ -131,8 +152,55 @@ class Rewriter:
             setattr(copy, name, self._attribute(module, getattr(module, name), attributes))
         return copy
 
+    def _object(self, owner: Any, attributes: set[str]) -> types.ModuleType:
+        """Return a module that holds those ``attributes`` that an object has, rewritten: compiled code knows modules.
+
+        Raises
+        ------
+        CompilationError
+            The object refers to itself.
+        """
+        if id(owner) in self._open:
+            raise CompilationError(f"an object of the class {type(owner).__name__} refers to itself")
+        self._open.add(id(owner))
+        copy = types.ModuleType(type(owner).__name__)
+        for name in sorted(attributes):
+            found = getattr(owner, name, None)
+            self.note(name, found is None)
+            own = isinstance(found, types.MethodType) and found.__self__ is owner
+            if found is not None:
+                setattr(copy, name, self._own_method(found, owner) if own else self._value(found, attributes))
+        self._open.discard(id(owner))
+        return copy
+
+    def _own_method(self, method: types.MethodType, owner: Any) -> Any:
+        """Return another method of an object whose attributes are being rewritten."""
+        self._open.discard(id(owner))
+        found = self.function(method)
+        self._open.add(id(owner))
+        return found
+
     def _attribute(self, module: types.ModuleType, value: Any, attributes: set[str]) -> object:
         """Return what stands for a module's attribute; of numpy and math nothing is rewritten but what has a stand-in."""
         if module.__name__ in ("numpy", "math"):
             return value if (replaced := self.stand_in(value)) is None else replaced
         return self._value(value, attributes)
+
+
+def _attributes(code: types.CodeType) -> set[str]:
+    """Return the names of all attributes and globals in a code object, and in those inside it."""
+    inner = [_attributes(constant) for constant in code.co_consts if isinstance(constant, types.CodeType)]
+    return set(code.co_names).union(*inner)
+
+
+def _is_object(value: Any) -> bool:
+    """Return whether a value is an object of a user's class, whose attributes may be constants of a problem."""
+    if type(value).__module__.partition(".")[0] in ("numpy", "scipy"):
+        return False
+    if isinstance(value, (tuple, list, dict, type)) or callable(value):
+        return False
+    return isinstance(value, types.SimpleNamespace) or bool(type(value).__flags__ & _HEAP_TYPE)
+
+
+#: The flag of classes that a class statement made (CPython: Py_TPFLAGS_HEAPTYPE).
+_HEAP_TYPE = 1 << 9

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import math
 from collections import namedtuple
@@ -69,34 +70,105 @@ def argument_count(function: Function) -> int:
     return sum(each.default is each.empty and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in given)
 
 
+@functools.lru_cache(256)
+def named_values(names: tuple[str, ...]) -> Any:
+    """Return the class of the named tuples that users' functions get: ``u.x``, ``u["x"]``, ``u[0]`` and ``x, y = u``.
+
+    They are no arrays: ``2 * u`` and ``u + v`` would repeat and append a tuple, so they are errors.
+
+    Examples
+    --------
+    >>> u = named_values(("x", "y"))(1.0, 2.0)
+    >>> u.y, u["y"], u[1], u[:1]
+    (2.0, 2.0, 2.0, (1.0,))
+    """
+    fields: Any = namedtuple("Values", names)  # type: ignore[misc]  # noqa: PYI024
+
+    class Values(_NoArray, fields):  # type: ignore[misc]
+        __slots__ = ()
+
+        def __getitem__(self, key: Any) -> Any:
+            if isinstance(key, str):
+                if key in self._fields:
+                    return getattr(self, key)
+                raise KeyError(key)
+            found = tuple.__getitem__(self, key)
+            return _NoArray(found) if isinstance(key, slice) else found
+
+    return Values
+
+
+class _NoArray(tuple[Any, ...]):
+    """A tuple that refuses what means something else for an array."""
+
+    __slots__ = ()
+
+    def _refuse(self, *_: object) -> Any:
+        raise TypeError("a tuple is no array")
+
+    __add__ = __radd__ = __mul__ = __rmul__ = _refuse  # type: ignore[assignment]
+
+
 def result_count(function: Function, arguments: Arguments, what: str) -> int:
     """Return how many values a function returns (0: a bare number), from calls in Python with numbers.
 
     Raises
     ------
     ProblemError
-        The call fails, for each of some numbers; ``what`` names the function.
+        The call fails, for each of some numbers, with named tuples and with arrays; ``what`` names the function.
     """
+    errors: list[Exception] = []
+    for arrays in (False, True):
+        try:
+            return _returned(function, arguments, arrays, what)
+        except ProblemError:
+            raise
+        except Exception as error:  # a user's function may raise anything
+            errors.append(error)
+    about_arrays = isinstance(errors[0], TypeError) and not isinstance(errors[1], AttributeError)
+    first = errors[about_arrays]
+    reason = " ".join(str(first).split())
+    if isinstance(first, (AttributeError, KeyError)):
+        reason += "; the states and parameters are " + ", ".join(name for names in arguments for name in names or ())
+    raise ProblemError(f"{what} cannot be called: {type(first).__name__}: {reason}") from first
+
+
+def takes_arrays(function: Function, arguments: Arguments) -> bool:
+    """Return whether a function has no value for states as named tuples, and has one for states as arrays."""
+    for arrays in (False, True):
+        try:
+            _returned(function, arguments, arrays, "")
+        except Exception:  # noqa: S112  # a user's function may raise anything
+            continue
+        return arrays
+    return False
+
+
+def _returned(function: Function, arguments: Arguments, arrays: bool, what: str) -> int:
+    """Return how many values a call returns, with states as named tuples or as arrays; parameters, the last, are named."""
     plain = getattr(function, "py_func", function)
-    kinds: list[Any] = [None if names is None else namedtuple("Values", names) for names in arguments]
     first: Exception | None = None
     for number in _PROBES:
-        values = [number if kind is None else kind(*[number + 0.01 * i for i in range(len(kind._fields))]) for kind in kinds]
+        values: list[Any] = [number if names is None else _probe(names, number) for names in arguments]
+        if arrays:
+            values[:-1] = [np.array(value) if isinstance(value, tuple) else value for value in values[:-1]]
         try:
             with np.errstate(all="ignore"):
                 result = plain(*values)
         except (ArithmeticError, ValueError) as error:  # it may have values elsewhere
             first = first or error
             continue
-        except Exception as error:  # a user's function may raise anything
-            first = error
-            break
-        return len(result) if isinstance(result, (tuple, list, np.ndarray)) else 0
+        if isinstance(result, (dict, set, str)):
+            raise ProblemError(f"{what} returns a {type(result).__name__}, must return numbers in the order of their equations")
+        if isinstance(result, np.ndarray):
+            return result.size if result.ndim else 0
+        return len(result) if isinstance(result, (tuple, list)) else 0
     assert first is not None
-    reason = " ".join(str(first).split())
-    if isinstance(first, AttributeError):
-        reason += "; the states and parameters are " + ", ".join(name for names in arguments for name in names or ())
-    raise ProblemError(f"{what} cannot be called: {type(first).__name__}: {reason}") from first
+    raise first
+
+
+def _probe(names: tuple[str, ...], number: float) -> Any:
+    return named_values(tuple(names))(*[number + 0.01 * i for i in range(len(names))])
 
 
 #: Numbers with which functions are called to see what they return: in the domain of most functions. NaN, the last, is in the

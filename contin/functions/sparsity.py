@@ -10,17 +10,16 @@ from __future__ import annotations
 import math
 import numbers
 import types
-from collections import namedtuple
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from contin.arrays import Function, Pattern
-from contin.functions.complex_step import analytic
+from contin.functions.complex_step import analytic, makers, stand_in_of
 from contin.functions.pointwise import parts
 from contin.functions.rewriting import Rewriter
-from contin.functions.signature import Signature, result_count
+from contin.functions.signature import Signature, named_values, result_count
 
 #: With more inputs the pattern is not looked for: it would take a gigabyte.
 _MOST_INPUTS = 30_000
@@ -53,6 +52,10 @@ class _TracingNumber:
     __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __hash__ = _refuse
 
 
+#: What functions call to make an array that they fill.
+_OBJECT_MAKERS = makers(object)
+
+
 class _Traceable(Rewriter):
     """Functions for a call in Python: with numpy's functions in place of those of ``math``, which want ordinary numbers."""
 
@@ -63,8 +66,8 @@ class _Traceable(Rewriter):
         return copy
 
     def stand_in(self, value: Any) -> Any:
-        """Return the stand-in that compiled code has, too."""
-        return analytic(value)
+        """Return the stand-in that compiled code has, too; arrays that the function fills hold tracing numbers."""
+        return analytic(value) or stand_in_of(value, _OBJECT_MAKERS)
 
 
 def sparsity_pattern(functions: Sequence[Function], counts: Sequence[int], signature: Signature) -> Pattern:
@@ -101,7 +104,7 @@ def _traced(function: Function, count: int, signature: Signature) -> list[Any]:
             arguments.append(_TracingNumber(0))
             continue
         values = [next(marks) for _ in names]
-        arguments.append(np.array(values, dtype=object) if fills else _tuple(names, values))
+        arguments.append(np.array(values, dtype=object) if fills else named_values(tuple(names))(*values))
     function, solve = parts(function)
     if solve is not None:  # it decides by the numbers that it is given: what it finds depends on all of them
         found = result_count(solve, signature.arguments, "a search at a point")
@@ -113,11 +116,6 @@ def _traced(function: Function, count: int, signature: Signature) -> list[Any]:
         return list(result)
     result = traceable(*arguments)
     return list(result) if count else [result]
-
-
-def _tuple(names: tuple[str, ...], values: list[_TracingNumber]) -> Any:
-    kind: Any = namedtuple("Values", list(names))  # type: ignore[misc]  # noqa: PYI024
-    return kind(*values)
 
 
 def _sources(value: Any) -> int:

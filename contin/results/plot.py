@@ -162,7 +162,7 @@ def column(points: Sequence[Point], name: str) -> Array:
 
 def _states(point: Point) -> tuple[str, ...]:
     """Return the states that are columns: those of an algebraic problem."""
-    return point.system.problem.state_names if isinstance(point.system, Algebraic) else ()
+    return point.system.named_states
 
 
 def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str, list[str], str]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from contin import checks
 from contin.arrays import Array
 from contin.curves.extended import Extended
 from contin.detection.floquet import Floquet, floquet
@@ -92,7 +93,7 @@ class Point:
     breaks: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float:
-        """Return a parameter or functional by name.
+        """Return a parameter, a functional, or a state of an equilibrium, by name.
 
         Raises
         ------
@@ -103,7 +104,13 @@ class Point:
             return self.parameters[name]
         if name in self.functionals:
             return self.functionals[name]
-        raise KeyError(f"{name!r} is none of {', '.join((*self.parameters, *self.functionals))}")
+        states = self.system.named_states
+        if name in states:
+            return float(self.system.states(self.x)[0, states.index(name)])
+        functions = () if states else tuple(self.system.problem.states)
+        if name in functions:
+            raise KeyError(f"{name!r} is a function of t: take point.system.evaluate(point.x, t), or state a functional of it")
+        raise KeyError(f"{name!r} is none of {checks.listed((*self.parameters, *self.functionals, *states))}")
 
     def __repr__(self) -> str:
         columns = {**self.parameters, **self.functionals}

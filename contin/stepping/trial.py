@@ -137,12 +137,14 @@ class Trial:
         return self._functionals
 
     def __getitem__(self, name: str) -> float:
-        """Return a parameter or functional by name."""
+        """Return a parameter, a functional, or a state of an equilibrium, by name."""
         if name in self.system.free:
             at = self.system.parameter_index(name)
             return float(self.x[at] * self.system.free_scales[at - self.system.state_size])
         if name in self.system.problem.functionals:
             return self.functionals[name]
+        if name in self.system.named_states and name not in self.system.problem.parameters:
+            return float(self.system.states(self.x)[0, self.system.named_states.index(name)])
         return self.system.parameter(self.x, name)
 
 

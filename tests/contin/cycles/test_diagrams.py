@@ -38,7 +38,7 @@ def test_a_depth_of_zero_leaves_no_hopf_point():
 
 def test_columns_of_neither_kind_are_refused():
     rest = contin.solve(AlgebraicProblem(between, ["x", "y"], {"mu": -0.5}), [0, 0])
-    with pytest.raises(ProblemError, match="'amplitude' is neither a parameter nor a functional"):
+    with pytest.raises(ProblemError, match="'amplitude' is no column of this problem"):
         contin.diagram(rest, free=["mu"], limits={"mu": (-0.6, 2), "amplitude": (0, 1)})
 
 
