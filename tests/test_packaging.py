@@ -1,6 +1,7 @@
 """The two distributions: what they declare is what the packages import, and one version stands in one place."""
 
 import ast
+import doctest
 import re
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 import contin
 
@@ -57,6 +59,21 @@ def test_both_have_the_same_bounds():
     for field in ("requires-python", "license", "dynamic"):
         assert BOTH["project"][field] == ALONE["project"][field]
     assert BOTH["tool"]["setuptools"]["dynamic"] == ALONE["tool"]["setuptools"]["dynamic"]
+
+
+def test_the_conda_recipe_has_the_same_bounds():
+    recipe = yaml.safe_load((ROOT / "packaging/conda/recipe.yaml").read_text(encoding="utf-8"))
+    assert recipe["context"]["version"] == contin.__version__
+    pairs = {"contin": ALONE, "ribbon-continuation": BOTH}
+    for output in recipe["outputs"]:
+        bounds = dict(line.lower().split() for line in output["requirements"]["run"] if not line.startswith("python "))
+        bounds = {name.removesuffix("-base"): bound for name, bound in bounds.items()}
+        project = pairs[output["package"]["name"]]["project"]
+        assert bounds == dict(re.match(r"([\w-]+)(.*)", line.lower()).groups() for line in project["dependencies"])
+
+
+def test_the_example_of_the_distribution_contin_runs():
+    assert doctest.testfile(str(ROOT / "packages/contin/README.md"), module_relative=False).failed == 0
 
 
 def test_both_list_all_folders_of_code():
