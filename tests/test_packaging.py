@@ -89,6 +89,10 @@ def test_the_version_stands_in_one_place():
     assert re.fullmatch(r"\d+\.\d+\.\d+", contin.__version__)
     assert BOTH["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "contin.__version__"}
     assert f"version = {{{contin.__version__}}}" in (ROOT / "README.md").read_text(encoding="utf-8")
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest = re.search(r"^## \[([\d.]+)\] - (\S+)$", changes, re.M).groups()
+    assert (citation["version"], citation["date-released"]) == newest and newest[0] == contin.__version__
 
 
 MISSING = {
