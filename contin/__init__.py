@@ -14,6 +14,6 @@ The tutorial is docs/contin.md; docs/architecture.md says which folder does what
 import lazy_loader
 
 #: Of both distributions that hold this package, see CONTRIBUTING.md.
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,11 +4,31 @@ from __future__ import annotations
 
 
 class ContinError(Exception):
-    """Base of all errors raised on purpose."""
+    """Base of all errors raised on purpose.
+
+    Examples
+    --------
+    >>> import contin
+    >>> try:
+    ...     contin.Settings(step=-1)
+    ... except contin.ContinError as error:
+    ...     print(error)
+    step: -1 must be a number between 0 and inf
+    """
 
 
 class ProblemError(ContinError, ValueError):
-    """The statement of a problem is not usable; the message names the field, the value and what is allowed."""
+    """The statement of a problem is not usable; the message names the field, the value and what is allowed.
+
+    Examples
+    --------
+    >>> import contin
+    >>> try:
+    ...     contin.Settings(limits={"a": 3})
+    ... except contin.ProblemError as error:
+    ...     print(error)
+    limits: a: 3 must be a list of two numbers, the first the smaller
+    """
 
 
 class CompilationError(ProblemError):
@@ -20,4 +40,15 @@ class InterpretedWarning(UserWarning):
 
 
 class ConvergenceError(ContinError, ArithmeticError):
-    """Newton's method did not converge; the message holds the last residuals and what to change."""
+    """Newton's method did not converge; the message holds the last residuals and what to change.
+
+    Examples
+    --------
+    >>> import contin
+    >>> nowhere = contin.AlgebraicProblem(lambda u, p: (p.a + u.x**2,), ["x"], {"a": 1.0})
+    >>> try:
+    ...     contin.solve(nowhere, [0.5])
+    ... except contin.ConvergenceError:
+    ...     print("there is no solution near by")
+    there is no solution near by
+    """

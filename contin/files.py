@@ -13,7 +13,14 @@ _KEPT = 50
 
 
 def temporary_name(path: Path) -> Path:
-    """Return a hidden name of its own beside ``path``, ending in ``.part``."""
+    """Return a hidden name of its own beside ``path``, ending in ``.part``.
+
+    Examples
+    --------
+    >>> name = temporary_name(Path("results") / "m1.h5").name
+    >>> name.startswith(".m1.h5."), name.endswith(".part")
+    (True, True)
+    """
     return path.with_name(f".{path.name[:_KEPT]}.{secrets.token_hex(4)}.part")
 
 

@@ -1,6 +1,7 @@
 """Shared by all tests: one thread each, the option ``--full``, workers, and the order of modules."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,7 +48,15 @@ def pytest_xdist_auto_num_workers(config):
     return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, MOST_WORKERS)
 
 
+#: What marks of tests require, with the reason as their argument.
+REQUIRED = {"posix": os.name == "posix", "forks": sys.platform.startswith("linux")}
+
+
 def pytest_collection_modifyitems(config, items):
+    for name, given in REQUIRED.items():
+        for item, mark in ((item, item.get_closest_marker(name)) for item in items if not given):
+            if mark is not None:
+                item.add_marker(pytest.mark.skip(reason=f"needs {name}: {mark.args[0]}"))
     if not config.getoption("--full"):
         for item in items:
             if item.get_closest_marker("full"):

@@ -1,6 +1,7 @@
 """The two distributions: what they declare is what the packages import, and one version stands in one place."""
 
 import ast
+import doctest
 import re
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 import contin
 
@@ -59,6 +61,21 @@ def test_both_have_the_same_bounds():
     assert BOTH["tool"]["setuptools"]["dynamic"] == ALONE["tool"]["setuptools"]["dynamic"]
 
 
+def test_the_conda_recipe_has_the_same_bounds():
+    recipe = yaml.safe_load((ROOT / "packaging/conda/recipe.yaml").read_text(encoding="utf-8"))
+    assert recipe["context"]["version"] == contin.__version__
+    pairs = {"contin": ALONE, "ribbon-continuation": BOTH}
+    for output in recipe["outputs"]:
+        bounds = dict(line.lower().split() for line in output["requirements"]["run"] if not line.startswith("python "))
+        bounds = {name.removesuffix("-base"): bound for name, bound in bounds.items()}
+        project = pairs[output["package"]["name"]]["project"]
+        assert bounds == dict(re.match(r"([\w-]+)(.*)", line.lower()).groups() for line in project["dependencies"])
+
+
+def test_the_example_of_the_distribution_contin_runs():
+    assert doctest.testfile(str(ROOT / "packages/contin/README.md"), module_relative=False).failed == 0
+
+
 def test_both_list_all_folders_of_code():
     folders = {
         p.parent.relative_to(ROOT) for name in ("contin", "ribbon_model", "branches") for p in (ROOT / name).rglob("*.py")
@@ -72,6 +89,10 @@ def test_the_version_stands_in_one_place():
     assert re.fullmatch(r"\d+\.\d+\.\d+", contin.__version__)
     assert BOTH["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "contin.__version__"}
     assert f"version = {{{contin.__version__}}}" in (ROOT / "README.md").read_text(encoding="utf-8")
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest = re.search(r"^## \[([\d.]+)\] - (\S+)$", changes, re.M).groups()
+    assert (citation["version"], citation["date-released"]) == newest and newest[0] == contin.__version__
 
 
 MISSING = {

@@ -42,6 +42,18 @@ def homoclinic(cycle: Point, free: Sequence[str], *, mesh: MeshControl | None = 
         It is no cycle, or the equilibrium next to it is no saddle.
     ConvergenceError
         No homoclinic orbit is found near the cycle.
+
+    Examples
+    --------
+    >>> import contin
+    >>> def field(u, p):
+    ...     return u.y, u.x - u.x**2 + u.y * (p.mu + u.x) / 2
+    >>> rest = contin.solve(contin.AlgebraicProblem(field, ["x", "y"], {"mu": -1.1}), [1.0, 0.0])
+    >>> (hopf,) = contin.trace(rest, free=["mu"], limits={"mu": (-1.1, -0.9)}).labelled("HB")
+    >>> cycles = contin.trace(hopf, branch=1, limits={"period": (0, 20)}, errors=False)
+    >>> orbit = homoclinic(cycles.points[-1], free=["mu"])
+    >>> abs(orbit["mu"] - cycles.points[-1]["mu"]) < 1e-4 and orbit["gap"] < 1e-3
+    True
     """
     checks.instance("cycle", cycle, Point, "a Point")
     system: Any = cycle.system

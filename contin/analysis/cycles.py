@@ -48,6 +48,15 @@ def cycle(
         The motion does not come back: it rests, goes to infinity, or has not settled.
     ConvergenceError
         No cycle is found near the motion.
+
+    Examples
+    --------
+    >>> import math, contin
+    >>> def van_der_pol(u, p):
+    ...     return u.v, p.mu * (1 - u.x**2) * u.v - u.x
+    >>> problem = contin.CycleProblem(van_der_pol, ["x", "v"], {"mu": 1.0})
+    >>> round(cycle(problem, [1.0, 0.0])["period"], 6)
+    6.663287
     """
     checks.instance("problem", problem, CycleProblem, "a CycleProblem")
     checks.number("settle", settle, 0)

@@ -50,7 +50,16 @@ class Junction:
 
 @dataclass
 class Diagram:
-    """Branches, and the junctions where they meet."""
+    """Branches, and the junctions where they meet.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, diagram, solve
+    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+    >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+    >>> [len(found.branches), *(junction.point.label for junction in found.junctions)]
+    [4, 'BP']
+    """
 
     branches: list[Branch] = field(default_factory=list)
     junctions: list[Junction] = field(default_factory=list)
@@ -68,6 +77,14 @@ class Diagram:
         Returns
         -------
         matplotlib.axes.Axes
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, diagram, solve
+        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+        >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+        >>> found.plot("a", "x").get_xlabel()
+        'a'
         """
         drawn = [branch.points for branch in self.branches if branch.points]
         cycles = [points[0].system for points in drawn if isinstance(points[0].system, PeriodicCollocation)]
@@ -87,6 +104,15 @@ class Diagram:
         ------
         ImportError
             networkx is not installed.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, diagram, solve
+        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+        >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+        >>> graph = found.graph()
+        >>> sorted(label for _, label in graph.nodes(data="label"))
+        ['BP', 'EP', 'EP', 'EP', 'EP', 'EP', 'EP']
         """
         try:
             import networkx
@@ -340,6 +366,14 @@ def diagram(
     -------
     Diagram
         Failed switches are recorded at their junction.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve
+    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+    >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+    >>> [str(branch.stop) for branch in found.branches]
+    ['reached a = 1', 'reached a = -1', 'reached a = 1', 'reached a = 1']
     """
     checks.instance("start", start, Point, "a Point")
     checks.whole("depth", depth, 0, 1000)

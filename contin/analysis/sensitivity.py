@@ -46,6 +46,14 @@ def sensitivities(
     ------
     ProblemError
         A name that is not a parameter that is held fixed on the branch.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> cubic = AlgebraicProblem(lambda u, p: (p.a - p.b * u.x + u.x**3,), ["x"], {"a": 0.0, "b": 3.0})
+    >>> fold = trace(solve(cubic, [0.0]), free=["a"], limits={"a": (-3, 3)}).labelled("LP")[0]  # a = 2, x = 1
+    >>> {name: round(value["a"], 6) for name, value in sensitivities(fold).items()}
+    {'b': 1.0}
     """
     checks.instance("point", point, Point, "a Point")
     system = system_of(point, "point")

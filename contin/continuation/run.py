@@ -525,7 +525,16 @@ def follow_until_interrupted(
 def follow(
     system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None, singular: bool = True
 ) -> Branch:
-    """Run to the end and return the branch: `Continuation` as one call."""
+    """Run to the end and return the branch: `Continuation` as one call.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> branch = follow(Algebraic(parabola, ["a"]), np.array([1.0, 1.0]), Settings(direction=-1, limits={"a": (-1, 4)}))
+    >>> [point.label for point in branch if point.label]
+    ['EP', 'LP', 'EP']
+    """
     run = Continuation(system, x, settings, tangent, singular=singular)
     points = list(run)
     return Branch(points, run.stop, run.notes)

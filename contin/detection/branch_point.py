@@ -55,6 +55,14 @@ class BranchPoint:
         Coefficients of the algebraic bifurcation equation a.H.a = 0 of the tangents a.kernel.
     imperfection : float
         The residual beta by which the discrete equations miss a perfect bifurcation.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> transcritical = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0})
+    >>> found = locate_branch_point(Algebraic(transcritical, ["a"]), np.array([0.1, 0.1]))
+    >>> sorted(abs(round(float(tangent[0]), 6)) for tangent in found.tangents)  # x = 0 and x = a
+    [0.0, 0.707107]
     """
 
     x: Array
@@ -71,7 +79,17 @@ class BranchPoint:
         return float(np.sqrt(2 * self.imperfection / largest)) if largest > 0 else 0.0
 
     def along(self, system: Discretization, direction: Array) -> BranchPoint:
-        """Return the same branch point with its tangents in order: first the one nearest to ``direction``, with its sense."""
+        """Return the same branch point with its tangents in order: first the one nearest to ``direction``, with its sense.
+
+        Examples
+        --------
+        >>> from contin import Algebraic, AlgebraicProblem
+        >>> transcritical = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0})
+        >>> system = Algebraic(transcritical, ["a"])
+        >>> found = locate_branch_point(system, np.array([0.1, 0.1])).along(system, np.array([-1.0, -1.0]))
+        >>> found.tangents[0].round(6).tolist()
+        [-0.707107, -0.707107]
+        """
         cosines = [inner(system, tangent, direction) for tangent in self.tangents]
         order = sorted(range(len(cosines)), key=lambda i: -abs(cosines[i]))
         tangents = [self.tangents[i] * (np.sign(cosines[i]) or 1.0) for i in order]

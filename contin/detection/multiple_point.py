@@ -63,6 +63,15 @@ class MultiplePoint:
         Unit tangents of the branches that meet there, first that of the branch it was found on; empty where it was not located.
     continuum : bool
         The branches are not isolated: a continuous symmetry turns each into a whole family.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> pair = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2), u.y * (p.a - u.y**2)), ["x", "y"], {"a": -1.0})
+    >>> branch = trace(solve(pair, [0.0, 0.0]), free=["a"], limits={"a": (-1, 1)})
+    >>> (point,) = branch.labelled("BP")
+    >>> point.details.dimension, len(point.details.tangents)  # the trivial branch, x, y, and x = y, x = -y
+    (2, 5)
     """
 
     dimension: int

@@ -29,6 +29,13 @@ class Algebraic(System):
     ------
     ProblemError
         An unknown parameter.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem
+    >>> system = Algebraic(AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0}), ["a"])
+    >>> system.size, system.residual(np.array([2.0, 1.0])).tolist()  # x = 2, a = 1
+    (2, [-3.0])
     """
 
     intervals = 0

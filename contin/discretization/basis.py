@@ -51,6 +51,11 @@ def basis(degree: int) -> Basis:
     Raises
     ------
     ProblemError
+
+    Examples
+    --------
+    >>> basis(2).nodes.tolist()
+    [0.0, 0.5, 1.0]
     """
     if degree not in DEGREES:
         raise ProblemError(f"degree: {degree!r} must be a whole number from 2 to 8")
@@ -75,7 +80,14 @@ def basis(degree: int) -> Basis:
 
 
 def interpolation(nodes: Array, barycentric: Array, at: Array) -> Array:
-    """Return the matrix (len(at), len(nodes)) that evaluates the polynomial through the nodes at points (barycentric form)."""
+    """Return the matrix (len(at), len(nodes)) that evaluates the polynomial through the nodes at points (barycentric form).
+
+    Examples
+    --------
+    >>> table = basis(2)
+    >>> interpolation(table.nodes, table.barycentric, np.array([0.25])) @ table.nodes**2  # exact for polynomials of degree 2
+    array([0.0625])
+    """
     distance = at[:, None] - nodes
     exact = distance == 0
     terms = barycentric / np.where(exact, 1.0, distance)

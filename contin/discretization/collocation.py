@@ -52,6 +52,14 @@ class Collocation(System):
     ------
     ProblemError
         An unknown parameter, a bad mesh or degree.
+
+    Examples
+    --------
+    >>> from contin import BoundaryValueProblem
+    >>> heat = BoundaryValueProblem(lambda t, u, p: (u.v, -p.q), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 8.0})
+    >>> system = Collocation(heat, [0.0, 0.5, 1.0], 4, ["q"], {})
+    >>> system.size, system.nodes.tolist()[::4]  # two states at nine nodes, and q
+    (19, [0.0, 0.5, 1.0])
     """
 
     problem: BoundaryValueProblem

@@ -38,6 +38,11 @@ class MeshControl:
         Bounds on the number of intervals N.
     every : int
         Number of steps after which the mesh is looked at again; 0 keeps it as it is.
+
+    Examples
+    --------
+    >>> MeshControl(tolerance=1e-8, min_intervals=20).max_intervals
+    2000
     """
 
     tolerance: float = 1e-12

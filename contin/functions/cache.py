@@ -19,7 +19,13 @@ _ADVICE = "set CONTIN_CACHE_DIR to a folder that can be written"
 
 
 def cache_directory() -> Path:
-    """Return the folder for compiled problems: ``CONTIN_CACHE_DIR``, else the user's cache directory, else a temporary one."""
+    """Return the folder for compiled problems: ``CONTIN_CACHE_DIR``, else the user's cache directory, else a temporary one.
+
+    Examples
+    --------
+    >>> cache_directory().is_dir()
+    True
+    """
     chosen = os.environ.get("CONTIN_CACHE_DIR")
     if not chosen:
         from platformdirs import user_cache_dir

@@ -38,6 +38,13 @@ class AlgebraicProblem(Restated):
     Raises
     ------
     ProblemError
+
+    Examples
+    --------
+    >>> from contin import solve
+    >>> cubic = AlgebraicProblem(lambda u, p: (p.a - u.x**3,), ["x"], {"a": 8.0}, functionals={"square": lambda u, p: u.x**2})
+    >>> round(solve(cubic, [1.0])["square"], 10)
+    4.0
     """
 
     residual: Function

@@ -124,7 +124,15 @@ class CycleProblem(BoundaryValueProblem):
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:
-        """Return the cycles of the vector field whose equilibria a problem states, one statement for each."""
+        """Return the cycles of the vector field whose equilibria a problem states, one statement for each.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem
+        >>> equilibria = AlgebraicProblem(lambda u, p: (u.v, -p.k * u.x), ["x", "v"], {"k": 4.0})
+        >>> list(CycleProblem.of(equilibria).parameters)
+        ['k', 'period']
+        """
         if problem not in _STATED:
             found = cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
             _STATED[problem] = found
@@ -158,6 +166,15 @@ class CycleProblem(BoundaryValueProblem):
         ------
         ProblemError
             The period of a forced field is no positive number there.
+
+        Examples
+        --------
+        >>> import math
+        >>> def forced(t, u, p):
+        ...     return u.v, -u.x + math.cos(p.w * t)
+        >>> problem = CycleProblem(forced, ["x", "v"], {"w": 2.0}, period=lambda p: 2 * math.pi / p.w)
+        >>> round(problem.duration(problem.parameters) / math.pi, 10)
+        1.0
         """
         if self.period is None:
             return parameters[PERIOD]

@@ -44,11 +44,29 @@ class Branch:
         return iter(self.points)
 
     def column(self, name: str) -> Array:
-        """Return a parameter or functional over all points."""
+        """Return a parameter or functional over all points.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, solve, trace
+        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+        >>> branch.column("a")[[0, -1]].round(10).tolist()
+        [1.0, 4.0]
+        """
         return np.array([point[name] for point in self.points])
 
     def labelled(self, label: str) -> list[Point]:
-        """Return the points that carry a label, in order."""
+        """Return the points that carry a label, in order.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, solve, trace
+        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+        >>> len(branch.labelled("LP")), len(branch.labelled("HB"))
+        (1, 0)
+        """
         return [point for point in self.points if point.label == label]
 
     def to_pandas(self) -> Any:
@@ -61,6 +79,14 @@ class Branch:
         ------
         ImportError
             pandas is not installed.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, solve, trace
+        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+        >>> list(branch.to_pandas().columns)
+        ['label', 'name', 'arclength', 'intervals', 'iterations', 'a', 'norm']
         """
         return table.to_pandas(self.points)
 
@@ -89,6 +115,14 @@ class Branch:
             A column that the branch does not have, or no points.
         ImportError
             matplotlib is not installed.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, solve, trace
+        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+        >>> branch.plot("a", "x").get_ylabel()
+        'x'
         """
         return plot.plot(self.points, x, y, axes)
 

@@ -32,6 +32,18 @@ class StoredColumns:
         Names of the states.
     profiles : list of (ndarray (nodes,), ndarray (nodes, states))
         The nodes and the states of each point; the states of an algebraic problem have one node, 0.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from contin import AlgebraicProblem, save, solve, trace
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "b.npz"
+    ...     save(trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)}), path)
+    ...     stored = read_columns(path)
+    >>> list(filter(None, stored.labels)), stored.stop
+    (['EP', 'LP', 'EP'], 'reached a = 4')
     """
 
     columns: dict[str, Array]

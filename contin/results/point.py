@@ -73,6 +73,15 @@ class Point:
         At a special point, the index before and after it, in the direction of travel.
     breaks : tuple of str
         At a branch point, the declared symmetries that its modes break.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+    >>> fold = branch.labelled("LP")[0]
+    >>> abs(fold["a"]) < 1e-12, list(fold.errors)
+    (True, ['a'])
     """
 
     label: str
@@ -164,6 +173,14 @@ class Point:
             The point is no solution over t, or there is no such picture or state.
         ImportError
             matplotlib is not installed.
+
+        Examples
+        --------
+        >>> from contin import BoundaryValueProblem, solve
+        >>> heat = BoundaryValueProblem(lambda t, u, p: (u.v, -p.q), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 8.0})
+        >>> axes = solve(heat, [0, 0]).plot("series")
+        >>> len(axes.lines)
+        2
         """
         return portrait.plot(self, what, states, axes)
 
@@ -174,6 +191,19 @@ class Point:
         ------
         ProblemError
             The point is no cycle.
+
+        Examples
+        --------
+        >>> import math, contin
+        >>> def field(u, p):
+        ...     square = u.x**2 + u.y**2
+        ...     return p.mu * u.x - u.y - u.x * square, u.x + p.mu * u.y - u.y * square
+        >>> def guess(t):
+        ...     return 0.6 * math.cos(2 * math.pi * t), 0.6 * math.sin(2 * math.pi * t)
+        >>> problem = contin.CycleProblem(field, ["x", "y"], {"mu": 0.25})
+        >>> orbit = contin.solve(problem, guess, {"period": 6})
+        >>> np.abs(orbit.floquet().multipliers).round(8).tolist()  # 1 and exp(-2 mu period), the period is 2 pi
+        [1.0, 0.04321392]
         """
         if not isinstance(self.system, PeriodicCollocation):
             raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem")
@@ -186,6 +216,18 @@ class Point:
         ------
         ProblemError
             The problem is no `VariationalProblem`, or Legendre's condition fails.
+
+        Examples
+        --------
+        >>> import math, contin
+        >>> strip = contin.VariationalProblem(
+        ...     energy=lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle),
+        ...     states=["angle"], parameters={"load": 30.0}, ends=lambda a, b, p: (a.angle, b.angle),
+        ...     integrals={"offset": lambda t, x, w, p: math.sin(x.angle)},
+        ... )
+        >>> straight = contin.solve(strip, [0.0], {"load": 45.0})  # beyond the first buckling load, 4 pi^2
+        >>> straight.second_variation().index()
+        1
         """
         if index_of(self.system) is None:
             raise ProblemError("second_variation: the problem has no energy; state it as a VariationalProblem")
@@ -196,7 +238,15 @@ class Point:
 
 
 def point_of(system: Discretization, x: Array, iterations: int = 0, error: float = 0.0) -> Point:
-    """Return the Point of any solution x of a system."""
+    """Return the Point of any solution x of a system.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> point_of(Algebraic(parabola, ["a"]), np.array([2.0, 4.0]))
+    Point(a=4)
+    """
     trial = Trial.without_tangent(system, x)
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point("", "", parameters, trial.functionals, x, trial.tangent, system, 0.0, iterations, error)

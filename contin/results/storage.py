@@ -47,6 +47,17 @@ def save(branch: Branch, path: str | Path) -> None:
         The file cannot be written; the one that was there is left as it was.
     ProblemError
         Points of an extended system (`contin.curve`), which cannot start other runs.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save(branch, pathlib.Path(folder) / "b.npz")
+    ...     [file.name for file in pathlib.Path(folder).iterdir()]
+    ['b.npz']
     """
     checks.instance("branch", branch, Branch, "a Branch")
     if not branch.points:
@@ -113,6 +124,18 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
         The file cannot be read.
     ProblemError
         It is no branch, or one of a problem with other states or parameters.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save(branch, pathlib.Path(folder) / "b.npz")
+    ...     again = load(parabola, pathlib.Path(folder) / "b.npz")
+    >>> str(trace(again.points[-1], limits={"a": (-1, 9)}).stop)
+    'reached a = 9'
     """
     checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
 

@@ -46,6 +46,11 @@ class Newton:
     """How to correct: stop when the estimated error of every component is below ``tolerance`` (1 + |x|).
 
     ``tolerance`` may be as small as round-off; iterations that stagnate there count as converged.
+
+    Examples
+    --------
+    >>> Newton(tolerance=1e-10)
+    Newton(tolerance=1e-10, max_iterations=10)
     """
 
     tolerance: float = 1e-12

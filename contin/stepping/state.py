@@ -31,6 +31,19 @@ class State:
         Number of regular points.
     singular : bool
         x is a branch point.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem, Continuation, Settings
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> system, settings = Algebraic(parabola, ["a"]), Settings(direction=-1, limits={"a": (-1, 4)})
+    >>> run = Continuation(system, np.array([1.0, 1.0]), settings)
+    >>> for point in run:
+    ...     if run.state.accepted == 3:
+    ...         break
+    >>> rest = Continuation(system, np.array([1.0, 1.0]), settings, state=run.state)  # goes on where the other one is
+    >>> rest.state.accepted == run.state.accepted
+    True
     """
 
     system: Discretization
@@ -57,7 +70,16 @@ def standing_at(system: Discretization, x: Array, tangent: Array, step: float) -
 
 @dataclass(frozen=True)
 class Stop:
-    """Why a run ended: a short ``reason``, a sentence, and what could be changed."""
+    """Why a run ended: a short ``reason``, a sentence, and what could be changed.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+    >>> branch.stop.reason, str(branch.stop)
+    ('limit', 'reached a = 4')
+    """
 
     reason: str
     message: str

@@ -61,6 +61,15 @@ class Trial:
         A function is called when tangent, sign or factors are first asked for.
     iterations, newton_error : int, float
         Newton iterations taken, and the estimated error that they left.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, TestFunction, solve, trace
+    >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+    >>> half = TestFunction("UZ", "x = 0.5", lambda trial: trial.x[0] - 0.5)
+    >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)}, test_functions=[half])
+    >>> round(branch.labelled("UZ")[0]["a"], 10)
+    0.25
     """
 
     def __init__(
@@ -198,7 +207,13 @@ class TestFunction:
     unless: str = ""
 
     def passed(self, before: float, after: float) -> bool:
-        """Return whether there is a zero between two neighbouring points where the function has these values."""
+        """Return whether there is a zero between two neighbouring points where the function has these values.
+
+        Examples
+        --------
+        >>> TestFunction("UZ", "a", lambda trial: trial["a"]).passed(-1.0, 2.0)
+        True
+        """
         return after >= 0 if self.limit else sign_changed(before, after)
 
 

@@ -49,8 +49,10 @@ class Command:
     def start(self, *arguments, program=("-m", "branches.run"), env=(), **more):
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8", **dict(env)}
         options = {"cwd": self.folder, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "encoding": "utf-8", **more}
+        if os.name == "posix":
+            options["preexec_fn"] = _default_signals
         words = [sys.executable, *program, *map(str, arguments)]
-        return subprocess.Popen(words, env=environment, preexec_fn=_default_signals, **options)
+        return subprocess.Popen(words, env=environment, **options)
 
     def __call__(self, *arguments, **more):
         process = self.start(*arguments, **more)

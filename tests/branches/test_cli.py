@@ -51,6 +51,7 @@ def test_an_unknown_command_is_answered_in_one_sentence(call):
     assert call(cli.main).err.startswith("error: a command is needed; the commands are run, ")
 
 
+@pytest.mark.posix("on Windows, bash may be that of another system")
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
 @pytest.mark.parametrize(
     ("line", "wanted"),

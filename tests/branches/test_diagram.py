@@ -198,6 +198,7 @@ def test_a_cluster_makes_no_difference(computed_here, tmp_path):
     assert all(map(np.array_equal, computed_here, points_of(tmp_path / "dask")))
 
 
+@pytest.mark.forks("workers inherit what the test has replaced")
 def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
     scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), job.compute_branch
 
@@ -237,6 +238,7 @@ def _raise(job):
     raise _Odd(1, 2)
 
 
+@pytest.mark.posix("a process is killed by a signal")
 def test_a_process_killed_while_it_sends_its_result():
     """A part of a result in the pipe must not keep anybody waiting; nor may an error that cannot be sent."""
     with executor(workers=2) as (submit, wait, _):
@@ -252,7 +254,7 @@ def test_a_process_killed_while_it_sends_its_result():
         assert "odd" in str(odd.exception())
 
 
-@pytest.mark.parametrize("method", ["fork", "spawn"])
+@pytest.mark.parametrize("method", [pytest.param("fork", marks=pytest.mark.forks("they are tested")), "spawn"])
 def test_how_processes_start_makes_no_difference(computed_here, tmp_path, monkeypatch, method):
     """Forked, or each from nothing as on Windows and macOS: the same bits as from one process."""
     monkeypatch.setattr(executors, "_start_method", lambda: method)
@@ -370,6 +372,7 @@ def test_what_is_absent_is_named_exactly():
     assert list(scene.absent) == ["ribbon, nu = -0.9, (1, 2)", "ribbon, nu = -0.9000001, (1, 2)"]
 
 
+@pytest.mark.posix("Windows sends Ctrl-C in another way")
 def test_an_interrupted_diagram_leaves_no_process_and_goes_on(command, tmp_path):
     """Ctrl-C: workers hold the other end of standard output, so it ends only when they are gone; the rest is computed later."""
     (tmp_path / "scene.yaml").write_text(SCENE)

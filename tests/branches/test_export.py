@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import shutil
 import signal
 import struct
@@ -225,7 +224,7 @@ def test_of_several_points_with_a_label_one_is_to_be_named(call, results, tmp_pa
     assert "2 points have this label; name one by its number: 2 (LP at" in done.err and done.returncode == 2
 
 
-@pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
+@pytest.mark.posix("Windows sends Ctrl-C in another way")
 def test_ctrl_c_ends_in_one_line_and_leaves_nothing(command, results, tmp_path):
     process = command.start(results, "--movie", "x.gif", program=("-m", "branches.export"))
     time.sleep(1.5)

@@ -50,6 +50,7 @@ def interrupted(process, module: str, delay: float) -> list[str]:
     return [*rest, *(line for line in err.splitlines() if not line.startswith("import time:"))]
 
 
+@pytest.mark.posix("Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize("moment", ["importing", "computing"])
 @pytest.mark.parametrize("name", COMMANDS)
 def test_ctrl_c(command, primary, name, moment):
@@ -81,7 +82,7 @@ def pressed(monkeypatch):
     interrupt.begin("nothing")
 
     def press():
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
         time.sleep(0.01)
 
     press.left = left

@@ -1,6 +1,7 @@
 """The shell check: decks, answers of CalculiX, its failures, the search, and one real strip."""
 
 import math
+import os
 import re
 import shutil
 import stat
@@ -136,6 +137,8 @@ def test_a_state_that_left_the_plane_is_seen():
 @pytest.fixture
 def fake(tmp_path, monkeypatch):
     """Puts a shell script in the place of ccx."""
+    if os.name != "posix":
+        pytest.skip("needs POSIX: a shell script in the place of a program")
 
     def put(script):
         program = tmp_path / "fake-ccx"

@@ -144,6 +144,7 @@ def test_a_failed_write_leaves_the_file_as_it_was(tmp_path, monkeypatch, trouble
     assert path.read_bytes() == b"before" and os.listdir(tmp_path) == ["x.h5"]
 
 
+@pytest.mark.posix("modes of files")
 @pytest.mark.parametrize("mask, mode", [(0o022, 0o644), (0o077, 0o600)])
 def test_a_new_file_has_the_mode_that_the_umask_says(tmp_path, mask, mode):
     before = os.umask(mask)
@@ -154,6 +155,7 @@ def test_a_new_file_has_the_mode_that_the_umask_says(tmp_path, mask, mode):
     assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == mode
 
 
+@pytest.mark.posix("modes of files, links")
 def test_a_replaced_file_keeps_its_mode_and_a_link_stays_one(tmp_path):
     path, link = tmp_path / "x", tmp_path / "link"
     write_bytes(path, b"1")
@@ -180,6 +182,7 @@ def test_what_killed_runs_left_is_removed(tmp_path):
     assert not old.exists() and young.exists() and other.exists()
 
 
+@pytest.mark.posix("a folder that nobody can make")
 def test_where_nothing_can_be_written(tmp_path, monkeypatch):
     (tmp_path / "file").write_bytes(b"1")
     with pytest.raises(StoreError, match="file' is not a folder"):
@@ -270,6 +273,7 @@ def test_one_run_at_a_time_within_a_process_too(tmp_path):
         assert os.listdir(tmp_path) == [".x.h5.lock"]
 
 
+@pytest.mark.posix("forks")
 def test_processes_that_a_run_starts_do_not_keep_its_lock(command, tmp_path):
     """Workers may live a moment longer than the run that was killed."""
     code = "import multiprocessing\n" + HOLD.replace(
@@ -286,6 +290,7 @@ def test_processes_that_a_run_starts_do_not_keep_its_lock(command, tmp_path):
     process.communicate()
 
 
+@pytest.mark.posix("its locks are those of fcntl")
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EIO])
 def test_where_there_are_no_locks_there_is_no_lock(tmp_path, monkeypatch, number):
     def unsupported(descriptor, operation):

@@ -261,6 +261,7 @@ def test_functions_of_one_name_compiled_by_two_processes_stay_apart(tmp_path):
     assert run("one", "two") == pytest.approx([30, 23])
 
 
+@pytest.mark.posix("a folder that nobody can make")
 def test_an_installation_and_a_home_that_cannot_be_used(tmp_path, monkeypatch, capsys):
     """Neither a cache nor a home: compiled code goes to one temporary folder, and a line says what to set."""
     monkeypatch.setattr(os, "access", lambda path, mode: str(path).startswith(str(tmp_path)))
