@@ -161,7 +161,8 @@ def _comes_near(segment: Segment, distances: Callable[[list[complex]], list[floa
     ends = [_without_trivial(trial) for trial in (segment.before, segment.trial)]
     for here, there in (ends, ends[::-1]):
         for value, distance in zip(here, distances(here)):
-            if not distance > max(_NEAR, _CHANGES * min(abs(_difference(value, other)) for other in there)):
+            stays = any(_CHANGES * abs(_difference(value, other)) < distance for other in there)
+            if not (stays and distance > _NEAR):
                 return True
     return False
 

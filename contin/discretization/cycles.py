@@ -100,7 +100,7 @@ class PeriodicCollocation(Collocation):
                 self._known.clear()
             jacobian = self._jacobian_of_field(x)
             values = log_eigenvalues(transitions(self.basis.value, self.basis.slope, self._h, jacobian))
-            total = float(self._quadrature @ np.trace(jacobian, axis1=1, axis2=2))
+            total = float(self._quadrature @ np.einsum("kaa->k", jacobian))
             least = values.real <= values.real.min() + _EQUAL
             if not self._is_own_error(values, least):
                 # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
