@@ -35,8 +35,9 @@ _TINY = 2.2250738585072014e-308
 class Iterates(NamedTuple):
     """The work space of an orthogonal iteration; bases are given by rows.
 
-    ``first`` and ``last`` (n, n) are Q_0 and Q_N, ``triangles`` (N, n, n) are R_j, ``coupling`` (n, n) is Q_0^T Q_N, ``product``
-    (n, n) one of the products of triangles, ``vectors`` (n, n) are columns of F_j Q_{j-1}, ``sizes`` (n,) logarithms.
+    ``first`` and ``last`` (n, n) are Q_0 and Q_N, ``triangles`` (N, n, n) are R_j, ``coupling`` (n, n) is Q_0^T Q_N,
+    ``product`` (n, n) one of the products of triangles, ``vectors`` (n, n) are columns of F_j Q_{j-1}, ``sizes`` (n,) are
+    logarithms.
     """
 
     first: Matrix

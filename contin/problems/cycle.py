@@ -111,11 +111,12 @@ class CycleProblem(BoundaryValueProblem):
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:
-        """Return the cycles of the vector field whose equilibria a problem states: one statement for each, with its functions."""
-        if problem not in _STATED:
+        """Return the cycles of the vector field whose equilibria a problem states; the same statement each time."""
+        found = _STATED.get(problem)
+        if found is None:
             found = cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
             _STATED[problem] = found
-        return _STATED[problem]
+        return found
 
     @property
     def multipliers(self) -> tuple[str, ...]:
