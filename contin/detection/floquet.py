@@ -265,8 +265,8 @@ def torus() -> TestFunction:
 
 def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
-    same = unstable(segment.before.system, segment.before.x) == unstable(segment.trial.system, segment.trial.x)
-    if same and not _comes_near(segment, _from_torus):
+    system: Any = segment.trial.system
+    if unstable(system, segment.before.x) == unstable(system, segment.trial.x) and not _comes_near(segment, _from_torus):
         return []
     return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
 
