@@ -164,7 +164,8 @@ def _comes_near(segment: Segment, distances: Callable[[list[complex]], list[floa
     ends = [_without_trivial(trial) for trial in (segment.before, segment.trial)]
     for here, there in (ends, ends[::-1]):
         for value, distance in zip(here, distances(here)):
-            if not distance > max(_NEAR, _CHANGES * min(abs(_difference(value, other)) for other in there)):
+            stays = any(_CHANGES * abs(_difference(value, other)) < distance for other in there)
+            if not (stays and distance > _NEAR):
                 return True
     return False
 
@@ -267,8 +268,8 @@ def torus() -> TestFunction:
 
 def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
-    same = unstable(segment.before.system, segment.before.x) == unstable(segment.trial.system, segment.trial.x)
-    if same and not _comes_near(segment, _from_torus):
+    system: Any = segment.trial.system
+    if unstable(system, segment.before.x) == unstable(system, segment.trial.x) and not _comes_near(segment, _from_torus):
         return []
     return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
 

@@ -101,7 +101,7 @@ def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
 
 def _nearest_to_each(gaps: Array) -> Indices:
     """Return the column that belongs to each row of a square matrix, so that the sum of these entries is the least."""
-    nearest = gaps.argmin(axis=1)
+    nearest: Indices = gaps.argmin(axis=1)
     if len(set(nearest.tolist())) == len(nearest):
         return nearest
     from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]  # takes .1 s; most steps do without

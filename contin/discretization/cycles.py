@@ -149,7 +149,7 @@ class PeriodicCollocation(Collocation):
             if self.order > 1:
                 matrices = np.concatenate([matrices, np.linalg.inv(self.turn)[None]])
             values = log_eigenvalues(matrices)
-            total = float(self._quadrature @ np.trace(jacobian, axis1=1, axis2=2))
+            total = float(self._quadrature @ np.einsum("kaa->k", jacobian))
             least = values.real <= values.real.min() + _EQUAL
             if not self._is_own_error(values, least):
                 # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one

@@ -45,7 +45,7 @@ def _values(degree: int) -> Array:
 
 
 @helper
-def _at(curve, x, n, state, t):
+def _at(curve: Curve, x: ReadOnlyVector, n: int, state: int, t: float) -> float:
     """Return the value of a state at a time from 0 to 1."""
     nodes, barycentric, mesh = curve
     low, high = 0, mesh.size - 1
@@ -58,7 +58,7 @@ def _at(curve, x, n, state, t):
     s, first = (t - mesh[low]) / (mesh[high] - mesh[low]), low * (nodes.size - 1)
     above, below = 0.0, 0.0
     for m in range(nodes.size):
-        value = x[(first + m) * n + state]
+        value: float = x[(first + m) * n + state]
         if s == nodes[m]:
             return value
         share = barycentric[m] / (s - nodes[m])

@@ -36,7 +36,8 @@ class Iterates(NamedTuple):
     """The work space of an orthogonal iteration; bases are given by rows.
 
     ``first`` and ``last`` (n, n) are Q_0 and Q_N, ``triangles`` (N, n, n) are R_j, ``coupling`` (n, n) is Q_0^T Q_N,
-    ``product`` (n, n) one of the products of triangles, ``vectors`` (n, n) are columns of F_j Q_{j-1}, ``sizes`` (n,) logs.
+    ``product`` (n, n) one of the products of triangles, ``vectors`` (n, n) are columns of F_j Q_{j-1}, ``sizes`` (n,) are
+    logarithms.
     """
 
     first: Matrix
@@ -93,11 +94,23 @@ def _first_basis(n: int) -> Array:
 
 
 def _eigenvalues(block: Array) -> list[complex]:
-    """Return the eigenvalues of a matrix."""
+    """Return the eigenvalues of a matrix: NumPy takes 20 us, which counts at cycles of few states."""
     if len(block) == 1:
         return [complex(block[0, 0])]
+    if len(block) == 2:
+        return _of_two(*block.ravel().tolist())
     found: list[complex] = np.linalg.eigvals(block).astype(complex).tolist()
     return found
+
+
+def _of_two(a: float, b: float, c: float, d: float) -> list[complex]:
+    """Return the eigenvalues of [[a, b], [c, d]], without cancellation."""
+    half, product = (a - d) / 2, b * c
+    square = half * half + product
+    if square < 0:
+        return [complex((a + d) / 2, root) for root in (math.sqrt(-square), -math.sqrt(-square))]
+    larger = half + math.copysign(math.sqrt(square), half)
+    return [complex(d + larger), complex(d - product / larger if larger else d)]
 
 
 def _logarithm(value: complex, size: float) -> complex:
@@ -177,8 +190,9 @@ def _triangularize(factors, q, triangles, work):
                 length += (work[b, a] / largest) ** 2 if largest > 0 else 0.0
             length = largest * math.sqrt(length)
             triangles[j, b, b] = length
+            factor = 1 / length if length > 0 else 0.0
             for a in range(n):
-                q[b, a] = work[b, a] / length if length > 0 else 0.0
+                q[b, a] = work[b, a] * factor
 
 
 @helper

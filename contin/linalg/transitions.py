@@ -55,13 +55,13 @@ def _filled(value: Array, slope: Array, h: Array, jacobian: Array, turn: int) ->
 def fill(value: Matrix, slope: Matrix, h: Vector, jacobian: Stack, turn: int, matrices: Stack) -> None:
     """Fill the equations of the intervals."""
     d, n = value.shape[0], jacobian.shape[1]
-    for j in range(h.size):
-        for q in range(d):
-            point = jacobian[j * d + q]
-            for a in range(n):
-                row = matrices[j, q * n + a]
-                for m in range(d + 1):
-                    start, factor = (m + turn) % (d + 1) * n, -h[j] * value[q, m]
+    for m in range(d + 1):
+        start = (m + turn) % (d + 1) * n
+        for j in range(h.size):
+            for q in range(d):
+                factor, point = -h[j] * value[q, m], jacobian[j * d + q]
+                for a in range(n):
+                    row = matrices[j, q * n + a]
                     for b in range(n):
                         row[start + b] = factor * point[a, b]
                     row[start + a] += slope[q, m]

@@ -133,10 +133,11 @@ class CycleProblem(BoundaryValueProblem):
         >>> list(CycleProblem.of(equilibria).parameters)
         ['k', 'period']
         """
-        if problem not in _STATED:
+        found = _STATED.get(problem)
+        if found is None:
             found = cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
             _STATED[problem] = found
-        return _STATED[problem]
+        return found
 
     def doubled(self) -> CycleProblem:
         """Return the problem of cycles that close after twice the part computed here: with the symmetry S^2.

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import os
 import re
+import resource
 import shutil
 import subprocess
 import tempfile
@@ -97,14 +98,21 @@ def _run(program: Path, folder: Path, constants: str, trace: bool = True) -> dic
     (folder / "fort.2").write_text(constants)
     (folder / "fort.97").unlink(missing_ok=True)
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
-    began = time.perf_counter()
+    began, used = time.perf_counter(), _processor_seconds()
     done = subprocess.run([str(program)], cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
-    elapsed = time.perf_counter() - began
+    elapsed, used = time.perf_counter() - began, _processor_seconds() - used
     if done.returncode:
         raise RuntimeError(f"AUTO-07p failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
     written = (folder / "fort.97").read_text() if trace else ""
     parsed = parse((folder / "fort.7").read_text(), (folder / "fort.9").read_text(), done.stdout)
-    return parsed | {"process_seconds": elapsed, "trace": [tuple(map(float, line.split())) for line in written.splitlines()]}
+    rows = [tuple(map(float, line.split())) for line in written.splitlines()]
+    return parsed | {"process_seconds": elapsed, "processor_seconds": used, "trace": rows}
+
+
+def _processor_seconds() -> float:
+    """Return the processor time of all child processes that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 #: AUTO's codes of special points in the branch file.

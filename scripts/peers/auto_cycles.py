@@ -40,9 +40,17 @@ PROGRAM = """\
       SUBROUTINE PVLS
       END SUBROUTINE PVLS
 """
-#: The statements of each vector field, parted by semicolons; U(3) is z, PAR(1) the parameter.
+#: The statements of each vector field, parted by semicolons, and the number of states; U(3) is z, PAR(1) the parameter.
 FIELDS = {
+    "predator": {
+        "states": "2",
+        "field": "F(1) = 3*U(1)*(1 - U(1)) - U(1)*U(2) - PAR(1)*(1 - EXP(-5*U(1))); F(2) = 3*U(1)*U(2) - U(2)",
+        "jacobian": "A(1,1) = 3 - 6*U(1) - U(2) - 5*PAR(1)*EXP(-5*U(1)); A(1,2) = -U(1); A(2,1) = 3*U(2); A(2,2) = 3*U(1) - 1",
+        "by_parameter": "B(1,1) = EXP(-5*U(1)) - 1",
+        "start": "PAR(1) = 0.5D0; U(1) = 1D0/3; U(2) = 2 - 1.5D0*(1 - EXP(-5D0/3))",
+    },
     "lorenz": {
+        "states": "3",
         "field": "F(1) = 10*(U(2) - U(1)); F(2) = PAR(1)*U(1) - U(2) - U(1)*U(3); F(3) = U(1)*U(2) - 8D0/3*U(3)",
         "jacobian": "A(1,1) = -10; A(1,2) = 10; A(2,1) = PAR(1) - U(3); A(2,2) = -1; A(2,3) = -U(1);"
         "A(3,1) = U(2); A(3,2) = U(1); A(3,3) = -8D0/3",
@@ -51,7 +59,7 @@ FIELDS = {
     },
 }
 CONSTANTS = """\
-NDIM=3, IPS={kind}, IRS={restart}, ISW=1, ICP=[{free}], NBC=0, NINT=0, JAC=1
+NDIM={states}, IPS={kind}, IRS={restart}, ISW=1, ICP=[{free}], NBC=0, NINT=0, JAC=1
 NTST={intervals}, NCOL={degree}, IAD=3, ILP=1, ISP=2, NMX=1000, NPR=0, MXBF=0, IID=0, IPLT=0
 ITMX=9, ITNW=7, NWTN=3, EPSL={tolerance}, EPSU={tolerance}, EPSS={event_tolerance}
 DS={step}, DSMIN=1e-8, DSMAX={longest_step}, IADS=1, {stop}
@@ -76,8 +84,9 @@ def _lines(text: str) -> str:
 
 
 def study(name: str, last: float, step: float, *, intervals: int, degree: int, tolerance: float) -> dict:
-    """Follow the equilibrium to its Hopf point, and the cycles to the period ``last``; return the times of the cycles."""
-    values = {"intervals": intervals, "degree": degree, "tolerance": tolerance, "event_tolerance": 10 * tolerance}
+    """Follow the equilibrium to its Hopf point, and the cycles to the period ``last``; return what is known of these."""
+    values = {"states": FIELDS[name]["states"], "intervals": intervals, "degree": degree}
+    values |= {"tolerance": tolerance, "event_tolerance": 10 * tolerance}
     with tempfile.TemporaryDirectory(prefix="bench-auto-") as place:
         folder = Path(place)
         first = {"kind": 1, "restart": 0, "free": "1", "step": step, "longest_step": 0.5, "stop": "SP=['HB1']"}
