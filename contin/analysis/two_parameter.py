@@ -58,7 +58,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     -------
     Branch
         Points with labels LP (the curve turns) and those of codimension two: CP, BP, BT, GH, ZH and HH of equilibria, CP, GPD,
-        CH, R1 to R4, LPPD and LPTR of cycles; the page on cycles says what they mean. Columns: ``frequency`` and ``lyapunov`` on
+        CH, R1 to R4, LPPD and LPTR of cycles (docs/cycles.md). Columns: ``frequency`` and ``lyapunov`` on
         curves of Hopf points, ``normal_form`` on those of period doublings and torus bifurcations, ``angle`` on the latter.
         Points of a curve of branch points carry their imperfection beta as the last entry of x.
 
