@@ -117,7 +117,7 @@ def _of_hopf_points(system: Algebraic, point: SpecialPoint) -> Coefficient | Non
 
 
 @own_normal_form.register
-def _of_bifurcations_of_cycles(system: CycleCollocation, point: SpecialPoint) -> Coefficient | None:
+def _of_bifurcations_of_cycles(system: PeriodicCollocation, point: SpecialPoint) -> Coefficient | None:
     """The coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
     with np.errstate(all="ignore"):
         if point.label == "LP" and point.details is None and not point.name.startswith("possible"):
