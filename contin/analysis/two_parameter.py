@@ -25,7 +25,7 @@ from contin.detection.branch_point import BranchPoint
 from contin.detection.lyapunov import critical_pair
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.results.branch import Branch
@@ -172,11 +172,11 @@ def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _doublings(start: Point, base: System, x: Array) -> _First | None:
-    return (DoublingCurve(base), x) if start_at(start) is doubled and isinstance(base, CycleCollocation) else None
+    return (DoublingCurve(base), x) if start_at(start) is doubled and isinstance(base, PeriodicCollocation) else None
 
 
 def _tori(start: Point, base: System, x: Array) -> _First | None:
-    if start.label != "TR" or not isinstance(base, CycleCollocation):
+    if start.label != "TR" or not isinstance(base, PeriodicCollocation):
         return None
     angle = frequency_of(start)
     if angle is None:

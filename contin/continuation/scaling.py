@@ -3,7 +3,8 @@
 The size of a parameter is that of its first value; where that is zero, of its smallest limit or labelled value. The size of a
 state is its largest value. For what is zero at the first point the tangent says whether it is small: a parameter, by the change
 that moves some state by its size; a state, by its response to such a change. States that do not respond get sizes from the
-derivatives of the functions, with which the terms of an equation are alike. Only sizes far from one count
+derivatives of the functions, with which the terms of an equation are alike. A parameter that is zero there and stands for a
+state (the coordinates of equilibria, of connecting orbits) has the size of that state. Only sizes far from one count
 (`contin.discretization.scales`).
 """
 
@@ -70,6 +71,9 @@ def scaled(
     change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
     response = np.minimum(1.0, rates * change)
     size = np.maximum(size, np.where(response > noise, response, 0.0))
+    alike = getattr(system.problem, "alike", {})
+    free = np.array([found or size[states.index(alike[name])] if name in alike else found
+                     for name, found in zip(system.free, free)])  # fmt: skip
     size, free = _with_faint(system, x, size, free)
     size = np.array([known.get(name, found) for name, found in zip(states, size)])
     parameters = np.array([known.get(name, value) for name, value in zip(names, system.parameters)])

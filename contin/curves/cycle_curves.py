@@ -24,11 +24,11 @@ import numpy as np
 from contin.arrays import Array
 from contin.curves.critical_curve import CriticalCurve
 from contin.curves.extended import Borders
-from contin.curves.fold_curve import FoldCurve, shrinking
+from contin.curves.fold_curve import FoldCurve, normal_product, shrinking
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.lyapunov import Coefficient
 from contin.detection.test_functions import own_test_functions
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.round import Round
 from contin.discretization.system import System
 from contin.problems.cycle import PERIOD
@@ -44,12 +44,12 @@ _REAL = 1e-6
 
 
 class CycleCurve(CriticalCurve):
-    """Cycles with a critical multiplier, on a `CycleCollocation`."""
+    """Cycles with a critical multiplier, on a `PeriodicCollocation`."""
 
     @property
-    def cycles(self) -> CycleCollocation:
+    def cycles(self) -> PeriodicCollocation:
         """The underlying system."""
-        return cast(CycleCollocation, self.base)
+        return cast(PeriodicCollocation, self.base)
 
     @functools.cached_property
     def _folds(self) -> FoldCurve:
@@ -69,7 +69,7 @@ class CycleCurve(CriticalCurve):
     @property
     def copy_shape(self) -> tuple[int, Array]:
         """Number of equations of one copy of L, and the weights of its unknowns."""
-        weights = np.append(self.base.weights[: self.base.state_size], 1.0)
+        weights = np.append(self.base.weights[: self.base.state_size], np.ones(int(self.cycles.autonomous)))
         return len(weights), weights
 
     def bordered(self, x: Array, b: Array, c: Array) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
@@ -78,11 +78,13 @@ class CycleCurve(CriticalCurve):
         return solver.solve, solver.solve_transposed
 
     def round(self, x: Array) -> Round:
-        """Return the linearization without the trivial multiplier."""
-        return Round(self.cycles, x[: self.base.size], phased=True)
+        """Return the linearization without the multiplier that is one along every autonomous cycle."""
+        return Round(self.cycles, x[: self.base.size], phased=self.cycles.autonomous)
 
     def _place(self, wide: Array, v: Array) -> None:
-        wide[: self.base.state_size], wide[self.base.parameter_index(PERIOD)] = v[:-1], v[-1]
+        wide[: self.base.state_size] = v[: self.base.state_size]
+        if self.cycles.autonomous:
+            wide[self.base.parameter_index(PERIOD)] = v[-1]
 
     def ends(self, left: Array) -> Array:
         """Return the part of left null vectors that belongs to the condition between the ends."""
@@ -184,7 +186,7 @@ def _at_fold(label: str, name: str) -> TestFunction:
     def confirm(trial: Trial) -> bool:
         curve = _curve(trial)
         exponents = curve.cycles.eigenvalues(trial.x[: curve.base.size])
-        return bool(np.sort(np.abs(exponents))[1] < _DOUBLE)
+        return bool(np.sort(np.abs(exponents))[int(curve.cycles.autonomous)] < _DOUBLE)
 
     return TestFunction(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)
 
@@ -201,7 +203,7 @@ def _degenerate(label: str, name: str) -> TestFunction:
 def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
     """Strong resonances, Chenciner points, and folds."""
     resonances = [_resonance(label, kappa) for label, kappa in _RESONANCES.items()]
-    return [shrinking(), *resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
+    return [*shrinking(system.cycles), *resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
 
 @own_test_functions.register
@@ -211,10 +213,11 @@ def _of_doubling_curve(system: DoublingCurve) -> list[TestFunction]:
     def double(trial: Trial) -> float:
         curve = _curve(trial)
         right, _, left = curve.null_vectors(trial.x)
-        v, w = curve.starts(right[0]), curve.ends(left[0, 0])
-        return float(v @ w) / float(np.linalg.norm(v) * np.linalg.norm(w))
+        return normal_product(curve.starts(right[0]), curve.ends(left[0, 0]))
 
     return [
-        shrinking(), TestFunction("R2", "resonance 1:2", double), _degenerate("GPD", "generalized period doubling"),
+        *shrinking(system.cycles),
+        TestFunction("R2", "resonance 1:2", double),
+        _degenerate("GPD", "generalized period doubling"),
         _at_fold("LPPD", "fold-flip"),
-    ]  # fmt: skip
+    ]

@@ -17,7 +17,7 @@ from contin.curves.extended import FITS, Borders, Extended
 from contin.curves.fold_curve import shrinking
 from contin.detection.extrema import Stationarity, curvatures
 from contin.detection.test_functions import own_test_functions
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.trial import TestFunction, Trial
@@ -94,4 +94,4 @@ def _of_extremum_curve(system: ExtremumCurve) -> list[TestFunction]:
 
     objective = system.objective
     found = [TestFunction("EX", objective, slope, describe=lambda trial: curvatures(trial, objective))]
-    return [*found, shrinking()] if isinstance(system.base, CycleCollocation) else found
+    return [*found, *shrinking(system.base)] if isinstance(system.base, PeriodicCollocation) else found

@@ -26,7 +26,7 @@ from contin.detection.interpolated import interpolated_zero
 from contin.detection.segment import Segment, SpecialPoint
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.state import Stop
@@ -45,6 +45,8 @@ _REAL = 1e-12
 _SMALL = 0.3
 #: Parameters turn at a point where their part of the unit tangent is below this: interpolated tangents are better known.
 _TURNS = 1e-4
+#: Vectors are normal to each other where the cosine between them is smaller: their round-off.
+_NORMAL = 1e-10
 #: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
 _ROUNDS = 3
 
@@ -135,8 +137,8 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
     ]
     if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
         found += _of_equilibria()
-    if isinstance(system.base, CycleCollocation):
-        found += _of_cycles()
+    if isinstance(system.base, PeriodicCollocation):
+        found += _of_cycles(system.base)
     return found
 
 
@@ -177,39 +179,46 @@ def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
     return [SpecialPoint(found.at, "BP", name, found.trial, stop, found, TestFunction("BP", name, _by_first))]
 
 
-def shrinking() -> TestFunction:
+def shrinking(cycles: PeriodicCollocation) -> list[TestFunction]:
     """Return the test function of the end of a curve where cycles shrink onto an equilibrium; beyond it is itself.
 
-    At the equilibrium the equations of the curve are singular, so the run ends a little before.
+    At the equilibrium the equations of the curve are singular, so the run ends a little before. With a forcing there is none.
     """
 
     def amplitude(trial: Trial) -> float:
         system: Any = trial.system
         return float(system.base.amplitude(trial.x[: system.base.size])) - _SHRUNK
 
-    return TestFunction("EP", "the end, near a Hopf point where the cycles have no size", amplitude, terminal=True)
+    name = "the end, near a Hopf point where the cycles have no size"
+    return [TestFunction("EP", name, amplitude, terminal=True)] if cycles.autonomous else []
 
 
-def _of_cycles() -> list[TestFunction]:
-    """Where a third multiplier of a cycle is one (the change of g with the multiplier vanishes), or another is -1."""
+def normal_product(v: Array, w: Array) -> float:
+    """Return the cosine between two vectors; 0 where it is round-off, as all along a curve of a conservative system."""
+    cosine = float(v @ w) / float(np.linalg.norm(v) * np.linalg.norm(w))
+    return cosine if abs(cosine) > _NORMAL else 0.0
 
-    def triple(trial: Trial) -> float:
+
+def _of_cycles(cycles: PeriodicCollocation) -> list[TestFunction]:
+    """Where a further multiplier of a cycle is one (the change of g with the multiplier vanishes), or another is -1."""
+    critical = 1 + cycles.autonomous
+
+    def further(trial: Trial) -> float:
         system: Any = trial.system
         v, w, _ = system.null_vectors(trial.x)
         n = len(system.problem.states)
-        starts, ends = v[:n], w[-1 - n : -1]
-        return float(starts @ ends) / float(np.linalg.norm(starts) * np.linalg.norm(ends))
+        return normal_product(v[:n], w[-1 - n : -1] if cycles.autonomous else w[-n:])
 
     def flip(trial: Trial) -> float:
         system: Any = trial.system
         exponents = system.base.eigenvalues(trial.x)
-        others = exponents[np.argsort(np.abs(exponents))[2:]]
+        others = exponents[np.argsort(np.abs(exponents))[critical:]]
         size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
         multipliers = np.exp(others - size)
         multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
         return signed_smallest(np.exp(-size) + multipliers)
 
-    return [shrinking(), TestFunction("R1", "resonance 1:1", triple), TestFunction("LPPD", "fold-flip", flip)]
+    return [*shrinking(cycles), TestFunction("R1", "resonance 1:1", further), TestFunction("LPPD", "fold-flip", flip)]
 
 
 def _of_equilibria() -> list[TestFunction]:

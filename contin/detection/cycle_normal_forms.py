@@ -22,7 +22,7 @@ The mean of |v|^2 over the period is one, and at folds v is normal to u0' in the
 discrete equations, so that the coefficients converge with the cycle. With a symmetry of order n all this is done over one n-th
 of the period, with S v(0) for v(0). Where c or the real part of d is negative, the bifurcation
 is supercritical: the doubled cycle, or the torus, attracts on the centre manifold. The sign of b depends on that of v, and its
-absolute value is given; it vanishes at a cusp.
+absolute value is given; it vanishes at a cusp. With a forcing the time s goes on evenly, and alpha and a are zero.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.detection.lyapunov import Coefficient
 from contin.discretization.bends import bends
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.round import Round
 from contin.problems.cycle import PERIOD
 
@@ -49,26 +49,28 @@ class NormalForms:
 
     Parameters
     ----------
-    system : CycleCollocation
+    system : PeriodicCollocation
     x : ndarray, shape (size,)
     """
 
-    def __init__(self, system: CycleCollocation, x: Array) -> None:
+    def __init__(self, system: PeriodicCollocation, x: Array) -> None:
         self.system, self.x = system, x
-        self.plain, self.phased = Round(system, x, phased=False), Round(system, x, phased=True)
+        self.plain = Round(system, x, phased=False)
+        self.phased = Round(system, x, phased=True) if system.autonomous else self.plain
         self.points = system.at_gauss_points(x)
         self.jacobian = system.rates_by_states(x, self.points)
         self.h = np.repeat(np.diff(system.mesh), system.degree)[:, None]
-        self.period = float(x[system.parameter_index(PERIOD)])
+        self.period = float(x[system.parameter_index(PERIOD)]) if system.autonomous else 1.0  # as it stands in x
 
     def fold(self) -> Coefficient:
         """Return the absolute value of b."""
         v, w = self._null_vectors(self.phased, 1.0)
-        states = np.ascontiguousarray(self.x[: self.system.state_size].reshape(self.system.nodes.size, -1))
-        along = self.system.rates(self.x, states).ravel()
-        v[: along.size] -= self._mean(v, along) / self._mean(along, along) * along
+        if isinstance(self.system, CycleCollocation):
+            states = np.ascontiguousarray(self.x[: self.system.state_size].reshape(self.system.nodes.size, -1))
+            along = self.system.rates(self.x, states).ravel()
+            v[: along.size] -= self._mean(v, along) / self._mean(along, along) * along
         v = v / np.sqrt(self._mean(v, v))
-        here, alpha = self._at_points(v), v[-1] / self.period
+        here, alpha = self._at_points(v), (v[-1] / self.period if self.system.autonomous else 0.0)
         w, first = w / self._product(w, here), self._bends(here)[0]
         slope = 2 * alpha * self._apply(self.jacobian, here)
         found = self._coefficient([[self._product(w, term) for term in (self._apply(b, here), slope)] for b in first], 2)
@@ -125,7 +127,7 @@ class NormalForms:
     def _periodic(self, right_side: Array) -> tuple[Array, float]:
         """Return the periodic h with L h = right side + change * F, at the Gauss points, and this change of the period."""
         solution = self.phased.solver(np.eye(1)).solve(self._right_side(right_side, self.phased))
-        return self._at_points(solution), float(solution[-1])
+        return self._at_points(solution), float(solution[-1]) if self.system.autonomous else 0.0
 
     def _right_side(self, values: Array, matrix: Round) -> Array:
         """Return values at the Gauss points as the right side of the discrete equations."""

@@ -11,15 +11,18 @@ import numpy as np
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.floquet import doubling, torus
 from contin.detection.homoclinic import homoclinic, resting_place
+from contin.detection.homoclinic_points import homoclinic_points, own_names
 from contin.detection.hopf import hopf
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.second_variation import legendre
 from contin.detection.segment import SpecialPoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
+from contin.discretization.connections import ConnectionCollocation
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
+from contin.problems.connection import TIME
 from contin.problems.variational import VariationalProblem
 from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
@@ -77,6 +80,11 @@ def _of_cycles(system: PeriodicCollocation) -> list[TestFunction]:
 
 
 @own_test_functions.register
+def _of_connections(system: ConnectionCollocation) -> list[TestFunction]:
+    return homoclinic_points(system) if system.problem.homoclinic and TIME not in system.free else []
+
+
+@own_test_functions.register
 def _of_equilibria(system: Algebraic) -> list[TestFunction]:
     return [hopf()] if system.problem.dynamics and not system.is_sparse else []
 
@@ -85,6 +93,13 @@ def _of_equilibria(system: Algebraic) -> list[TestFunction]:
 def own_end(system: Discretization, point: SpecialPoint) -> SpecialPoint:
     """Return a special point, as the end of the branch where a kind of problem knows it as one. Each kind registers its own."""
     return point
+
+
+@own_end.register
+def _of_homoclinic_points(system: ConnectionCollocation, point: SpecialPoint) -> SpecialPoint:
+    """Neutral saddles, and the end of a curve, by which of the leading eigenvalues are complex."""
+    names = own_names(point)
+    return point if names is None else dataclasses.replace(point, label=names[0], name=names[1])
 
 
 @functools.singledispatch
@@ -103,7 +118,7 @@ def _of_hopf_points(system: Algebraic, point: SpecialPoint) -> Coefficient | Non
 
 
 @own_normal_form.register
-def _of_bifurcations_of_cycles(system: CycleCollocation, point: SpecialPoint) -> Coefficient | None:
+def _of_bifurcations_of_cycles(system: PeriodicCollocation, point: SpecialPoint) -> Coefficient | None:
     """The coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
     with np.errstate(all="ignore"):
         if point.label == "LP" and point.details is None and not point.name.startswith("possible"):

@@ -79,15 +79,19 @@ class ConnectionCollocation(Conditioned):
         last = first if self.problem.homoclinic else first + n
         return [p[:, place : place + n] for place in (first, last)]
 
+    def _jacobian_at(self, place: Array, p: Array) -> Array:
+        """Return the derivatives of the field by the states at one place, scaled, for values of all parameters."""
+        batch, n, sizes = self.problem.batch("vector field"), self._n, self._sizes
+        jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.colouring([]))[1][0, :, :n]
+        return jacobian * sizes / sizes[:, None]
+
     def _left_vectors(self, p: Array, bases: Any) -> list[list[Array]]:
         """Return [L, L'] for each of the values of all parameters, p of shape (m, number of names)."""
-        batch, n, sizes = self.problem.batch("vector field"), self._n, self._sizes
-        colours, found = batch.colouring([]), []
+        found = []
         for values, *places in zip(p, *self._places(p)):
             both = []
             for end, (place, count) in enumerate(zip(places, self.problem.conditions)):
-                jacobian = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), values, colours)[1][0, :, :n]
-                left = _left_subspace(jacobian * sizes / sizes[:, None], count, stable=end == 0)
+                left = _left_subspace(self._jacobian_at(place, values), count, stable=end == 0)
                 both.append(left if bases is None else np.linalg.solve(left @ bases[end].T, left))
             found.append(both)
         return found
@@ -136,6 +140,25 @@ class ConnectionCollocation(Conditioned):
     def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of these conditions by any parameters."""
         return self._conditions_at_ends(x, names)[2]
+
+    # --- for special points of homoclinic orbits -----------------------------------------------------------------
+
+    def saddle_jacobian(self, x: Array) -> Array:
+        """Return the derivatives of the field by the states at the first equilibrium, scaled, shape (n, n)."""
+        p = self.all_parameters(x)
+        return self._jacobian_at(self._places(p[None])[0][0], p)
+
+    def apart(self, x: Array) -> tuple[Array, Array]:
+        """Return u(0) - e and u(1) - e', scaled."""
+        first, last = (place[0] / self._sizes for place in self._places(self.all_parameters(x)[None]))
+        states = self._scaled_states(x)
+        return states[0] - first, states[-1] - last
+
+    def adjoint_at_ends(self, x: Array, w: Array) -> tuple[Array, Array]:
+        """Return L^T w and L'^T w, of the entries of a left vector that belong to the projection conditions."""
+        first, last = self._left_vectors(self.all_parameters(x)[None], self._bases)[0]
+        own = w[-self._further :]
+        return first.T @ own[: len(first)], last.T @ own[len(first) : len(first) + len(last)]
 
     # --- columns -------------------------------------------------------------------------------------------------
 

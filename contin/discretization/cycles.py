@@ -40,9 +40,16 @@ _MOVED = 1e-6
 
 
 class PeriodicCollocation(Collocation):
-    """A `CycleProblem` on a mesh: what forced and autonomous ones share."""
+    """A `CycleProblem` on a mesh: what forced and autonomous ones share.
+
+    Attributes
+    ----------
+    autonomous : bool
+        There is no forcing: the period is unknown, and an orbit may be shifted in time.
+    """
 
     problem: CycleProblem
+    autonomous = True
 
     def __init__(
         self, problem: CycleProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
@@ -123,12 +130,25 @@ class PeriodicCollocation(Collocation):
 
     # --- stability -----------------------------------------------------------------------------------------------
 
+    @property
+    def by_interval(self) -> Indices:
+        """Places of the nodes of each interval among all nodes, shape (N, d + 1)."""
+        return self._by_interval
+
+    def rates_by_states(self, x: Array, points: Array) -> Array:
+        """Return the derivatives of T F by the states at states (K, n) divided by their sizes, shape (K, n, n).
+
+        Of an autonomous field the states may be any, of a forced one they are those at the Gauss points.
+        """
+        n, times = self._n, np.zeros(len(points)) if self.autonomous else self._times
+        colours = self.problem.batch("field").colouring([])
+        none, p = np.empty((0, n)), self._scaled_parameters(x)
+        derivatives: Array = self._field.jacobian(times, points, none, p, colours)[1][:, :n, :n]
+        return derivatives
+
     def _jacobian_of_field(self, x: Array) -> Array:
         """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N d, n, n)."""
-        colours = self.problem.batch("field").colouring([])
-        p, points = self._scaled_parameters(x), self.at_gauss_points(x)
-        jacobian: Array = self._field.jacobian(self._times, points, np.empty((0, self._n)), p, colours)[1]
-        return jacobian
+        return self.rates_by_states(x, self.at_gauss_points(x))
 
     def interval_matrices(self, x: Array) -> Array:
         """Return the linearized collocation equations of each interval, shape (N, d n, (d + 1) n)."""
@@ -182,6 +202,8 @@ class ForcedCollocation(PeriodicCollocation):
     ProblemError
         ``rounds`` is no whole number, or free; the period is no positive number.
     """
+
+    autonomous = False
 
     def __init__(
         self, problem: CycleProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
@@ -255,11 +277,6 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
     # --- stability -----------------------------------------------------------------------------------------------
 
     @property
-    def by_interval(self) -> Indices:
-        """Places of the nodes of each interval among all nodes, shape (N, d + 1)."""
-        return self._by_interval
-
-    @property
     def start_direction(self) -> Array:
         """The direction in which the reference leaves t = 0, scaled, shape (n,)."""
         first: Array = self.reference[1] - self.reference[0]
@@ -285,14 +302,6 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         n, times = self._n, np.zeros(len(points))
         rates: Array = self._field.values(times, points, np.empty((0, n)), self._scaled_parameters(x))[:, :n]
         return rates
-
-    def rates_by_states(self, x: Array, points: Array) -> Array:
-        """Return the derivatives of `rates` by the states, shape (K, n, n)."""
-        n, times = self._n, np.zeros(len(points))
-        colours = self.problem.batch("field").colouring([])
-        none, p = np.empty((0, n)), self._scaled_parameters(x)
-        derivatives: Array = self._field.jacobian(times, points, none, p, colours)[1][:, :n, :n]
-        return derivatives
 
     def has_shrunk(self, x: Array) -> bool:
         """Return whether an orbit is an equilibrium, up to the square root of round-off."""

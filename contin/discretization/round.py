@@ -20,12 +20,13 @@ integral would not do in place of e: with u' of constant length, (t - 1/2) u' wo
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
-from contin.discretization.cycles import CycleCollocation
+from contin.arrays import Array, Indices
+from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.problems.cycle import PERIOD
 
 
@@ -37,7 +38,7 @@ class Solver:
 
         self.size = matrix.shape[0]
         try:
-            self._factors: Any = splu(matrix.tocsc())
+            self._factors: Any = splu(matrix)
         except (RuntimeError, ValueError):  # exactly singular, or not finite
             self._factors = None
 
@@ -61,10 +62,11 @@ class Round:
 
     Parameters
     ----------
-    system : CycleCollocation
+    system : PeriodicCollocation
     x : ndarray, shape (size,)
     phased : bool
-        With a change of the period and the condition at t = 0, so that the trivial multiplier is left out.
+        With a change of the period and the condition at t = 0, so that the trivial multiplier is left out; of autonomous
+        systems only.
 
     Attributes
     ----------
@@ -72,12 +74,14 @@ class Round:
         Number of equations, and of unknowns, of one copy.
     """
 
-    def __init__(self, system: CycleCollocation, x: Array, phased: bool) -> None:
+    def __init__(self, system: PeriodicCollocation, x: Array, phased: bool) -> None:
         self.system, self.phased = system, phased
         self.states = system.state_size
         self.size = self.states + phased
         self._matrices = system.interval_matrices(x)
-        self._period = system.parameter_columns(x, (PERIOD,))[:, 0] if phased else np.empty(0)
+        if phased:
+            assert isinstance(system, CycleCollocation)
+            self._period, self._direction = system.parameter_columns(x, (PERIOD,))[:, 0], system.start_direction
 
     @property
     def ends(self) -> slice:
@@ -89,20 +93,33 @@ class Round:
         """Return the solver of the matrix for P (k, k), bordered in each copy by a column b and a row c if these are given."""
         from scipy import sparse  # type: ignore[import-untyped]  # as above
 
-        coupling = np.atleast_2d(coupling)
-        one = np.eye(len(coupling))
-        turn = sparse.coo_array(self.system.turn)
-        first = sparse.coo_array((turn.data, (turn.coords[0] + self.ends.start, turn.coords[1])), (self.size, self.size))
-        matrix = sparse.kron(one, self._collocation()) - sparse.kron(coupling, first)
-        if b is not None and c is not None:
-            column, row = sparse.coo_array(b[:, None]), sparse.coo_array(c[None, :])
-            matrix = sparse.block_array([[matrix, sparse.kron(one, column)], [sparse.kron(one, row), None]])
-        return Solver(matrix)
+        coupling, size = np.atleast_2d(coupling), self.size
+        copies, turn = len(coupling), sparse.coo_array(self.system.turn)
+        values, rows, columns = [], [], []
 
-    def _collocation(self) -> Any:
-        """Return the matrix of one copy, but for what P multiplies."""
-        from scipy import sparse
+        def put(entries: Array, i: Indices, j: Indices) -> None:
+            values.append(entries)
+            rows.append(i)
+            columns.append(j)
 
+        (ends, starts), every = turn.coords, np.arange(size)
+        for copy in range(copies):
+            at = copy * size
+            entries, i, j = self._collocation
+            put(entries, i + at, j + at)
+            for other in range(copies):
+                put(-coupling[copy, other] * turn.data, at + self.ends.start + ends, other * size + starts)
+            if b is not None and c is not None:
+                last = np.full(size, copies * size + copy)
+                put(b, at + every, last)
+                put(c, last, at + every)
+        total = copies * (size + (b is not None))
+        where = np.concatenate(rows), np.concatenate(columns)
+        return Solver(sparse.csc_array((np.concatenate(values), where), (total, total)))
+
+    @functools.cached_property
+    def _collocation(self) -> tuple[Array, Indices, Indices]:
+        """Entries of the matrix of one copy but for what P multiplies, with their rows and columns."""
         count, rows, columns = self._matrices.shape
         at = rows * np.arange(count)[:, None, None]
         n, end = len(self.system.problem.state_names), self.states
@@ -111,7 +128,6 @@ class Round:
         last = np.arange(end - n, end)
         values, places = [self._matrices.ravel(), np.ones(n)], [(i, j), (last, last)]
         if self.phased:
-            values += [self._period, self.system.start_direction]
+            values += [self._period, self._direction]
             places += [(np.arange(end + 1), np.full(end + 1, end)), (np.full(n, end), np.arange(n))]
-        where = np.concatenate([row for row, _ in places]), np.concatenate([column for _, column in places])
-        return sparse.coo_array((np.concatenate(values), where), (self.size, self.size))
+        return np.concatenate(values), np.concatenate([row for row, _ in places]), np.concatenate([j for _, j in places])

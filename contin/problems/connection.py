@@ -103,6 +103,11 @@ class ConnectionProblem(BoundaryValueProblem):
         return tuple(kind + name for kind in kinds for name in self.state_names)
 
     @property
+    def alike(self) -> dict[str, str]:
+        """The state that each coordinate of an equilibrium is a value of."""
+        return dict(zip(self.multipliers, 2 * self.state_names))
+
+    @property
     def conditions(self) -> tuple[int, int]:
         """Numbers of projection conditions at the first and at the last end."""
         return len(self.state_names) - self.unstable, len(self.state_names) - self.stable

@@ -122,15 +122,19 @@ def run(study: Study) -> dict[str, list]:
 
 def labelled(text: str, constants: dict, study: Study) -> list[dict]:
     """Return the labelled points of AUTO's file of a branch."""
-    rows = [line.split() for line in text.splitlines() if line.split()[0] != "0"]
+    table = [line.replace("MAX U", "MAX_U").split() for line in text.splitlines()]
+    rows = [line for line in table if line[0] != "0"]
+    names = next(line for line in table if "TY" in line)
     periodic = constants["IPS"] == 2
     found = []
     for row in rows:
         if row[3] != "0" and abs(int(row[1])) > 1:  # the first point is not corrected
             square = float(row[5]) ** 2 - (1.0 if study.oscillator else 0.0)
+            second = {"second": float(row[names.index("PAR(1)")])} if constants["IPS"] == 9 and "PAR(1)" in names[5:] else {}
             found.append({
                 "label": LABELS[int(row[2]) if int(row[2]) < 0 else int(row[2]) % 10], "parameter": float(row[4]),
-                "period": float(row[-1]) if periodic else 0.0, "square": square, "number": int(row[3]),
+                "period": float(row[-1]) if periodic else 0.0, "square": square, **second,
+                "number": int(row[3]),
             })  # fmt: skip
     return found
 
@@ -143,8 +147,11 @@ def ends(*values: float, period: float | None = None) -> str:
 
 EQUILIBRIA = {"IPS": 1, "ICP": [1]}
 CYCLES = {"IPS": 2, "ICP": [1, 11]}
+HOMOCLINIC = {"IPS": 9, "ILP": 0, "ISP": 0, "NPAR": 40, "ISTART": 1, "THL": {}}
 #: Tolerances at which special points are found that AUTO-07p gives up at tighter ones, in silence.
 LOOSE = {"EPSL": 1e-10, "EPSU": 1e-10, "EPSS": 1e-7, "DS": 0.001, "DSMAX": 0.02}
+#: Those of the demo ``kpr`` itself, for runs on the way to a first homoclinic orbit.
+LOOSEST = {"EPSL": 1e-7, "EPSU": 1e-7, "EPSS": 1e-5, "DS": 0.1, "DSMIN": 0.001, "DSMAX": 2.0, "NTST": 60}
 #: A branch that shrinks onto a Hopf point passes it, labelled BP (in ``ppp`` LP) and misplaced, and comes back: it is stopped.
 SHRINKING = {**CYCLES, "SP": "['BP1']"}
 
@@ -311,6 +318,37 @@ STUDIES = {
             "rest": Run({**EQUILIBRIA, "UZSTOP": ends(-0.91, -0.4)}),
             "cycles": Run({**CYCLES, **LOOSE, "UZSTOP": ends(-0.91, -0.4, period=30)}, ("rest", "HB", 1)),
             "beside": Run({**CYCLES, **LOOSE, "ISW": -1, "UZSTOP": ends(-0.91, -0.4, period=30)}, ("cycles", "BP", 1)),
+        },
+    ),
+    # demo kpr: PAR(1) is lambda, PAR(2) kappa, 1 / epsilon = 10; a homoclinic orbit by homotopy (PAR(15) is the distance from
+    # the saddle at which it begins), made longer, then inclination flips (PAR(33)) and a zero eigenvalue (PAR(29), PAR(30))
+    "kpr": Study(
+        3,
+        "F(1) = 10*(PAR(2)*U(2) - U(1)**3 + 3*U(1) - PAR(1)); F(2) = U(1) - 2*U(2) + U(3); F(3) = U(2) - U(3)",
+        "PAR(1) = -1.851185124D0; PAR(2) = -0.15D0; PAR(11) = 0.1D0; PAR(12:14) = -0.9591016D0; PAR(15) = -0.00001D0",
+        {
+            "homotopy": Run(
+                {**HOMOCLINIC, **LOOSEST, "ICP": [11, 17], "ISTART": 3, "NMX": 400, "SP": "['UZ1']", "UZR": "{17: 0}"}
+            ),
+            "longer": Run(
+                {**HOMOCLINIC, **LOOSEST, "ICP": [11, 1], "ISTART": 3, "NMX": 400, "UZSTOP": "{11: 70}"}, ("homotopy", "UZ", 1)
+            ),
+            "adjoint": Run({**HOMOCLINIC, **LOOSEST, "ICP": [11, 1], "ITWIST": 1, "NMX": 2}, ("longer", "UZ", 1)),
+            "flips": Run(
+                {
+                    **HOMOCLINIC,
+                    **LOOSEST,
+                    "ICP": [2, 1, 10, 29, 30, 33],
+                    "ITWIST": 1,
+                    "NMX": 400,
+                    "DS": -0.01,
+                    "DSMAX": 0.05,
+                    "IPSI": [9, 10, 13],
+                    "UZR": "{33: 0}",
+                    "UZSTOP": "{2: -0.6}",
+                },
+                ("adjoint", "EP", 1),
+            ),
         },
     ),
     # demo plp: PAR(1) is rho; S0 = 110, A0 = 500, alpha = .2, K = .1

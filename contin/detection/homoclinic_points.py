@@ -1,0 +1,167 @@
+"""Special points on curves of homoclinic orbits (Champneys, Kuznetsov & Sandstede 1996; labels as in MatCont).
+
+The eigenvalues of the saddle are those of the manifold that the orbit enters, m1, m2, ... with the largest real part first,
+and those of the manifold that it leaves, l1, l2, ... with the smallest first: the leading ones. Test functions:
+
+    NSS, NSF, NFF   Re m1 + Re l1                            neutral saddle, saddle-focus, bifocus
+    DRS, DRU        (m1 - m2)^2, (l1 - l2)^2                 a real leading eigenvalue becomes a complex pair
+    NDS, NDU        2 Re m1 + Re l1, Re m1 + 2 Re l1         neutrally divergent saddle-focus (m1, l1 complex)
+    NCH, SH         -Re m1, Re l1                            the saddle comes to be a saddle-node, or has a Hopf bifurcation
+    OFS, OFU        p.(u(1) - e), q.(u(0) - e)               orbit flips: p, q are left eigenvectors of m1, l1
+    IFS, IFU        v.a(0), w.a(1)                           inclination flips: v, w are right eigenvectors of m1, l1
+
+a solves the adjoint equation; its values at the ends are the multipliers of the projection conditions in the left null vector
+of F_z, z all unknowns but two parameters. Eigenvectors and null vectors have the signs that they have at the reference of the
+discretization.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.detection.segment import SpecialPoint
+from contin.discretization.connections import ConnectionCollocation
+from contin.stepping.trial import TestFunction, Trial
+
+#: A null vector's part at an end below this part of its length is round-off: the orbit is long.
+_NOTHING = 1e-12
+#: With a larger gap the orbit is not close to a homoclinic one.
+_FAR = 0.2
+#: An eigenvalue with a smaller imaginary part, relative to its size, is real.
+_REAL = 1e-8
+
+
+def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
+    """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
+    n, unstable = len(system.problem.state_names), system.problem.unstable
+    counts = n - unstable, unstable
+    found = [
+        TestFunction("EP", "the ends of the orbit are far from the saddle: it needs a longer time", _closeness, terminal=True),
+        TestFunction("NSS", "neutral saddle", lambda trial: _leading(trial, 0)[0].real + _leading(trial, 1)[0].real),
+        *(_ends(side) for side in (0, 1)),
+    ]
+    for side in (0, 1):
+        if counts[side] > 1:
+            found += [_double(side), _divergent(side), _orbit_flip(side), _inclination_flip(side)]
+    return found
+
+
+def _closeness(trial: Trial) -> float:
+    return _FAR - trial["gap"]
+
+
+def own_names(point: SpecialPoint) -> tuple[str, str] | None:
+    """Return label and name of a neutral saddle, or of the end of a curve, whose leading eigenvalue is complex; else None."""
+    if point.label not in ("NSS", "NCH") or point.name.startswith("possible"):
+        return None
+    kinds = [_is_complex(_leading(point.trial, side)[0]) for side in (0, 1)]
+    if point.label == "NSS" and any(kinds):
+        return ("NFF", "neutral bifocus") if all(kinds) else ("NSF", "neutral saddle-focus")
+    nearest = int(np.argmin([abs(_leading(point.trial, side)[0].real) for side in (0, 1)]))
+    return ("SH", "Shilnikov-Hopf") if point.label == "NCH" and kinds[nearest] else None
+
+
+def _system(trial: Trial) -> ConnectionCollocation:
+    system: Any = trial.system
+    found: ConnectionCollocation = system
+    return found
+
+
+def _leading(trial: Trial, side: int) -> ComplexArray:
+    """Return the eigenvalues of one side, 0 stable or 1 unstable, the leading one first."""
+    return _eigenvalues(_system(trial), trial.x, side)[0]
+
+
+def _eigenvalues(system: ConnectionCollocation, x: Array, side: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Return the eigenvalues of one side, the leading one first, and its right and left eigenvector."""
+    values, vectors = np.linalg.eig(system.saddle_jacobian(x))
+    order = np.argsort(-values.real)
+    count = system.problem.unstable
+    chosen = order[:count][::-1] if side else order[count:]
+    left = np.linalg.inv(vectors)[chosen[0]]
+    return values[chosen].astype(complex), vectors[:, chosen[0]].astype(complex), left.astype(complex)
+
+
+def _leading_vectors(system: ConnectionCollocation, x: Array, side: int) -> tuple[Array, Array]:
+    """Return the eigenvectors, right and left, of a real leading eigenvalue, with the signs of the reference."""
+    _, *there = _eigenvalues(system, system.reference, side)
+    _, *here = _eigenvalues(system, x, side)
+    signs = [np.sign((vector.conj() @ known).real) for vector, known in zip(here, there)]
+    right, left = (sign * vector.real / np.linalg.norm(vector.real) for sign, vector in zip(signs, here))
+    return right, left
+
+
+def _is_complex(value: complex) -> bool:
+    return abs(value.imag) > _REAL * abs(value)
+
+
+def _ends(side: int) -> TestFunction:
+    """Return the test function that ends a curve: a leading eigenvalue of one side reaches the imaginary axis."""
+    sign = 1 if side else -1
+    return TestFunction(
+        "NCH", "non-central homoclinic orbit to a saddle-node",
+        lambda trial: sign * _leading(trial, side)[0].real, terminal=True,
+    )  # fmt: skip
+
+
+def _double(side: int) -> TestFunction:
+    def square(trial: Trial) -> float:
+        first, second = _leading(trial, side)[:2]
+        return float(((first - second) ** 2).real)
+
+    return TestFunction("DRU" if side else "DRS", f"double real leading {('stable', 'unstable')[side]} eigenvalue", square)
+
+
+def _divergent(side: int) -> TestFunction:
+    def total(trial: Trial) -> float:
+        return float(2 * _leading(trial, side)[0].real + _leading(trial, 1 - side)[0].real)
+
+    return TestFunction(
+        "NDU" if side else "NDS", "neutrally divergent saddle-focus", total,
+        confirm=lambda trial: _is_complex(_leading(trial, side)[0]),
+    )  # fmt: skip
+
+
+def _flip(label: str, name: str, side: int, function: Callable[[ConnectionCollocation, Array], float]) -> TestFunction:
+    """Return the test function of a flip: NaN where the leading eigenvalue is complex."""
+
+    def value(trial: Trial) -> float:
+        complex_pair = _is_complex(_leading(trial, side)[0])
+        return float("nan") if complex_pair else function(_system(trial), trial.x)
+
+    return TestFunction(label, name, value)
+
+
+def _orbit_flip(side: int) -> TestFunction:
+    def component(system: ConnectionCollocation, x: Array) -> float:
+        return float(_leading_vectors(system, x, side)[1] @ system.apart(x)[1 - side])
+
+    return _flip("OFU" if side else "OFS", "orbit flip", side, component)
+
+
+def _inclination_flip(side: int) -> TestFunction:
+    def component(system: ConnectionCollocation, x: Array) -> float:
+        known = _left_null_vector(system, system.reference, None)
+        if not np.linalg.norm(system.adjoint_at_ends(x, known)[side]) > _NOTHING:
+            return float("nan")
+        adjoint = system.adjoint_at_ends(x, _left_null_vector(system, x, known))[side]
+        return float(_leading_vectors(system, x, side)[0] @ adjoint)
+
+    return _flip("IFU" if side else "IFS", "inclination flip", side, component)
+
+
+def _left_null_vector(system: ConnectionCollocation, x: Array, border: Array | None) -> Array:
+    """Return w with w F_z = 0, of unit length, and its product with the border (random without one) positive."""
+    own = [name for name in system.free if name not in system.problem.multipliers]
+    held = np.zeros((2, system.size + 1))
+    held[[0, 1], [system.parameter_index(name) for name in own]] = 1.0
+    column = np.random.default_rng(11).standard_normal(system.equations) if border is None else border
+    _, factors = system.linearize(x, held, column[None])
+    unit = np.zeros(system.size + 1)
+    unit[-1] = 1.0
+    w: Array = factors.solve_transposed(unit)[: system.equations]
+    return w / np.linalg.norm(w)

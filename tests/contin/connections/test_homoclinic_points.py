@@ -1,0 +1,137 @@
+"""Special points on curves of homoclinic orbits, against exact orbits and AUTO-07p's demo ``kpr``.
+
+Exact: the Cartesian leaf x^2 (1 - x) = y^2 is a homoclinic orbit of Sandstede's equations (1997) with nu = 0; the
+eigenvalues are a + 1 and a - 1.
+"""
+
+import functools
+import math
+
+import pytest
+from cycles.noted import NOTES
+
+import contin
+from contin import AlgebraicProblem, ConnectionProblem, ProblemError
+
+#: Where AUTO-07p locates the flips it does so at the tolerance 1e-7 of the demo; at tighter ones it gives up.
+AUTO = 2e-6
+
+
+def leaf(time):
+    """The leaf with a = 0 and b = 1, x = 1 / cosh^2(s), y = x', as a function of t from 0 to 1; s = time (t - 1/2) / 2."""
+
+    def orbit(t):
+        s = time * (t - 0.5) / 2
+        x = 1 / math.cosh(s) ** 2
+        return x, -x * math.tanh(s)
+
+    return orbit
+
+
+def sandstede(u, p):
+    """The plane of the leaf: nu breaks it."""
+    x, y = u.x, u.y
+    return p.a * x + y - p.a * x**2 + p.nu * x * (2 - 3 * x), x + p.a * y - 1.5 * x**2 - 1.5 * p.a * x * y - 2 * p.nu * y
+
+
+def test_a_neutral_saddle():
+    """The eigenvalues a + 1 and a - 1 have the sum 2 a."""
+    problem = ConnectionProblem(sandstede, ["x", "y"], {"a": 0.0, "nu": 0.0}, unstable=1)
+    orbit = contin.solve(problem, leaf(40), {"time": 40}, free=["nu"], intervals=40)
+    start = contin.trace(orbit, free=["a", "nu"], direction=-1, limits={"a": (-0.3, 1)}).points[-1]
+    branch = contin.trace(start, free=["a", "nu"], limits={"a": (-0.4, 0.3)})
+    assert [point.label for point in branch if point.label] == ["EP", "NSS", "EP"]
+    assert branch.labelled("NSS")[0]["a"] == pytest.approx(0, abs=1e-9)
+
+
+def beside(u, p):
+    """With z and w beside the leaf: eigenvalues -r -+ sqrt(-d)."""
+    x, y = sandstede(u, p)
+    return x, y, -p.r * u.z - u.w * p.d, u.z - p.r * u.w
+
+
+@functools.cache
+def four_dimensional():
+    """The leaf with a = -0.2 (eigenvalues .8 and -1.2), r = .3 and d = 1."""
+    problem = ConnectionProblem(beside, ["x", "y", "z", "w"], {"a": 0.0, "nu": 0.0, "r": 0.3, "d": 1.0}, unstable=1)
+    orbit = contin.solve(problem, lambda t: (*leaf(40)(t), 0.0, 0.0), {"time": 40}, free=["nu"], intervals=40)
+    return contin.trace(orbit, free=["a", "nu"], direction=-1, limits={"a": (-0.2, 1)}).points[-1]
+
+
+def test_a_saddle_focus():
+    """The pair -r -+ i leads: 2 r = .8 is neutrally divergent, r = .8 neutral."""
+    branch = contin.trace(four_dimensional(), free=["r", "nu"], limits={"r": (0.1, 1)})
+    assert [point.label for point in branch if point.label] == ["EP", "NDS", "NSF", "EP"]
+    assert branch.labelled("NDS")[0]["r"] == pytest.approx(0.4, abs=1e-9)
+    assert branch.labelled("NSF")[0]["r"] == pytest.approx(0.8, abs=1e-9)
+
+
+def test_a_complex_pair_becomes_real():
+    """At d = 0 the pair is a double eigenvalue; at d = -.09 = -r^2 one of them is zero."""
+    branch = contin.trace(four_dimensional(), free=["d", "nu"], direction=-1, limits={"d": (-0.2, 2)})
+    found = [point for point in branch if point.label in ("DRS", "NCH")]
+    assert [point.label for point in found] == ["DRS", "NCH"]
+    assert [point["d"] for point in found] == pytest.approx([0, -0.09], abs=1e-8)
+    assert branch.stop.message == "met non-central homoclinic orbit to a saddle-node"
+
+
+def test_a_pair_crosses_the_axis():
+    """At r = 0 the pair is imaginary."""
+    branch = contin.trace(four_dimensional(), free=["r", "nu"], direction=-1, limits={"r": (-1, 1)})
+    assert [point.label for point in branch if point.label] == ["EP", "SH"]
+    assert branch.points[-1]["r"] == pytest.approx(0, abs=1e-8)
+
+
+def flipping(u, p):
+    """z' = -z / 2 + mu x: with mu = 0 the leaf comes in along the strong direction."""
+    x, y = sandstede(u, p)
+    return x + 0.3 * u.z * u.x, y, -u.z / 2 + p.mu * u.x
+
+
+def test_an_orbit_flip():
+    problem = ConnectionProblem(flipping, ["x", "y", "z"], {"a": 0.0, "nu": 0.0, "mu": 0.0}, unstable=1)
+    orbit = contin.solve(problem, lambda t: (*leaf(40)(t), 0.0), {"time": 40}, free=["nu"], intervals=40)
+    start = contin.trace(orbit, free=["mu", "nu"], direction=-1, limits={"mu": (-0.1, 1)}).points[-1]
+    branch = contin.trace(start, free=["mu", "nu"], limits={"mu": (-0.2, 0.1)})
+    assert [point.label for point in branch if point.label and point.label != "NSS"] == ["EP", "OFS", "EP"]
+    assert branch.labelled("OFS")[0]["mu"] == pytest.approx(0, abs=1e-9)
+
+
+def koper(u, p):
+    return p.e * (p.k * u.y - u.x**3 + 3 * u.x - p.l), u.x - 2 * u.y + u.z, u.y - u.z
+
+
+@pytest.mark.full
+def test_the_demo_kpr_against_auto():
+    """Two inclination flips, and the end: with x = y = z = s, l = k s + 3 s - s^3 has a fold at k = 3 s^2 - 3."""
+    problem = AlgebraicProblem(koper, ["x", "y", "z"], {"l": -2.3, "k": -0.15, "e": 10.0})
+    line = contin.trace(contin.solve(problem, [2, 2, 2]), free=["l"], limits={"l": (-6, 6)})
+    cycles = contin.trace(line.labelled("HB")[1], branch=1, limits={"l": (-6, 6), "period": (0, 92)})
+    orbit = contin.homoclinic(cycles.points[-1], free=["l"])
+    branch = contin.trace(orbit, free=["l", "k"], primary="k", direction=-1, limits={"k": (-3, 3)}, zeros={"k": [-0.6]})
+    known = NOTES["kpr"]["flips"]
+    found = [point for point in branch.points[1:] if point.label in ("IFS", "UZ")]
+    assert [point.label for point in found] == ["IFS", "IFS", "UZ"]
+    for point, row in zip(found, known):
+        assert (point["k"], point["l"]) == pytest.approx((row["parameter"], row["second"]), abs=AUTO)
+    end = branch.points[-1]
+    assert end.label == "NCH"
+    s = end["from_x"]
+    assert (end["k"], end["l"]) == pytest.approx((3 * s * s - 3, 2 * s**3), abs=1e-8)
+
+
+def test_a_short_orbit_ends_the_run():
+    problem = ConnectionProblem(sandstede, ["x", "y"], {"a": 0.0, "nu": 0.0}, unstable=1)
+    orbit = contin.solve(problem, leaf(3), {"time": 3}, free=["nu"], intervals=40)
+    branch = contin.trace(orbit, free=["a", "nu"], limits={"a": (-1, 1)})
+    assert len(branch) == 1 and "it needs a longer time" in branch.stop.message
+
+
+def test_an_orbit_in_one_parameter_has_none():
+    """With ``time`` free the curve is one orbit, cut off elsewhere."""
+    problem = ConnectionProblem(sandstede, ["x", "y"], {"a": 0.0, "nu": 0.0}, unstable=1)
+    orbit = contin.solve(problem, leaf(20), {"time": 20}, free=["nu"], intervals=40)
+    branch = contin.trace(orbit, free=["nu", "time"], primary="time", limits={"time": (10, 30)})
+    assert [point.label for point in branch if point.label] == ["EP", "EP"]
+    with pytest.raises(ProblemError, match="must be"):
+        contin.curve(orbit, "a")

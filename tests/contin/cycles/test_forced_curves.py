@@ -1,0 +1,105 @@
+"""Curves and normal forms of forced cycles, against Mathieu's numbers and the same systems driven by an oscillator."""
+
+import math
+
+import pytest
+from cycles.test_forced import around, duffing, mathieu, two_wells, van_der_pol
+from scipy.special import mathieu_a, mathieu_b
+
+import contin
+from contin import CycleProblem, MeshControl
+
+
+def labels(branch):
+    return [point.label for point in branch if point.label]
+
+
+def test_edges_of_stability_of_mathieu():
+    """a_n(q) and b_n(q), from SciPy: one call each from q = 1 to q = 5. Both multipliers are -1 or 1 all along."""
+    problem = CycleProblem(mathieu, ["x", "v"], {"a": -3.0, "q": 1.0}, period=math.pi)
+    mesh = MeshControl(min_intervals=20)
+    branch = contin.trace(contin.solve(problem, [0, 0], degree=7), free=["a"], limits={"a": (-3, 6)}, mesh=mesh)
+    starts = [point for point in branch if point.label in ("PD", "BP")]
+    known = [(mathieu_a, 0), (mathieu_b, 1), (mathieu_a, 1), (mathieu_b, 2), (mathieu_a, 2)]
+    assert len(starts) == len(known)
+    for start, (number, order) in zip(starts, known):
+        edge = contin.curve(start, free=["a", "q"], limits={"q": (0.5, 5)}, mesh=mesh)
+        assert labels(edge) == ["EP", "EP"] and edge.points[-1]["q"] == pytest.approx(5, abs=1e-12)
+        for point in edge:
+            assert point["a"] == pytest.approx(float(number(order, point["q"])), abs=1e-10)
+
+
+def test_folds_of_duffing():
+    """The folds of the resonance at g = .4, on the curve and on a branch of cycles."""
+    problem = CycleProblem(duffing, ["x", "v"], {"w": 4.0, "g": 0.5}, period=around)
+    branch = contin.trace(contin.solve(problem, [0, 0]), free=["w"], direction=-1, limits={"w": (0.9, 15)})
+    other = contin.trace(contin.solve(problem, [0, 0], {"g": 0.4}), free=["w"], direction=-1, limits={"w": (0.9, 15)})
+    assert len(branch.labelled("LP")) == len(other.labelled("LP")) == 2
+    for fold, known in zip(branch.labelled("LP"), other.labelled("LP")):
+        folds = contin.curve(fold, "g", direction=-1, limits={"g": (0.4, 1)})
+        assert folds.points[-1]["w"] == pytest.approx(known["w"], abs=1e-9)
+
+
+def driven(field, rate):
+    """A forced field with the forcing cos(w t) from an oscillator on the circle r = 1."""
+
+    def autonomous(u, p):
+        s = u.c**2 + u.s**2
+        x, v = field(u, p)
+        return x, v + p.g * u.c, rate * u.c * (1 - s) - p.w * u.s, rate * u.s * (1 - s) + p.w * u.c
+
+    return autonomous
+
+
+@pytest.mark.full
+def test_normal_forms_are_those_of_a_driven_system():
+    """Two wells: the first period doubling, forced and driven."""
+
+    def field(u, p):
+        return u.v, -0.25 * u.v + u.x - u.x**3
+
+    problem = CycleProblem(two_wells, ["x", "v"], {"w": 1.0, "g": 0.0}, period=around)
+    branch = contin.trace(contin.solve(problem, [1.0, 0]), free=["g"], limits={"g": (0, 0.3)})
+    (doubling,) = branch.labelled("PD")
+    extended = CycleProblem(driven(field, 1.0), ["x", "v", "c", "s"], {"w": 1.0, "g": 0.0})
+    orbit = contin.solve(
+        extended, lambda t: (1, 0, math.cos(2 * math.pi * t), math.sin(2 * math.pi * t)), {"period": 2 * math.pi}, degree=5
+    )
+    (known,) = contin.trace(orbit, free=["g"], limits={"g": (0, 0.3)}).labelled("PD")
+    assert doubling["g"] == pytest.approx(known["g"], abs=1e-10)
+    assert doubling.name == known.name == "period doubling, supercritical"
+    assert doubling.normal_form == pytest.approx(known.normal_form, rel=1e-7)
+
+
+def test_a_fold_has_a_normal_form():
+    """x' = b + x^2 averaged: x' = mu + x^2 + cos(t) x^2 / 2 has at mu = x = 0 a fold with b = 1, the mean of 1 + cos(t) / 2."""
+    problem = CycleProblem(
+        lambda t, u, p: (p.mu + u.x**2 * (1 + math.cos(t) / 2), -u.y), ["x", "y"], {"mu": -1.0}, period=2 * math.pi
+    )
+    branch = contin.trace(contin.solve(problem, [-1, 0]), free=["mu"], limits={"mu": (-2, 1), "max_x": (-2, 0.5)})
+    (fold,) = branch.labelled("LP")
+    assert (fold["mu"], fold.normal_form) == pytest.approx((0, 1), abs=1e-8)
+
+
+@pytest.mark.full
+def test_torus_bifurcations_of_van_der_pol():
+    """At g = 1.1, on the curve and on a branch of cycles."""
+    problem = CycleProblem(van_der_pol, ["x", "v"], {"w": 4.0, "g": 0.5}, period=around)
+    first, second = (
+        contin.trace(contin.solve(problem, [0, 0], {"g": g}), free=["w"], direction=-1, limits={"w": (0.3, 15)})
+        for g in (1.0, 1.1)
+    )
+    found = contin.curve(first.labelled("TR")[0], "g", limits={"g": (0.9, 1.1)})
+    assert found.points[-1]["g"] == pytest.approx(1.1, abs=1e-12)
+    assert found.points[-1]["w"] == pytest.approx(second.labelled("TR")[0]["w"], abs=1e-9)
+
+
+@pytest.mark.full
+def test_period_doublings_of_two_wells():
+    """At w = 1.05, on the curve and on a branch of cycles."""
+    problem = CycleProblem(two_wells, ["x", "v"], {"w": 1.0, "g": 0.0}, period=around)
+    first, second = (
+        contin.trace(contin.solve(problem, [1.0, 0], {"w": w}), free=["g"], limits={"g": (0, 0.3)}) for w in (1.0, 1.05)
+    )
+    found = contin.curve(first.labelled("PD")[0], "w", limits={"w": (0.9, 1.05)})
+    assert found.points[-1]["g"] == pytest.approx(second.labelled("PD")[0]["g"], abs=1e-9)
