@@ -11,7 +11,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.continuation.cycle_starts import doubled, from_hopf
+from contin.continuation.cycle_starts import switched
 from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
@@ -31,8 +31,8 @@ from contin.stepping.state import Stop
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
-#: Special points where a branch of another kind begins, by label: cycles at Hopf points, doubled ones at period doublings.
-_SWITCHES = {"HB": from_hopf, "PD": doubled}
+#: Labels of special points where a branch of another kind begins: cycles at Hopf points, doubled ones at period doublings.
+_SWITCHES = ("HB", "PD")
 
 
 @dataclass
@@ -172,7 +172,7 @@ class _Explorer:
             return
         junction.taken[1][1] = len(self.result.branches)
         try:
-            system, x, tangent = _SWITCHES[junction.point.label](junction.point)
+            system, x, tangent = switched(junction.point, self.settings.mesh)
             self._follow(self._run(system, x, self.settings, tangent), junction.depth + 1, junction)
         except ConvergenceError as error:
             junction.failed.append((1, 1, str(error)))

@@ -12,17 +12,33 @@ from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.detection.lyapunov import critical_pair
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.discretization.degree import usual_degree
 from contin.discretization.kinds import discretized
 from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
-#: First mesh of a branch from a Hopf point.
-_INTERVALS, _DEGREE = 20, 4
+#: Intervals of the first mesh of a branch from a Hopf point.
+_INTERVALS = 20
 
 
-def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
+def switched(point: Point, control: MeshControl) -> tuple[PeriodicCollocation, Array, Array]:
+    """Return the system of the cycles that leave a Hopf point or a period doubling, the point in it, and the tangent there.
+
+    Raises
+    ------
+    ProblemError
+        It is neither.
+    ConvergenceError
+        The branch point of doubled orbits is not found.
+    """
+    if point.label == "PD":
+        return doubled(point)
+    return from_hopf(point, usual_degree(len(point.system.problem.states), control.tolerance))
+
+
+def from_hopf(point: Point, degree: int) -> tuple[CycleCollocation, Array, Array]:
     """Return the system of the cycles that leave a Hopf point, the point as an orbit of no size, and the tangent there.
 
     The tangent is the ellipse of the critical eigenvector v, Re(v exp(2 pi i t)), with the period 2 pi over the frequency.
@@ -39,7 +55,7 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
     problem = CycleProblem.of(system.problem)
     parameters = {**point.parameters, PERIOD: 2 * math.pi / frequency}
     mesh = np.linspace(0, 1, _INTERVALS + 1)
-    cycles = CycleCollocation(problem, mesh, _DEGREE, (system.free[0], PERIOD), parameters)
+    cycles = CycleCollocation(problem, mesh, degree, (system.free[0], PERIOD), parameters)
     wave = np.exp(2j * math.pi * cycles.nodes)[:, None]
     ellipse = (wave * vector).real
     rest = np.tile(system.states(point.x), (cycles.nodes.size, 1))

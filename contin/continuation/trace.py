@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from contin import checks
-from contin.continuation.cycle_starts import doubled, from_hopf
+from contin.continuation.cycle_starts import switched
 from contin.continuation.run import follow_until_interrupted
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
@@ -56,7 +56,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         return follow_until_interrupted(system, x, settings)
     checks.whole("branch", branch, 0, 10)
     if start.label in ("HB", "PD") and branch == 1:
-        cycles, x, tangent = from_hopf(start) if start.label == "HB" else doubled(start)
+        cycles, x, tangent = switched(start, settings.mesh)
         return follow_until_interrupted(cycles, x, settings, settings.direction * tangent)
     if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")
