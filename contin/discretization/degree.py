@@ -14,11 +14,11 @@ from contin.discretization.mesh import share
 #: the cheapest.
 _CHOSEN, _COMPARED = range(4, 8), range(4, 9)
 #: Microseconds that a Newton iteration takes for its Python code, for an interval, and for each of (n d)^2 entries of an
-#: interval's block (docs/performance.md, cost laws). Ten times more Python code: the degree is 7 for up to 6 states at any
-#: tolerance from 1e-4, and for up to 30 at 1e-12. Ten times more for an entry: it is 6 at 1e-12 from 4 states on.
+#: interval's block (docs/performance.md, cost laws). If the first were ten times larger, the degree at 1e-12
+#: would be 7 for more than 30 states instead of up to 12; if the last were, for up to 3.
 _ITERATION, _INTERVAL, _ENTRY = 1000.0, 3.0, 0.0075
 #: The fewest intervals: those of special points, which are located on meshes with twice `MeshControl.min_intervals`. With ten
-#: times as many, the degree at 1e-12 is 6 from 7 states on.
+#: times as many, the degree at 1e-12 would be 7 for up to 5 states.
 _FEWEST = 16
 #: Solutions are considered from one for which every degree has the fewest intervals to one that needs so many times as many.
 #: Ten times more changes no degree.
@@ -29,11 +29,11 @@ _HARDEST, _SAMPLES = 1e4, 200
 def usual_degree(states: int, tolerance: float) -> int:
     """Return the degree for n states and a tolerance that is never far from the cheapest one, whatever the solution is.
 
-    A Newton iteration on N intervals of degree d takes the time a + N (b + c (n d)^2). A solution whose density has the integral
-    K needs N = K / share(d) intervals, but no fewer than some number. Many states and easy solutions (small K) want a low degree,
-    few states and difficult solutions a high one. K is not known before the solution is. The result is the degree whose time,
-    divided by that of the cheapest degree, is smallest at the K that is worst for it. That quotient is below 2 for tolerances
-    from 1e-12 and any number of states, and below 1.6 for fewer than 20 states.
+    A Newton iteration on N intervals of degree d takes the time a + N (b + c (n d)^2). A solution whose density has the
+    integral K needs N = K / share(d) intervals, but no fewer than some number. Many states and easy solutions (small K) want a
+    low degree, few states and difficult solutions a high one. K is not known before the solution is. The result is the degree
+    whose time, divided by that of the cheapest degree, is smallest at the K that is worst for it. That quotient is below 2 for
+    tolerances from 1e-12 and any number of states, and below 1.6 for fewer than 20 states.
     """
     shares = {d: share(basis(d), tolerance) for d in _COMPARED}
     easiest = _FEWEST * min(shares.values())
