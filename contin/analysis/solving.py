@@ -49,7 +49,7 @@ def solve(
         Of the first mesh, which is uniform unless the guess has one.
     degree : int, optional
         Of the collocation, 2 to 8. By default that of the guess, if it has one; otherwise it follows from the number of states
-        and the tolerance of the mesh: 7 for up to 6 states, down to 4 for more states and larger tolerances.
+        and the tolerance of the mesh: 7 for up to 5 states, down to 4 for more states and larger tolerances.
     mesh : MeshControl, optional
         How the mesh adapts; ``MeshControl(every=0)`` keeps the first one.
     others : sequence of Point

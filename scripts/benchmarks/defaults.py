@@ -32,7 +32,7 @@ ROWS = 12
 
 @dataclass(frozen=True)
 class Task:
-    """A run: ``run(degree, tolerance)`` returns its branch; ``exact`` lists the values of its special points, with their errors."""
+    """A run: ``run(degree, tolerance)`` returns its branch. ``exact`` lists its special points: label, values, uncertainty."""
 
     name: str
     run: Callable[[int | None, float], contin.Branch]
