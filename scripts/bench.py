@@ -1,6 +1,7 @@
 """Time contin and other tools on your machine: pictures, a table of ratios, and every number as JSON.
 
-    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [cycles] [--quick] [--out DIR]
+    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [cycles] [defaults]
+                            [--quick] [--out DIR]
 
 Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A tool
 that is not installed is left out, and the output names it. See docs/performance.md.
@@ -22,7 +23,7 @@ from benchmarks.measure import ONE_THREAD  # noqa: E402  (it imports nothing tha
 
 os.environ.update(ONE_THREAD)
 
-PARTS = ("like-for-like", "fold", "cost", "startup", "many", "stress", "cores", "cycles")
+PARTS = ("like-for-like", "fold", "cost", "startup", "many", "stress", "cores", "cycles", "defaults")
 
 
 def arguments(argv=None) -> argparse.Namespace:
@@ -52,7 +53,7 @@ def arguments(argv=None) -> argparse.Namespace:
 
 def measure(part: str, quick: bool, bifpy_python: str) -> dict:
     """Run one part."""
-    from benchmarks import cores, cost, cycles, fold, like_for_like, many, startup, stress
+    from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, startup, stress
 
     from ribbon_model import exact
 
@@ -66,6 +67,8 @@ def measure(part: str, quick: bool, bifpy_python: str) -> dict:
         return stress.run(quick)
     if part == "cycles":
         return cycles.run(quick)
+    if part == "defaults":
+        return defaults.run(quick)
     exact_fold = exact.folds(1, 2)[0].kappa_n
     if part == "cores":
         return cores.run(quick, exact_fold)
@@ -77,7 +80,7 @@ def measure(part: str, quick: bool, bifpy_python: str) -> dict:
 def main(argv=None) -> int:
     """Run the requested parts, and write the results."""
     options = arguments(argv)
-    from benchmarks import cores, cycles, like_for_like, report
+    from benchmarks import cores, cycles, defaults, like_for_like, report
     from benchmarks.measure import machine
 
     results, out = {"machine": machine()}, Path(options.out)
@@ -101,6 +104,8 @@ def main(argv=None) -> int:
     if "cycles" in results:
         found = cycles.ratio(results["cycles"])
         print(f"ratio per orbit, AUTO-07p / contin: {'AUTO-07p is not installed' if found is None else f'{found:.2f}'}")
+    if "defaults" in results:
+        print(f"worst default / best: {defaults.worst(results['defaults']):.2f}")
     return 0
 
 

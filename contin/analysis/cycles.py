@@ -26,7 +26,8 @@ _MOST_ROUNDS, _CLOSED = 16, 1e-3
 
 
 def cycle(
-    problem: CycleProblem, start: Any, parameters: Any = None, *, settle: float = 100.0, intervals: int = 40, degree: int = 4,
+    problem: CycleProblem, start: Any, parameters: Any = None, *, settle: float = 100.0, intervals: int = 40,
+    degree: int | None = None,
 ) -> Point:  # fmt: skip
     """Return the stable cycle that a time integration from ``start`` settles on.
 
@@ -40,7 +41,7 @@ def cycle(
     settle : float
         Time after which the motion is taken to be periodic.
     intervals, degree : int
-        First mesh and degree of the collocation.
+        First mesh and degree of the collocation, as in `solve`.
 
     Raises
     ------

@@ -11,7 +11,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.continuation.cycle_starts import start_at
+from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
@@ -179,7 +179,7 @@ class _Explorer:
             done += 1
             if junction.depth >= depth:
                 continue
-            if start_at(junction.point) is not None:
+            if switches(junction.point):
                 self._switch(junction)
                 continue
             for which, tangent in enumerate(junction.point.details.tangents):
@@ -203,9 +203,7 @@ class _Explorer:
             return
         junction.taken[1][1] = len(self.result.branches)
         try:
-            start = start_at(junction.point)
-            assert start is not None
-            system, x, tangent = start(junction.point)
+            system, x, tangent = switched(junction.point, self.settings.mesh)
             self._follow(self._run(system, x, self.settings, tangent), junction.depth + 1, junction)
         except ConvergenceError as error:
             junction.failed.append((1, 1, str(error)))
@@ -231,10 +229,10 @@ class _Explorer:
 
     def _is_known(self, point: Point, number: int, depth: int) -> bool:
         """Note a point that a run passes, if it is one to leave a branch at; return True if the way ahead was followed."""
-        switches = start_at(point) is not None
-        if isinstance(point.details, (BranchPoint, MultiplePoint)) and not switches:
+        begins = switches(point)
+        if isinstance(point.details, (BranchPoint, MultiplePoint)) and not begins:
             return bool(point.details.tangents) and self._arrived(point, number, depth)
-        return switches and self._met(point, number, depth)
+        return begins and self._met(point, number, depth)
 
     def _met(self, point: Point, number: int, depth: int) -> bool:
         """Note a Hopf point or period doubling on a run; return True if it is known already."""

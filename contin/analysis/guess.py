@@ -65,15 +65,15 @@ def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tu
 @first_guess.register
 def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Options) -> tuple[System, Array]:
     a, b = problem.domain
-    mesh, degree = np.linspace(a, b, options.intervals + 1), options.degree
+    mesh = np.linspace(a, b, options.intervals + 1)
     order = problem.order if isinstance(problem, CycleProblem) else 1
     if isinstance(guess, Point):
-        mesh, degree = _mesh_of(_meshed(guess), order), guess.system.degree
+        mesh = _mesh_of(_meshed(guess), order)
     elif _is_pair(guess):
         given = _numbers(guess[0])
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a or not given[-1] >= b:
             raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
-    system = discretized(problem, mesh, degree, options.free, options.parameters)
+    system = discretized(problem, mesh, options.degree, options.free, options.parameters)
     if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
         return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
     states = _sampled(guess, system.nodes / order, len(problem.state_names))

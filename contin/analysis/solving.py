@@ -13,6 +13,7 @@ from contin.arrays import Array
 from contin.detection.second_variation import degeneracy
 from contin.discretization.basis import DEGREES
 from contin.discretization.collocation import Collocation
+from contin.discretization.degree import usual_degree
 from contin.discretization.mesh import MOST_INTERVALS, MeshControl
 from contin.discretization.system import System
 from contin.errors import ConvergenceError, ProblemError
@@ -29,8 +30,8 @@ _ROUNDS = 4
 
 def solve(
     problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess = None, parameters: Mapping[str, float] | None = None, *,
-    free: Sequence[str] = (), intervals: int = 20, degree: int = 4, mesh: MeshControl | None = None, newton: Newton = Newton(),
-    others: Sequence[Point] = (),
+    free: Sequence[str] = (), intervals: int = 20, degree: int | None = None, mesh: MeshControl | None = None,
+    newton: Newton = Newton(), others: Sequence[Point] = (),
 ) -> Point:  # fmt: skip
     """Return one solution near a guess, on a mesh adapted to it.
 
@@ -44,8 +45,11 @@ def solve(
         Values that differ from the defaults (of the problem, or of the guess if it is a point).
     free : sequence of str
         Parameters to be found along with the states, for problems with more conditions than states.
-    intervals, degree : int
-        First mesh (uniform, unless the guess has one) and degree of the collocation.
+    intervals : int
+        Of the first mesh, which is uniform unless the guess has one.
+    degree : int, optional
+        Of the collocation, 2 to 8. By default that of the guess, if it has one; otherwise it follows from the number of states
+        and the tolerance of the mesh: 7 for up to 5 states, down to 4 for more states and larger tolerances.
     mesh : MeshControl, optional
         How the mesh adapts; ``MeshControl(every=0)`` keeps the first one.
     others : sequence of Point
@@ -80,6 +84,8 @@ def solve(
         raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
     if len(free) != needed:
         raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
+    if degree is None:
+        degree = guess.system.degree if isinstance(guess, Point) else usual_degree(len(problem.state_names), control.tolerance)
     system, x = first_guess(problem, guess, Options(parameters, free, intervals, degree))
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
@@ -125,7 +131,8 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
 def _check_options(problem: object, intervals: object, degree: object, control: object, newton: object) -> None:
     checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
     checks.whole("intervals", intervals, 1, MOST_INTERVALS)
-    checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
+    if degree is not None:
+        checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
     checks.instance("mesh", control, MeshControl, "a MeshControl")
     checks.instance("newton", newton, Newton, "a Newton")
 

@@ -12,7 +12,7 @@ import numpy as np
 from contin import checks
 from contin.analysis.codimension_two import leaving
 from contin.arrays import Array
-from contin.continuation.cycle_starts import doubled, frequency_of, start_at
+from contin.continuation.cycle_starts import doubles, frequency_of
 from contin.continuation.run import follow
 from contin.curves.branch_point_curve import BranchPointCurve
 from contin.curves.cycle_curves import DoublingCurve, TorusCurve
@@ -172,7 +172,7 @@ def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _doublings(start: Point, base: System, x: Array) -> _First | None:
-    return (DoublingCurve(base), x) if start_at(start) is doubled and isinstance(base, PeriodicCollocation) else None
+    return (DoublingCurve(base), x) if doubles(start) and isinstance(base, PeriodicCollocation) else None
 
 
 def _tori(start: Point, base: System, x: Array) -> _First | None:

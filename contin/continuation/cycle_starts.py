@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,17 +12,43 @@ from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.detection.lyapunov import CriticalPair, critical_pair
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.discretization.degree import usual_degree
 from contin.discretization.kinds import discretized
 from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
-#: First mesh of a branch from a Hopf point.
-_INTERVALS, _DEGREE = 20, 4
+#: Intervals of the first mesh of a branch from a Hopf point.
+_INTERVALS = 20
 
 
-def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
+def doubles(point: Point) -> bool:
+    """Return whether `doubled` orbits leave a point: a period doubling, or a branch point at which a symmetry breaks."""
+    return point.label == "PD" or (point.label == "BP" and isinstance(point.details, dict))
+
+
+def switches(point: Point) -> bool:
+    """Return whether a branch of another kind begins at a point."""
+    return point.label == "HB" or doubles(point)
+
+
+def switched(point: Point, control: MeshControl) -> tuple[PeriodicCollocation, Array, Array]:
+    """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
+
+    Raises
+    ------
+    ProblemError
+        None begin there.
+    ConvergenceError
+        The branch point of doubled orbits is not found.
+    """
+    if doubles(point):
+        return doubled(point)
+    return from_hopf(point, usual_degree(len(point.system.problem.states), control.tolerance))
+
+
+def from_hopf(point: Point, degree: int) -> tuple[CycleCollocation, Array, Array]:
     """Return the system of the cycles that leave a Hopf point, the point as an orbit of no size, and the tangent there.
 
     The tangent is the ellipse of the critical eigenvector v, Re(v exp(2 pi i t)), with the period 2 pi over the frequency.
@@ -37,11 +62,13 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
     if point.label != "HB" or not isinstance(system, Algebraic):
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
-    cycles, x, tangent = small_cycle(system, point.x, pair, 0.0)
+    cycles, x, tangent = small_cycle(system, point.x, pair, 0.0, degree)
     return cycles.with_reference(x + tangent), x, tangent
 
 
-def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) -> tuple[CycleCollocation, Array, Array]:
+def small_cycle(
+    system: Algebraic, x: Array, pair: CriticalPair, size: float, degree: int
+) -> tuple[CycleCollocation, Array, Array]:
     """Return the system of cycles beside a Hopf point x, the ellipse of this size as one, and the direction in which it grows.
 
     The free parameters are those of ``system`` and, after the first, the period.
@@ -50,7 +77,7 @@ def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) ->
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     parameters[PERIOD] = 2 * math.pi / pair.frequency
     mesh = np.linspace(0, 1, _INTERVALS + 1)
-    cycles = CycleCollocation(CycleProblem.of(system.problem), mesh, _DEGREE, (first, PERIOD, *others), parameters)
+    cycles = CycleCollocation(CycleProblem.of(system.problem), mesh, degree, (first, PERIOD, *others), parameters)
     wave = np.exp(2j * math.pi * cycles.nodes)[:, None]
     rest = cycles.pack(np.tile(system.states(x), (cycles.nodes.size, 1)), parameters)
     tangent = cycles.pack((wave * pair.right).real, dict.fromkeys(cycles.free, 0.0))
@@ -61,13 +88,6 @@ def frequency_of(point: Point) -> float | None:
     """Return the frequency of a Hopf or torus bifurcation; None where it was stored without it."""
     known = isinstance(point.details, dict) and "frequency" in point.details
     return float(point.details["frequency"]) if known else None
-
-
-def start_at(point: Point) -> Callable[[Point], tuple[PeriodicCollocation, Array, Array]] | None:
-    """Return the function that finds the start of the other kind of branch at a point; None where none begins there."""
-    if point.label == "BP" and not isinstance(point.details, dict):
-        return None  # a branch point at which all branches are of one kind
-    return {"HB": from_hopf, "PD": doubled, "BP": doubled}.get(point.label)
 
 
 def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
@@ -85,7 +105,7 @@ def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
         The branch point is not found.
     """
     system: Any = point.system
-    if start_at(point) is not doubled:
+    if not doubles(point):
         raise ProblemError(f"start: a point with the label {point.label!r} is no period doubling")
     adapted = system.adapted(point.x, MeshControl())  # the point is located on a mesh finer than the run needs
     system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))

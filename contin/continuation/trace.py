@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from contin import checks
-from contin.continuation.cycle_starts import start_at
+from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.run import follow_until_interrupted
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
@@ -55,9 +55,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if branch is None:
         return follow_until_interrupted(system, x, settings)
     checks.whole("branch", branch, 0, 10)
-    switch = start_at(start) if branch == 1 else None
-    if switch is not None:
-        cycles, x, tangent = switch(start)
+    if branch == 1 and switches(start):
+        cycles, x, tangent = switched(start, settings.mesh)
         return follow_until_interrupted(cycles, x, settings, settings.direction * tangent)
     if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")

@@ -90,17 +90,23 @@ def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl)
     """Return a better mesh for a solution, given by its states at the nodes, or None where the present one is good enough.
 
     It equidistributes the density (smoothed, and raised to at least a tenth of its mean so that no interval grows without
-    bound) over as many intervals as ``control.tolerance`` takes, by the interpolation error of degree d.
+    bound) over as many intervals as ``control.tolerance`` takes.
     """
-    h, d = np.diff(mesh), basis.degree
+    h = np.diff(mesh)
     phi = _raised(density(basis, mesh, states), h)
-    total = phi @ h
-    allowed = (_BETWEEN * control.tolerance ** ((d + 1) / (2 * d)) / basis.constant) ** (1 / (d + 1))
+    total = float(phi @ h)
+    allowed = share(basis, control.tolerance)
     wanted = int(np.clip(np.ceil(total / allowed), control.min_intervals, control.max_intervals))
     enough = wanted <= h.size <= max(_TOO_MANY * wanted, control.min_intervals)
     if enough and (phi * h).max() <= _TOO_LARGE * max(total / h.size, allowed * wanted / h.size):
         return None
     return _equidistributed(mesh, phi, h.size if enough else wanted)
+
+
+def share(basis: Basis, tolerance: float) -> float:
+    """Return the density times length that an interval may have for a tolerance, by the interpolation error of degree d."""
+    d = basis.degree
+    return float((_BETWEEN * tolerance ** ((d + 1) / (2 * d)) / basis.constant) ** (1 / (d + 1)))
 
 
 def equidistributed(basis: Basis, mesh: Array, states: Array, intervals: int) -> Array:

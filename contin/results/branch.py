@@ -35,7 +35,7 @@ class Branch:
 
     def __repr__(self) -> str:
         labels = " ".join(point.label for point in self.points if point.label)
-        return f"Branch({len(self.points)} points: {labels}; {self.stop or 'not ended'})"
+        return f"Branch({len(self.points)} points{table.meshes(self.points)}: {labels}; {self.stop or 'not ended'})"
 
     def __len__(self) -> int:
         return len(self.points)
@@ -72,8 +72,8 @@ class Branch:
     def to_pandas(self) -> Any:
         """Return all points as a ``pandas.DataFrame``, a row a point, in order.
 
-        Columns: ``label``, ``name``, ``arclength``, ``intervals``, ``iterations``, all parameters, all functionals, and
-        ``norm``.
+        Columns: ``label``, ``name``, ``arclength``, ``intervals``, ``degree``, ``iterations``, all parameters, all functionals,
+        and ``norm``.
 
         Raises
         ------

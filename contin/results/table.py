@@ -22,7 +22,8 @@ def to_pandas(points: Sequence[Point]) -> Any:
     rows = [
         {
             "label": point.label, "name": point.name, "arclength": point.arclength, "intervals": point.system.intervals,
-            "iterations": point.iterations, **({} if point.index is None else {"index": point.index}),
+            "degree": point.system.degree, "iterations": point.iterations,
+            **({} if point.index is None else {"index": point.index}),
             **({} if point.normal_form is None else {"normal_form": point.normal_form}), **point.parameters,
             **point.functionals,
         }
@@ -31,10 +32,20 @@ def to_pandas(points: Sequence[Point]) -> Any:
     return pandas.DataFrame(rows).assign(norm=column(points, "norm"))
 
 
+def meshes(points: Sequence[Point]) -> str:
+    """Return the numbers of intervals of a branch and their degree, as text; nothing where there is no mesh."""
+    counts = [point.system.intervals for point in points]
+    if not any(counts):
+        return ""
+    fewest, most = min(counts), max(counts)
+    between = f"{most}" if fewest == most else f"{fewest} to {most}"
+    return f" on {between} interval{'s' * (most != 1)} of degree {points[0].system.degree}"
+
+
 def to_html(points: Sequence[Point], stop: object) -> str:
     """Return a branch for a notebook: a picture where it can be drawn, the labelled points, and why the run ended."""
     count, ended = len(points), f"; {html.escape(str(stop))}" if stop else ""
-    parts = [f"<p><b>Branch</b> of {count} point{'s' * (count != 1)}{ended}</p>"]
+    parts = [f"<p><b>Branch</b> of {count} point{'s' * (count != 1)}{meshes(points)}{ended}</p>"]
     if points:
         parts += [picture(points), _table(points)]
     return f"<div>{''.join(parts)}</div>"

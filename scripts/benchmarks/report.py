@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cores, cost, cycles, fold, like_for_like, many, startup, stress
+from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, startup, stress
 
 TITLES = {
     "like-for-like": "Like for like",
@@ -18,6 +18,7 @@ TITLES = {
     "stress": "Numerical stability",
     "cores": "Two cores",
     "cycles": "Cycles",
+    "defaults": "Default degree",
 }
 TABLES = {
     "like-for-like": like_for_like.table,
@@ -28,6 +29,7 @@ TABLES = {
     "stress": stress.table,
     "cores": cores.table,
     "cycles": cycles.table,
+    "defaults": defaults.table,
 }
 
 

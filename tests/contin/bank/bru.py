@@ -35,7 +35,7 @@ def problem():
 
 @functools.cache
 def uniform():
-    return trace(solve(problem(), [2, 0, 2.3, 0], degree=6), free=["L"], limits={"L": (0.01, 0.45)})
+    return trace(solve(problem(), [2, 0, 2.3, 0]), free=["L"], limits={"L": (0.01, 0.45)})
 
 
 def half_branch(which, sign):

@@ -32,7 +32,7 @@ def problem():
 
 @functools.cache
 def trivial():
-    start = solve(problem(), [0, 0], free=["mean"], degree=6)
+    start = solve(problem(), [0, 0], free=["mean"])
     return trace(start, free=["lam", "mean"], limits={"lam": (0, 5.5)})
 
 

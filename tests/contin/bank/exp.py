@@ -26,7 +26,7 @@ def problem():
 
 
 def run():
-    start = solve(problem(), [0, 0], degree=6)
+    start = solve(problem(), [0, 0])
     return trace(start, free=["lam"], limits={"lam": (-1, 4), "mean": (-1, 6)}, zeros={"lam": [1.0]})
 
 

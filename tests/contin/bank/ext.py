@@ -29,7 +29,7 @@ def problem():
 
 @functools.cache
 def trivial():
-    return trace(solve(problem(), [0, 0], degree=6), free=["lam"], limits={"lam": (0, 4.6)})
+    return trace(solve(problem(), [0, 0]), free=["lam"], limits={"lam": (0, 4.6)})
 
 
 def half_branch(which, sign):

@@ -30,7 +30,7 @@ def problem():
 
 @functools.cache
 def real():
-    start = solve(problem(), [0, 0, 0, 0], degree=6)
+    start = solve(problem(), [0, 0, 0, 0])
     return trace(start, free=["lam"], limits={"lam": (-1, 6), "re": (-1, 3)}, zeros={"lam": [2.0]})
 
 

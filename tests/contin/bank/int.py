@@ -36,7 +36,7 @@ def problem():
 
 @functools.cache
 def branch():
-    start = solve(problem(), [0, 0], {"p1": 0.1}, degree=6)
+    start = solve(problem(), [0, 0], {"p1": 0.1})
     return trace(start, free=["p1"], limits={"p1": (-1, 20), "square": (-1, 10)}, zeros={"p1": [1.0, 3.0]})
 
 

@@ -40,7 +40,7 @@ def problem():
 
 
 def run():
-    start = solve(problem(), [0] * 5, free=["inf"], intervals=40, degree=5)
+    start = solve(problem(), [0] * 5, free=["inf"], intervals=40)
     return run_until(
         start, ["gam", "inf"], 8, direction=-1, limits={"gam": (-2, 2)}, zeros={"gam": [0.0]}, mesh=MeshControl(tolerance=1e-10)
     )

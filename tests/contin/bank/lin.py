@@ -32,7 +32,7 @@ def problem():
 
 @functools.cache
 def trivial():
-    start = solve(problem(), [0, 0], free=["p3"], degree=6)
+    start = solve(problem(), [0, 0], free=["p3"])
     return trace(start, free=["lam", "p3"], limits={"lam": (0, 5.5)})
 
 

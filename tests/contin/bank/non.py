@@ -26,7 +26,7 @@ def problem():
 
 
 def run():
-    start = solve(problem(), [0, 0], degree=6)
+    start = solve(problem(), [0, 0])
     return trace(start, free=["p1"], limits={"p1": (-1, 20), "mean": (-1, 5)}, zeros={"p1": [1.0, 3.0]})
 
 

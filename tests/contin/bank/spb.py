@@ -28,7 +28,7 @@ def problem():
 
 @functools.cache
 def homotopy():
-    start = solve(problem(), lambda t: (1.5 - 0.3 * t, -0.3), degree=6)
+    start = solve(problem(), lambda t: (1.5 - 0.3 * t, -0.3))
     return trace(start, free=["lam"], limits={"lam": (-0.1, 1)})
 
 

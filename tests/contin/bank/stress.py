@@ -23,12 +23,11 @@ VARIANTS = (
 )  # fmt: skip
 
 
-def changed(function, extra, only=()):
-    """A function with options added (or, where ``only`` names some, those replaced that it was given)."""
+def changed(function, extra):
+    """A function with options added."""
 
     def call(*args, **options):
-        more = {name: value for name, value in extra.items() if not only or name in options}
-        return function(*args, **{**options, **more})
+        return function(*args, **{**options, **extra})
 
     return call
 
@@ -45,7 +44,7 @@ def modules(variant):
                 if what in vars(module) and what in vars(place):
                     setattr(module, what, changed(getattr(place, what), options))
         if degree and "solve" in vars(module):
-            module.solve = changed(contin.solve, degree, only=("degree",))
+            module.solve = changed(contin.solve, degree)
         yield module
 
 

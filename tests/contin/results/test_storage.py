@@ -66,3 +66,13 @@ def test_columns_of_scaled_and_algebraic_problems(tmp_path):
     assert np.array_equal(stored.columns["a"], branch.column("a"))
     for (times, states), point in zip(stored.profiles, branch, strict=True):
         assert len(times) == 1 and np.array_equal(states, point.system.states(point.x))
+
+
+def test_the_degree_is_stored(tmp_path):
+    """A branch of the default degree goes on from a file as from memory, bit by bit."""
+    branch = trace(solve(elastica(), [0, 0]), free=["lam"], limits={"lam": (1, 20)})
+    save(branch, tmp_path / "b.npz")
+    again = load(elastica(), tmp_path / "b.npz")
+    assert {point.system.degree for point in (*branch, *again)} == {7} and repr(again) == repr(branch)
+    first, second = (trace(b.points[-1], free=["lam"], limits={"lam": (1, 60)}) for b in (branch, again))
+    assert np.array_equal(first.column("lam"), second.column("lam"))
