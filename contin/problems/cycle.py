@@ -11,11 +11,11 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Signature, argument_count
+from contin.functions.signature import Signature
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
-from contin.problems.vector_field import check_field, found_elsewhere, generated, scaled
+from contin.problems.vector_field import check_field, found_elsewhere, generated, of_parameters, scaled
 
 #: What is said of a field with other arguments.
 _FORCED = "must be a function of (t, u, p), as a period is given"
@@ -99,7 +99,7 @@ class CycleProblem(BoundaryValueProblem):
                 raise ProblemError(f"parameters: {name} is a column of every cycle by itself")
         check_field(field, Signature(names, tuple(parameters), times=forced), _FORCED if forced else _AUTONOMOUS)
         count = len(names)
-        found = None if period is None else _period_function(period, parameters)
+        found = None if period is None else of_parameters("period", period, parameters, positive=True)
         rhs = scaled(field, PERIOD, count) if found is None else _scaled_by_forcing(field, found, count)
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "means", means)
@@ -144,26 +144,6 @@ class CycleProblem(BoundaryValueProblem):
             return super()._compiled(name)
         functions = [_of_time(f) if self.period is None else _of_forcing(f, self.period) for f in self.means.values()]
         return Batch(functions, [0] * len(functions), self.state_names, tuple(self.parameters))
-
-
-def _period_function(period: Period, parameters: Mapping[str, float]) -> Function:
-    """Return the period of a forcing as a function of the parameters.
-
-    Raises
-    ------
-    ProblemError
-        It is no positive number, parameter or function of one argument.
-    """
-    if isinstance(period, str):
-        if period not in parameters:
-            raise ProblemError(f"period: {checks.shown(period)} is no parameter; there are {', '.join(parameters) or 'none'}")
-        return generated("period", f"def period(p):\n    return p.{period}\n", {})
-    if callable(period):
-        if argument_count(period) != 1:
-            raise ProblemError("period: must be a function of p alone")
-        return period
-    checks.number("period", period, 0)
-    return generated("period", f"def period(p):\n    return {float(period)!r}\n", {})
 
 
 def _scaled_by_forcing(field: Function, period: Function, count: int) -> Function:
