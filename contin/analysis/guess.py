@@ -22,6 +22,7 @@ from contin.names import exact_text
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import CycleProblem
+from contin.problems.segmented import SegmentedProblem
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point
 
@@ -79,6 +80,16 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
     states = _sampled(guess, system.nodes / order, len(problem.state_names))
     x = system.pack(states, {**problem.parameters, **options.parameters})
     return system.with_reference(x), x
+
+
+@first_guess.register
+def _of_segments(problem: SegmentedProblem, guess: Any, options: Options) -> tuple[System, Array]:
+    """A list with a guess for each segment: its states, constant or as a function of s; or a guess of all states, on [0, 1]."""
+    if isinstance(guess, list) and any(callable(each) or isinstance(each, (list, tuple, np.ndarray)) for each in guess):
+        if len(guess) != len(problem.pieces):
+            raise ProblemError(f"guess: {len(guess)} guesses, must be one for each of the {len(problem.pieces)} segments")
+        guess = problem.guessed(guess, {**problem.parameters, **options.parameters})
+    return _of_boundary_value(problem, guess, options)
 
 
 def _sampled(guess: Guess, nodes: Array, count: int) -> Array:

@@ -218,7 +218,7 @@ def _values(start: Point, base: Any, x: Array) -> _First | None:
 def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
     """A point that a test function of its curve has labelled."""
     for test in own_test_functions(start.system):
-        if (test.label, test.name) == (start.label, start.name) and test.search is None:
+        if (test.label, test.name) == (start.label, start.name):
             return EventCurve(base, test.function), x
     return None
 

@@ -14,12 +14,12 @@ from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Signature, argument_count
+from contin.functions.signature import Signature
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle_symmetry import averaged, check_equivariance, linear, order_of, symmetry_matrix
 from contin.problems.statement import check_statement
-from contin.problems.vector_field import check_field, found_elsewhere, generated, scaled
+from contin.problems.vector_field import check_field, found_elsewhere, generated, of_parameters, scaled
 
 #: What is said of a field with other arguments.
 _FORCED = "must be a function of (t, u, p), as a period is given"
@@ -111,13 +111,13 @@ class CycleProblem(BoundaryValueProblem):
         count = len(names)
         turn = _turn(symmetry, forced, count)
         check_equivariance(field, turn, names, parameters)
-        found, order = None if period is None else _period_function(period, parameters), order_of(turn)
-        rhs = scaled(field, PERIOD, count, order) if found is None else _scaled_by_forcing(field, found, count)
+        found = None if period is None else of_parameters("period", period, parameters, positive=True)
+        rhs = scaled(field, PERIOD, count, order_of(turn)) if found is None else _scaled_by_forcing(field, found, count)
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "means", means)
         object.__setattr__(self, "period", found)
         object.__setattr__(self, "symmetry", turn)
-        object.__setattr__(self, "order", order)
+        object.__setattr__(self, "order", order_of(turn))
         super().__init__(rhs, _periodic(turn), names, {**parameters, **({ROUNDS: 1.0} if forced else {PERIOD: 1.0})})
         columns = [*extremes, PERIOD] if forced else extremes
         object.__setattr__(self, "functionals", {**dict.fromkeys(columns, found_elsewhere), **means})
@@ -214,26 +214,6 @@ def _turn(symmetry: Any, forced: bool, count: int) -> Array:
 
 #: The cycles of vector fields that are still used: to state them anew would make their functions ready again.
 _STATED: weakref.WeakKeyDictionary[AlgebraicProblem, CycleProblem] = weakref.WeakKeyDictionary()
-
-
-def _period_function(period: Period, parameters: Mapping[str, float]) -> Function:
-    """Return the period of a forcing as a function of the parameters.
-
-    Raises
-    ------
-    ProblemError
-        It is no positive number, parameter or function of one argument.
-    """
-    if isinstance(period, str):
-        if period not in parameters:
-            raise ProblemError(f"period: {checks.shown(period)} is no parameter; there are {', '.join(parameters) or 'none'}")
-        return generated("period", f"def period(p):\n    return p.{period}\n", {})
-    if callable(period):
-        if argument_count(period) != 1:
-            raise ProblemError("period: must be a function of p alone")
-        return period
-    checks.number("period", period, 0)
-    return generated("period", f"def period(p):\n    return {float(period)!r}\n", {})
 
 
 def _scaled_by_forcing(field: Function, period: Function, count: int) -> Function:

@@ -1,4 +1,4 @@
-"""What statements of orbits have in common: a vector field u' = F(u, p), and functions generated from it."""
+"""Functions generated from those of users; checks of vector fields u' = F(u, p), for orbits of all kinds."""
 
 from __future__ import annotations
 
@@ -31,6 +31,28 @@ def generated(name: str, source: str, names: Mapping[str, Any]) -> Function:
     exec(source, scope)
     found: Function = scope[name]
     return found
+
+
+def of_parameters(
+    what: str, value: float | str | Function, parameters: Mapping[str, float], positive: bool = False
+) -> Function:
+    """Return a number, parameter or function of the parameters as a function of these; ``what`` names it in messages.
+
+    Raises
+    ------
+    ProblemError
+        It is none of these, or a number that is not positive where it must be.
+    """
+    if isinstance(value, str):
+        if value not in parameters:
+            raise ProblemError(f"{what}: {checks.shown(value)} is no parameter; there are {', '.join(parameters) or 'none'}")
+        return generated("quantity", f"def quantity(p):\n    return p.{value}\n", {})
+    if callable(value):
+        if argument_count(value) != 1:
+            raise ProblemError(f"{what}: must be a function of p alone")
+        return value
+    checks.number(what, value, *([0] if positive else []))
+    return generated("quantity", f"def quantity(p):\n    return {float(value)!r}\n", {})
 
 
 def scaled(field: Function, by: str, count: int, parts: int = 1) -> Function:

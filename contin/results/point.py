@@ -17,6 +17,7 @@ from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.results import portrait
+from contin.results.profile import Profile
 from contin.stepping.trial import Trial
 
 #: Kinds of curves in two parameters that begin at, or pass, points of codimension two of equilibria.
@@ -183,6 +184,16 @@ class Point:
         2
         """
         return portrait.plot(self, what, states, axes)
+
+    def segment(self, index: int) -> Profile:
+        """Return the solution on one segment of a `SegmentedProblem`, over its own coordinate; segments count from 0.
+
+        Raises
+        ------
+        ProblemError
+            The problem has no segments, or fewer.
+        """
+        return Profile(self, index)
 
     def floquet(self) -> Floquet:
         """Return the Floquet multipliers of a cycle, with estimates of their errors.

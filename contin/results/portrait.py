@@ -13,6 +13,7 @@ from contin.detection.floquet import floquet
 from contin.discretization.collocation import Collocation
 from contin.discretization.cycles import PeriodicCollocation
 from contin.errors import ProblemError
+from contin.problems.segmented import SegmentedProblem
 from contin.results.axes import new_axes
 
 #: Places at which a solution is drawn, for each interval of its mesh, and at least.
@@ -51,7 +52,7 @@ def plot(point: Any, what: str | None, states: Sequence[str] | None, axes: Any) 
 def _drawings(system: Collocation) -> dict[str, Callable[[Any, tuple[str, ...], Any], None]]:
     """Return the pictures that there are of a point, by name."""
     found: dict[str, Callable[[Any, tuple[str, ...], Any], None]] = {}
-    if len(system.problem.state_names) > 1:
+    if len(_known(system)) > 1:
         found["portrait"] = _portrait
     found["series"] = _series
     if isinstance(system, PeriodicCollocation):
@@ -60,7 +61,7 @@ def _drawings(system: Collocation) -> dict[str, Callable[[Any, tuple[str, ...], 
 
 
 def _chosen(system: Collocation, states: Sequence[str] | None) -> tuple[str, ...]:
-    known = system.problem.state_names
+    known = _known(system)
     if states is None:
         return known
     names = checks.names("states", states)
@@ -72,8 +73,33 @@ def _chosen(system: Collocation, states: Sequence[str] | None) -> tuple[str, ...
     return names
 
 
-def _course(point: Any, names: Sequence[str]) -> tuple[Array, Array, str]:
-    """Return times in the user's units (K,), states (K, n), and the name of time."""
+def _known(system: Collocation) -> tuple[str, ...]:
+    """Return the names of the states; of segments each name once, in order."""
+    problem = system.problem
+    if not isinstance(problem, SegmentedProblem):
+        return problem.state_names
+    return tuple(dict.fromkeys(name for piece in problem.pieces for name in piece.names))
+
+
+def _courses(point: Any, names: Sequence[str]) -> list[tuple[Array, Array]]:
+    """Return times in the user's units (K,) and states (K, n) of each segment; a state that it does not have is NaN."""
+    problem = point.system.problem
+    if not isinstance(problem, SegmentedProblem):
+        return [_course(point, names)]
+    found = []
+    for index in range(len(problem.pieces)):
+        profile = point.segment(index)
+        s = profile.begin + (profile.end - profile.begin) * np.linspace(
+            0, 1, max(_FEWEST, _PER_INTERVAL * point.system.intervals)
+        )
+        states = profile(s)
+        columns = [states[:, profile.names.index(name)] if name in profile.names else np.full(len(s), np.nan) for name in names]
+        found.append((s, np.stack(columns, axis=1)))
+    return found
+
+
+def _course(point: Any, names: Sequence[str]) -> tuple[Array, Array]:
+    """Return times in the user's units (K,), and states (K, n)."""
     system = point.system
     a, b = system.problem.domain
     cycle = isinstance(system, PeriodicCollocation)
@@ -81,30 +107,38 @@ def _course(point: Any, names: Sequence[str]) -> tuple[Array, Array, str]:
     t = np.unique(np.arange(system.order)[:, None] + once) if cycle else once
     which = [system.problem.state_names.index(name) for name in names]
     states = system.evaluate(point.x, t)[:, which]
-    return (t * system.unit_time(point.x) if cycle else t), states, "t"
+    return (t * system.unit_time(point.x) if cycle else t), states
 
 
 def _portrait(point: Any, names: tuple[str, ...], axes: Any) -> None:
-    """Draw the second state against the first, with an arrow in the sense of time."""
-    _, states, _ = _course(point, names[:2])
-    x, y = states.T
-    axes.plot(x, y, lw=1.5, color=_COLOURS[0])
-    at = len(x) // 8
-    axes.annotate(
-        "", xy=(x[at + 1], y[at + 1]), xytext=(x[at], y[at]),
-        arrowprops={"arrowstyle": "-|>", "color": _COLOURS[0], "mutation_scale": 18, "shrinkA": 0, "shrinkB": 0},
-    )  # fmt: skip
+    """Draw the second state against the first, with an arrow in the sense of time; segments in colours of their own."""
+    courses = _courses(point, names[:2])
+    for index, (_, states) in enumerate(courses):
+        x, y = states.T
+        colour = _COLOURS[index % len(_COLOURS)]
+        axes.plot(x, y, lw=1.5, color=colour, label=f"segment {index}")
+        at = len(x) // 8
+        axes.annotate(
+            "", xy=(x[at + 1], y[at + 1]), xytext=(x[at], y[at]),
+            arrowprops={"arrowstyle": "-|>", "color": colour, "mutation_scale": 18, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+    if len(courses) > 1:
+        axes.legend(frameon=False, ncols=min(len(courses), 4), loc="lower center", bbox_to_anchor=(0.5, 1.0))
     axes.margins(0.08)
     axes.set(xlabel=names[0], ylabel=names[1])
 
 
 def _series(point: Any, names: tuple[str, ...], axes: Any) -> None:
-    """Draw the states over time."""
-    t, states, time = _course(point, names[:_MOST_STATES])
-    for name, column, colour in zip(names, states.T, _COLOURS):
-        axes.plot(t, column, lw=1.5, color=colour, label=name)
+    """Draw the states over time; where segments meet there is a line."""
+    names = names[:_MOST_STATES]
+    courses = _courses(point, names)
+    for index, (t, states) in enumerate(courses):
+        for name, column, colour in zip(names, states.T, _COLOURS):
+            axes.plot(t, column, lw=1.5, color=colour, label=name if index == 0 else None)
+        if index:
+            axes.axvline(t[0], lw=0.6, ls=":", color="#666666", zorder=1)
     axes.margins(x=0)
-    axes.set(xlabel=time)
+    axes.set(xlabel="t" if len(courses) == 1 else "s")
     if len(names) > 1:
         axes.legend(frameon=False, ncols=min(len(names), 4), loc="lower center", bbox_to_anchor=(0.5, 1.0))
     else:

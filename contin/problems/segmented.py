@@ -1,0 +1,233 @@
+"""Boundary value problems on several intervals: each segment has its own equations, states and length.
+
+Every segment is mapped to [0, 1], and the states of all stand side by side: u' = rhs(s, u, p) on a segment that begins at s = a
+and has the length l becomes du/dt = l rhs(a + l t, u, p). Segments do not depend on each other but through the conditions at
+their ends, so elimination treats them one by one (`contin.linalg.layout`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter, namedtuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array, Function
+from contin.errors import ProblemError
+from contin.functions.signature import Signature, argument_count, result_count
+from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.statement import check_statement
+from contin.problems.vector_field import generated, of_parameters
+
+#: A number, the name of a parameter, or a function of the parameters.
+Quantity = float | str | Function
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """One interval of a `SegmentedProblem`, with its own equations.
+
+    Parameters
+    ----------
+    rhs : callable
+        ``rhs(s, u, p)`` returns the derivatives of the states by the coordinate s.
+    states : sequence of str
+        Names of the states, ``u.theta``; other segments may have the same.
+    length : float, str or callable
+        A positive number, the name of a parameter, or ``length(p)``.
+    begin : float, str or callable, optional
+        The coordinate s at which it begins, likewise; where the segment before ends by default, 0 for the first one.
+    functionals : mapping of str to callable, optional
+        ``f(s, u, p)``: integrands over s. A column is the sum over all segments that have one of its name.
+    """
+
+    rhs: Function
+    states: Sequence[str]
+    length: Quantity = 1.0
+    begin: Quantity | None = None
+    functionals: Mapping[str, Function] = field(default_factory=dict)
+
+
+class Piece(NamedTuple):
+    """A segment as the problem has it: names and places of its states, length and beginning as functions of p."""
+
+    names: tuple[str, ...]
+    at: slice
+    length: Function
+    begin: Function
+
+
+class SegmentedProblem(BoundaryValueProblem):
+    """A boundary value problem on several intervals, with conditions between their ends.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+    boundary : callable
+        ``boundary(a, b, p)`` returns the quantities that vanish. ``a[i]`` holds the states at the beginning of segment i,
+        ``b[i]`` those at its end: ``b[0].u - a[1].u`` where they join.
+    parameters : mapping of str to float
+        Names and default values; lengths may be among them.
+
+    Raises
+    ------
+    ProblemError
+        A segment, a name or a function that cannot be used; the message says which and why.
+
+    Notes
+    -----
+    A curve needs conditions - states + 1 free parameters, states of all segments counted. Where a name occurs in several
+    segments, the states of the whole problem have the number of the segment behind it, ``u_0``, ``u_1``. All segments share one
+    mesh of [0, 1], which is adapted to all of them.
+
+    Examples
+    --------
+    Heat flows through two layers with an interface at s = .25 and conductivities 1 and 3; the flux is continuous:
+
+    >>> import contin
+    >>> layers = contin.SegmentedProblem(
+    ...     [contin.Segment(lambda s, u, p: (u.slope, 0.0), ["heat", "slope"], length=0.25),
+    ...      contin.Segment(lambda s, u, p: (u.slope, 0.0), ["heat", "slope"], length=0.75)],
+    ...     lambda a, b, p: (a[0].heat, b[0].heat - a[1].heat, b[0].slope - p.k * a[1].slope, b[1].heat - 1), {"k": 3.0},
+    ... )
+    >>> second = contin.solve(layers, [0, 0, 0, 0]).segment(1)
+    >>> print(second.s[[0, -1]], second["heat"][[0, -1]])
+    [0.25 1.  ] [0.5 1. ]
+    """
+
+    segments: tuple[Segment, ...]
+    pieces: tuple[Piece, ...]
+
+    def __init__(self, segments: Sequence[Segment], boundary: Function, parameters: Mapping[str, float]) -> None:
+        given = tuple(checks.sequence("segments", segments, "Segment"))
+        if not given:
+            raise ProblemError("segments: there must be at least one")
+        for number, segment in enumerate(given):
+            checks.instance(f"segments: {number}", segment, Segment, "a Segment")
+        pieces = _pieces(given, parameters)
+        if argument_count(checks.function("boundary", boundary)) != 3:
+            raise ProblemError("boundary must take 3 arguments, (a, b, p)")
+        object.__setattr__(self, "segments", given)
+        object.__setattr__(self, "pieces", pieces)
+        super().__init__(
+            _side_by_side([segment.rhs for segment in given], pieces), _between(boundary, pieces), _names(pieces), parameters,
+            functionals=_sums(given, pieces),
+        )  # fmt: skip
+
+    def extent(self, index: int, parameters: Mapping[str, float]) -> tuple[float, float]:
+        """Return the coordinates of both ends of a segment."""
+        values = namedtuple("P", tuple(parameters))(**parameters)  # noqa: PYI024
+        piece = self.pieces[index]
+        begin = float(piece.begin(values))
+        return begin, begin + float(piece.length(values))
+
+    def guessed(self, guesses: Sequence[Any], parameters: Mapping[str, float]) -> Callable[[float], Array]:
+        """Return the states of all segments as a function of the place in [0, 1], from a guess for each segment."""
+        known: list[Any] = []
+        for index, (guess, piece) in enumerate(zip(guesses, self.pieces)):
+            begin, end = self.extent(index, parameters)
+            known.append((guess, begin, end, len(piece.names)))
+
+        def states(t: float) -> Array:
+            parts = [np.ravel(g(a + (b - a) * t) if callable(g) else g) for g, a, b, _ in known]
+            for index, (part, (_, _, _, count)) in enumerate(zip(parts, known)):
+                if part.size != count:
+                    raise ProblemError(f"guess: {part.size} numbers for segment {index}, must be its {count} states")
+            return np.concatenate(parts)
+
+        return states
+
+
+def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tuple[Piece, ...]:
+    """Return the segments, checked, with lengths and beginnings as functions.
+
+    Raises
+    ------
+    ProblemError
+    """
+    pieces: list[Piece] = []
+    for number, segment in enumerate(segments):
+        what = f"segments: {number}: "
+        names = check_statement(
+            segment.states, parameters, checks.mapping(f"{what}functionals", segment.functionals, "functions")
+        )
+        _check_function(f"{what}rhs", segment.rhs, Signature(names, tuple(parameters)), len(names))
+        for name, function in segment.functionals.items():
+            _check_function(f"{what}functionals: {name}", function, Signature(names, tuple(parameters)), 0)
+        length = of_parameters(f"{what}length", segment.length, parameters, positive=True)
+        if segment.begin is not None:
+            begin = of_parameters(f"{what}begin", segment.begin, parameters)
+        elif pieces:
+            begin = generated("begin", "def begin(p):\n    return start(p) + length(p)\n",
+                              {"start": pieces[-1].begin, "length": pieces[-1].length})  # fmt: skip
+        else:
+            begin = of_parameters(f"{what}begin", 0.0, parameters)
+        at = pieces[-1].at.stop if pieces else 0
+        pieces.append(Piece(names, slice(at, at + len(names)), length, begin))
+    return tuple(pieces)
+
+
+def _check_function(what: str, function: Function, signature: Signature, count: int) -> None:
+    if argument_count(checks.function(what, function)) != 3:
+        raise ProblemError(f"{what} must take 3 arguments, (s, u, p)")
+    found = result_count(function, signature.arguments, what)
+    if found != count:
+        allowed = f"{count} for the states {', '.join(signature.states)}" if count else "one number"
+        raise ProblemError(f"{what} returns {found or 'one number'}{' values' if found else ''}, must return {allowed}")
+
+
+def _names(pieces: Sequence[Piece]) -> tuple[str, ...]:
+    """Return the names of all states."""
+    count = Counter(name for piece in pieces for name in piece.names)
+    return tuple(f"{name}_{i}" if count[name] > 1 else name for i, piece in enumerate(pieces) for name in piece.names)
+
+
+# --- generated functions: compiled code has tuples of fixed sizes ---------------------------------------------------------
+
+
+def _scope(pieces: Sequence[Piece], functions: Iterable[Function | None] = ()) -> dict[str, Any]:
+    """Return the names that generated functions refer to; the number of the segment stands behind each."""
+    scope: dict[str, Any] = {}
+    for i, piece in enumerate(pieces):
+        scope |= {f"U{i}": namedtuple("U", piece.names), f"length{i}": piece.length, f"begin{i}": piece.begin}  # noqa: PYI024
+    return scope | {f"f{i}": function for i, function in enumerate(functions) if function is not None}
+
+
+def _states(piece: Piece, number: int, of: str = "u") -> str:
+    """Return the text of the states of a segment as a named tuple."""
+    return f"U{number}({', '.join(f'{of}[{at}]' for at in range(piece.at.start, piece.at.stop))})"
+
+
+def _side_by_side(functions: Sequence[Function], pieces: Sequence[Piece]) -> Function:
+    """Return the right-hand side of all states on [0, 1]."""
+    lines, values = [], []
+    for i, piece in enumerate(pieces):
+        lines += [f"    l{i} = length{i}(p)", f"    r{i} = f{i}(begin{i}(p) + l{i} * t, {_states(piece, i)}, p)"]
+        values += [f"l{i} * r{i}[{k}]" for k in range(len(piece.names))]
+    source = "\n".join(["def rhs(t, u, p):", *lines, f"    return ({', '.join(values)},)", ""])
+    return generated("rhs", source, _scope(pieces, functions))
+
+
+def _between(boundary: Function, pieces: Sequence[Piece]) -> Function:
+    """Return the conditions as a function of all states at both ends."""
+    ends = ["".join(f"{_states(piece, i, of)}, " for i, piece in enumerate(pieces)) for of in ("a", "b")]
+    source = f"def boundary(a, b, p):\n    return given(({ends[0]}), ({ends[1]}), p)\n"
+    return generated("boundary", source, {**_scope(pieces), "given": boundary})
+
+
+def _sums(segments: Sequence[Segment], pieces: Sequence[Piece]) -> dict[str, Function]:
+    """Return the functionals: sums over the segments that have them."""
+    found = {}
+    for name in dict.fromkeys(name for segment in segments for name in segment.functionals):
+        functions = [segment.functionals.get(name) for segment in segments]
+        terms = [
+            f"length{i}(p) * f{i}(begin{i}(p) + length{i}(p) * t, {_states(piece, i)}, p)"
+            for i, (piece, function) in enumerate(zip(pieces, functions))
+            if function is not None
+        ]
+        source = f"def functional(t, u, p):\n    return {' + '.join(terms)}\n"
+        found[name] = generated("functional", source, _scope(pieces, functions))
+    return found

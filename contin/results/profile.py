@@ -1,0 +1,56 @@
+"""The solution on one segment, over its own coordinate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.errors import ProblemError
+from contin.problems.segmented import SegmentedProblem
+
+
+class Profile:
+    """States on one segment of a `SegmentedProblem`.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the states.
+    s : ndarray, shape (K,)
+        Coordinates of the nodes, from the beginning of the segment to its end.
+    states : ndarray, shape (K, n)
+        States there; ``profile["theta"]`` is one of them.
+    """
+
+    def __init__(self, point: Any, index: int) -> None:
+        problem = point.system.problem
+        if not isinstance(problem, SegmentedProblem):
+            raise ProblemError("segment: the problem has no segments; state it as a SegmentedProblem")
+        checks.whole("segment", index, 0, len(problem.pieces) - 1)
+        self._point, self._at = point, problem.pieces[index].at
+        self.names = problem.pieces[index].names
+        self.begin, self.end = problem.extent(index, point.parameters)
+        self.s: Array = self.begin + (self.end - self.begin) * point.system.nodes
+        self.states: Array = point.system.states(point.x)[:, self._at]
+
+    def __getitem__(self, name: str) -> Array:
+        """Return one state at the nodes, shape (K,).
+
+        Raises
+        ------
+        KeyError
+            There is none of this name.
+        """
+        if name not in self.names:
+            raise KeyError(f"{name!r} is none of {', '.join(self.names)}")
+        column: Array = self.states[:, self.names.index(name)]
+        return column
+
+    def __call__(self, s: Array) -> Array:
+        """Return the states at coordinates (m,) between the ends of the segment, shape (m, n)."""
+        t = (np.atleast_1d(np.asarray(s, dtype=float)) - self.begin) / (self.end - self.begin)
+        states: Array = self._point.system.evaluate(self._point.x, t)[:, self._at]
+        return states
