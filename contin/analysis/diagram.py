@@ -20,6 +20,7 @@ from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
+from contin.functions.signature import argument_count
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.problems.variational import VariationalProblem
@@ -377,7 +378,8 @@ def diagram(
     checks.whole("depth", depth, 0, 1000)
     checks.number("tolerance", tolerance, 0)
     for symmetry in checks.sequence("symmetries", symmetries, "functions"):
-        checks.function("symmetries", symmetry)
+        if argument_count(checks.function("symmetries", symmetry)) != 2:
+            raise ProblemError(f"symmetries: {checks.shown(symmetry)} must take 2 arguments, times (K,) and states (K, n)")
     settings = settings_with(settings, options)
     symmetries = [*symmetries, *getattr(system_of(start, "start").problem, "symmetries", {}).values()]
     system, x = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -22,7 +23,7 @@ from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import with_multipliers
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point, point_of, system_of
-from contin.stepping.newton import Corrected, Newton, correct
+from contin.stepping.newton import Corrected, Newton, approached, correct
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 4
@@ -121,6 +122,9 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
     try:
         return correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, unscaled=True)
     except ConvergenceError:
+        if not others:
+            with contextlib.suppress(ConvergenceError):
+                return correct(system, approached(system, x), newton=newton, unscaled=True)
         if isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
             reason = degeneracy(system, x)
             if reason:

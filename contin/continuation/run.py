@@ -51,6 +51,9 @@ from contin.stepping.trial import Linearization, TestFunction, Trial, linearizat
 
 #: A step is cut down to this fraction of itself to take several branch points one by one.
 _FINEST = 1e-3
+#: A step ends at this many times the distance to a limit, along the tangent, at most: beyond it, and not much. Ten times
+#: larger, a parameter that the equations divide by went through zero, and three branch points before it were lost.
+_BEYOND = 1.25
 #: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
 _ASTRAY = 2.5
 #: A tangent's component with a larger estimated error than this, relative to itself, may have the wrong sign.
@@ -291,7 +294,7 @@ class Continuation:
         Returns the step and the distance from prediction to corrected point. At the first failure the state's tangent is taken
         anew, right at its point.
         """
-        step, settings, exact = state.step, self.settings, False
+        step, settings, exact = self._up_to_limits(state), self.settings, False
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
@@ -307,6 +310,21 @@ class Continuation:
             step /= 2
             if step < settings.min_step:
                 raise problem
+
+    def _up_to_limits(self, state: State) -> float:
+        """Return the state's step, shortened where it leads far beyond the limit of a free parameter.
+
+        The equations may have no meaning there, and what lies between the limit and the end of the step is not looked for.
+        """
+        system, step = state.system, state.step
+        for name in set(system.free) & set(self.settings.limits):
+            at = system.parameter_index(name)
+            size = system.free_scales[at - system.state_size]
+            rate, value = state.tangent[at] * size, state.x[at] * size
+            room = self.settings.limits[name][int(rate > 0)] - value
+            if rate * room > 0:
+                step = min(step, _BEYOND * room / rate)
+        return max(step, self.settings.min_step)
 
     def _attempt(self, state: State, step: float) -> tuple[Segment, float]:
         """Make one step of a given length, as far as it can be believed by itself.

@@ -86,7 +86,7 @@ def _of_connections(system: ConnectionCollocation) -> list[TestFunction]:
 
 @own_test_functions.register
 def _of_equilibria(system: Algebraic) -> list[TestFunction]:
-    return [hopf()] if system.problem.dynamics and not system.is_sparse else []
+    return [hopf()] if system.problem.dynamics else []
 
 
 @functools.singledispatch

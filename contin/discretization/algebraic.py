@@ -15,6 +15,7 @@ from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
 from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
+from contin.linalg.rightmost import rightmost
 from contin.linalg.sparse import SparseFactors
 from contin.problems.algebraic import AlgebraicProblem
 
@@ -157,7 +158,12 @@ class Algebraic(System):
         return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
 
     def eigenvalues(self, x: Array) -> ComplexArray:
-        """Return the eigenvalues of F_u, shape (n,), complex: the stability of the equilibrium of u' = F."""
+        """Return the eigenvalues of F_u, complex: the stability of the equilibrium of u' = F.
+
+        All n of them or, of a matrix that is kept sparse, those right of the imaginary axis or near to it.
+        """
+        if self.is_sparse:
+            return rightmost(self.as_field().field_jacobian(x))
         return np.linalg.eigvals(self.jacobian(x)).astype(complex, copy=False)
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:

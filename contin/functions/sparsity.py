@@ -56,6 +56,26 @@ class _TracingNumber:
 _OBJECT_MAKERS = makers(object)
 
 
+class _TracedMatrix:
+    """A sparse matrix that is multiplied by tracing numbers: each product has the sources of its row's entries."""
+
+    def __init__(self, matrix: Any) -> None:
+        self._rows = matrix.tocsr()
+
+    def __matmul__(self, vector: Any) -> Any:
+        given, rows = np.asarray(vector, dtype=object), self._rows
+        if given.ndim != 1:
+            raise TypeError("a traced matrix is multiplied by vectors only")
+        result = np.empty(rows.shape[0], dtype=object)
+        for i, (first, last) in enumerate(zip(rows.indptr, rows.indptr[1:])):
+            result[i] = _TracingNumber(0)
+            for j in rows.indices[first:last]:
+                result[i] = result[i] + given[j]
+        return result
+
+    dot = __matmul__
+
+
 class _Traceable(Rewriter):
     """Functions for a call in Python: with numpy's functions in place of those of ``math``, which want ordinary numbers."""
 
@@ -67,6 +87,8 @@ class _Traceable(Rewriter):
 
     def stand_in(self, value: Any) -> Any:
         """Return the stand-in that compiled code has, too; arrays that the function fills hold tracing numbers."""
+        if type(value).__module__.startswith("scipy.sparse") and hasattr(value, "tocsr"):
+            return _TracedMatrix(value)
         return analytic(value) or stand_in_of(value, _OBJECT_MAKERS)
 
 

@@ -31,7 +31,7 @@ class AlgebraicProblem(Restated):
         ``f(u, p)``: columns of every point.
     dynamics : bool
         Whether u' = F(u, p): Hopf points are then looked for. Needs as many equations as states. For 200 states or more with a
-        sparse Jacobian they are not looked for: all eigenvalues would take longer than everything else.
+        sparse Jacobian, only the eigenvalues near the imaginary axis and right of it are computed.
     count : int, optional
         Number of equations of a residual that fills an array; as many as states by default.
 

@@ -163,6 +163,46 @@ def _newton(
     raise _failure(progress.sizes)
 
 
+def approached(system: Equations, guess: Sequence[float] | Array) -> Array:
+    """Return a point from which Newton's method converges, reached from a guess by damped steps.
+
+    The damping is that of the natural monotonicity test (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3):
+    the next correction, with the same Jacobian, must be smaller. It does not depend on units of the equations.
+
+    Raises
+    ------
+    ConvergenceError
+        The damping becomes too strong, or the corrections do not become small.
+    """
+    x = np.array(guess, dtype=float)
+    with np.errstate(all="ignore"):
+        for _ in range(_MOST_DAMPED):
+            residual, factors = system.linearize(x)
+            update = factors.solve(residual)
+            size = float(np.max(np.abs(update) / (1 + np.abs(x)), initial=0.0))
+            if size < _NEAR:
+                return x
+            part = 1.0
+            while True:
+                there = x - part * update
+                following = factors.solve(system.residual(there))
+                if np.linalg.norm(following) <= (1 - _ENOUGH * part) * np.linalg.norm(update):
+                    break
+                part /= 2
+                if not (np.isfinite(size) and part > _LEAST_PART):
+                    raise ConvergenceError("damped Newton steps from this guess do not come nearer to a solution")
+            x = there
+    raise ConvergenceError(f"Newton did not converge in {_MOST_DAMPED} damped steps")
+
+
+#: A step must make the next correction smaller by this part, times the part of the correction that it takes, as in SciPy's
+#: solve_bvp. Half of a step, which theory suggests, loses the localized pattern of the Swift-Hohenberg equation.
+_ENOUGH = 0.2
+#: Damped steps end where corrections, relative to 1 + |x|, are so small: Newton's method takes over. They end, too, after so
+#: many steps, and with so small a part of the correction: SciPy's solve_bvp gives up at about the same part.
+_NEAR, _MOST_DAMPED, _LEAST_PART = 1e-2, 100, 1e-4
+
+
 def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...]) -> bool:
     """Return whether an update is no larger than round-off of x makes it.
 

@@ -1,0 +1,95 @@
+"""Eigenvalues of a large sparse matrix that decide on stability: those right of the imaginary axis, and those nearest to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import ComplexArray
+
+#: Eigenvalues that each operator gives at first. Ten times more take ten times as long.
+_COUNT = 24
+#: Shifts of the Cayley transforms, as multiples of the largest eigenvalue near zero: an oscillation whose frequency is a hundred
+#: times the largest shift converges slowly.
+_SHIFTS = (1.0, 30.0)
+#: Two eigenvalues closer than this, relative to 1 + their size, are the same one, found twice.
+_SAME = 1e-7
+
+
+def rightmost(matrix: Any) -> ComplexArray:
+    """Return the eigenvalues of a real sparse matrix that lie right of the imaginary axis or near to it, by Arnoldi's method.
+
+    The Cayley transform (A - s)^-1 (A + s) with s > 0 has the eigenvalues (z + s) / (z - s): larger than one exactly for the z
+    right of the axis, so that Arnoldi's method finds these first (Meerbergen, Spence and Roose 1994). Its shifts s come from
+    the eigenvalues that are nearest to zero. Eigenvalues far left of the axis are not looked for.
+
+    Parameters
+    ----------
+    matrix : scipy.sparse array, shape (n, n)
+
+    Returns
+    -------
+    ndarray
+        In conjugate pairs, each once; NaN where the matrix is not finite.
+
+    Examples
+    --------
+    >>> from scipy.sparse import diags_array
+    >>> rows = np.arange(60)
+    >>> rotating = diags_array([np.append([0.5, 0.5], -1.0 - rows), np.append(3.0, 0 * rows), np.append(-3.0, 0 * rows)], offsets=[0, 1, -1])
+    >>> values = rightmost(rotating)
+    >>> [complex(z) for z in np.round(values[values.real > 0], 9)]
+    [(0.5+3j), (0.5-3j)]
+    """
+    from scipy.sparse import csc_array, eye_array  # type: ignore[import-untyped]  # .1 s; only large problems need it
+
+    matrix = csc_array(matrix, dtype=float)
+    if not np.all(np.isfinite(matrix.data)):
+        return np.full(2, np.nan, dtype=complex)
+    one = eye_array(matrix.shape[0], format="csc")
+    size = float(abs(matrix).sum(axis=0).max())
+    found = [_transformed(matrix, one, 1e-9 * size, 0.0)]  # a matrix at a fold is singular itself
+    scale = float(np.abs(found[0]).max(initial=0.0)) or 1.0
+    for share in _SHIFTS:
+        shift, count = min(share * scale, size), _COUNT
+        found.append(_transformed(matrix, one, shift, shift))
+        while np.all(found[-1].real > 0) and found[-1].size and 2 * count < matrix.shape[0]:  # there may be more
+            count *= 2
+            found.append(_transformed(matrix, one, shift, shift, count))
+    return _distinct(np.concatenate(found))
+
+
+def _transformed(matrix: Any, one: Any, pole: float, zero: float, count: int = _COUNT) -> ComplexArray:
+    """Return the eigenvalues z of largest |(z + zero) / (z - pole)|, or of largest 1 / |z - pole| without a zero."""
+    from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, splu  # type: ignore[import-untyped]
+
+    n = matrix.shape[0]
+    try:
+        factors, after = splu(matrix - pole * one), matrix + zero * one
+    except RuntimeError:  # exactly singular
+        return np.empty(0, dtype=complex)
+    operator = LinearOperator((n, n), (lambda v: factors.solve(after @ v)) if zero else factors.solve, dtype=float)
+    start = np.random.default_rng(11).standard_normal(n)
+    try:
+        values = eigs(operator, min(count, n - 2), v0=start, return_eigenvectors=False)
+    except ArpackNoConvergence as error:
+        values = error.eigenvalues
+    except ArpackError:
+        values = np.empty(0)
+    values = np.asarray(values, dtype=complex)
+    with np.errstate(all="ignore"):
+        back = (pole * values + zero) / (values - 1) if zero else pole + 1 / values
+    kept: ComplexArray = back[np.isfinite(back)]
+    return kept
+
+
+def _distinct(values: ComplexArray) -> ComplexArray:
+    """Return each of the values once, with its conjugate."""
+    upper = values[values.imag >= 0]
+    kept: list[complex] = []
+    for value in upper[np.argsort(-upper.real, kind="stable")]:
+        if all(abs(value - other) > _SAME * (1 + abs(value)) for other in kept):
+            kept.append(complex(value))
+    pairs = [each for z in kept for each in ((z, z.conjugate()) if z.imag > _SAME * (1 + abs(z)) else (complex(z.real),))]
+    return np.array(pairs, dtype=complex)
