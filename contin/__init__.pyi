@@ -1,4 +1,5 @@
 # The public names, and where they come from. `import contin` loads none of them: each is imported when it is first used.
+from .analysis.auto_07p import from_auto
 from .analysis.connections import homoclinic
 from .analysis.cycles import cycle
 from .analysis.diagram import Diagram, diagram
@@ -26,6 +27,7 @@ from .problems.connection import ConnectionProblem
 from .problems.cycle import CycleProblem
 from .problems.segmented import Segment, SegmentedProblem
 from .problems.variational import VariationalProblem
+from .results.auto_07p import AutoBranch, AutoSolution, read_auto
 from .results.branch import Branch
 from .results.columns import StoredColumns, read_columns
 from .results.point import Point, point_of
@@ -38,11 +40,12 @@ from .stepping.trial import Monitor, TestFunction, Trial
 __version__: str
 
 __all__ = [
-    "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation",
+    "Algebraic", "AlgebraicProblem", "AutoBranch", "AutoSolution", "Batch", "BoundaryValueProblem", "Branch",
+    "BranchPoint", "Collocation",
     "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl",
     "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise", "ProblemError", "Segment", "SegmentedProblem",
     "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis",
-    "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow", "gradient", "homoclinic",
-    "interpolation", "load", "locate_branch_point", "point_of", "read_columns", "save", "sensitivities", "solve",
+    "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow", "from_auto", "gradient", "homoclinic",
+    "interpolation", "load", "locate_branch_point", "point_of", "read_auto", "read_columns", "save", "sensitivities", "solve",
     "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

@@ -84,14 +84,7 @@ def save(branch: Branch, path: str | Path) -> None:
             arrays[f"kernel{number}"] = point.details.kernel
         if isinstance(point.details, (BranchPoint, MultiplePoint)):
             arrays[f"tangents{number}"] = np.array(point.details.tangents)
-        rows.append({
-            "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
-            "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
-            "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
-            "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
-            "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
-            "details": _numbers(point.details),
-        })  # fmt: skip
+        rows.append(_row(point, at))
     first = branch.points[0].system
     stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
     head = {
@@ -106,6 +99,18 @@ def save(branch: Branch, path: str | Path) -> None:
 def _symmetry(problem: Any) -> list[list[float]] | None:
     """Return the matrix of the symmetry of cycles; None where none is declared."""
     return problem.symmetry.tolist() if isinstance(problem, CycleProblem) and problem.order > 1 else None
+
+
+def _row(point: Point, at: int) -> dict[str, Any]:
+    """Return what is stored of a point besides arrays; ``at`` is the number of its system."""
+    return {
+        "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
+        "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
+        "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
+        "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
+        "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
+        "details": _numbers(point.details),
+    }  # fmt: skip
 
 
 def _numbers(details: Any) -> dict[str, float] | None:
