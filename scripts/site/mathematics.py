@@ -1,0 +1,42 @@
+"""A hook of mkdocs: mathematics between dollars becomes MathML when the site is built, and the site gets a font for it.
+
+The browser typesets MathML itself: a page needs no script, and loads nothing from elsewhere.
+"""
+
+from __future__ import annotations
+
+import html
+import importlib.util
+import re
+from pathlib import Path
+from typing import Any
+
+from latex2mathml.converter import convert
+from mkdocs.structure.files import File
+
+#: The package that brings the font STIX Two Math (Open Font License), and the file in it.
+FONT = "ziamath", "fonts/STIXTwoMath-Regular.ttf"
+#: What pymdownx.arithmatex makes of $…$ and $$…$$.
+FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.S)
+
+
+def on_files(files: Any, config: Any) -> Any:
+    """Add the font to the files of the site."""
+    package, name = FONT
+    found = importlib.util.find_spec(package)
+    assert found is not None and found.origin is not None, f"{package} is in the extra docs"
+    font = Path(found.origin).parent / name
+    files.append(File.generated(config, "assets/mathematics.ttf", content=font.read_bytes()))
+    return files
+
+
+def on_page_content(page_html: str, **_: Any) -> str:
+    """Replace every formula of a page."""
+    return FORMULA.sub(_mathml, page_html)
+
+
+def _mathml(found: re.Match[str]) -> str:
+    """Return the MathML of one formula; a formula of its own line goes into a box that scrolls where it is too wide."""
+    alone = found[2] == "["
+    mathml = convert(html.unescape(found[3]).strip(), display="block" if alone else "inline")
+    return f'<div class="formula">{mathml}</div>' if alone else mathml
