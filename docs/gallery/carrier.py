@@ -1,13 +1,15 @@
 r"""# Carrier's equation: many solutions by deflation
 
-A small parameter before the second derivative gives a boundary value problem many solutions, with more and more inner layers:
+A small parameter before the second derivative gives a boundary value problem many solutions, with more and more inner
+layers:
 
 $$\varepsilon^2 u'' + 2 (1 - t^2)\, u + u^2 = 1, \qquad u(\pm 1) = 0 .$$
 
-`solve` with `others` finds a solution that differs from all known ones (deflation). Each guess is tried until nothing new comes.
+`solve` with `others` finds a solution that differs from all known ones (deflation). Each guess is tried until nothing new
+comes.
 
-**Check:** at $\varepsilon = 0.2$ there are 8 solutions. Shooting from $t = -1$ with 3000 slopes, by SciPy, finds as many: a test of
-this project counts them.
+**Check:** at $\varepsilon = 0.2$ there are 8 solutions. Shooting from $t = -1$ with 3000 slopes, by SciPy, finds as many: a
+test of this project counts them.
 """
 
 import math
@@ -36,7 +38,7 @@ for k in (math.pi / 2, -math.pi / 2, math.pi, -math.pi):  # a half wave and a wh
 print(len(found), "solutions")
 assert len(found) == 8
 
-figure, all_axes = plt.subplots(2, 4, sharex=True, sharey=True)
+figure, all_axes = plt.subplots(2, 4, sharex=True, sharey=True, figsize=(9, 4), layout="constrained")
 profiles = sorted((point.system.evaluate(point.x, t)[:, 0] for point in found), key=lambda u: u.mean())
 for axes, u in zip(all_axes.flat, profiles):
     mirrored = np.allclose(u, u[::-1], atol=1e-6)

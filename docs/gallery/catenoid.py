@@ -1,11 +1,12 @@
 r"""# The catenoid: a soap film between two rings
 
-A soap film between two rings of radius 1 takes the shape of least area. Let the distance of the rings be the gap $g$; the area is
+A soap film between two rings of radius 1 takes the shape of least area. Let the distance of the rings be the gap $g$; the
+area is
 
 $$A = 2\pi \int_0^1 r \sqrt{g^2 + r'^2}\, dt .$$
 
-The energy is all that the program is told. It derives the equations, and from the second variation the index: the wide neck is a
-minimum, the narrow one is not. Pulled beyond the fold, the film breaks.
+The energy is all that the program is told. It derives the equations, and from the second variation the index: the wide neck
+is a minimum, the narrow one is not. Pulled beyond the fold, the film breaks.
 
 **Check:** the largest half distance is $0.6627434193$ radii, where $\cosh a = a \sinh a$ (Goldschmidt 1831).
 """
@@ -28,7 +29,7 @@ branch = contin.trace(contin.solve(film, [1.0]), free=["gap"], limits={"gap": (0
 print(f"largest half distance {fold['gap'] / 2:.10f}, index {fold.index_change[0]} before it, {fold.index_change[1]} after it")
 assert abs(fold["gap"] / 2 - 0.6627434193) < 1e-10
 
-_, (left, right) = plt.subplots(1, 2)
+_, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 branch.plot("gap", "energy", axes=left)
 left.set(xlabel="gap of the rings / radius", ylabel="area / 2π")
 t = np.linspace(0, 1, 200)

@@ -4,9 +4,9 @@ A pendulum whose pivot shakes, an ion in a quadrupole trap: both obey Mathieu's 
 
 $$u'' + \left(a - 2 q \cos 2t\right) u = 0 .$$
 
-For each $q$ there are eigenvalues $a$ with solutions of period $\pi$ or $2\pi$. They bound the tongues, in which the rest position is
-unstable. A quarter period and a condition on the norm, $\int u^2 dt = 1$, make each eigenvalue a regular unknown: it is followed from
-$q = 0$, where $a = n^2$ and $u$ is a sine or a cosine. The number of zeros stays.
+For each $q$ there are eigenvalues $a$ with solutions of period $\pi$ or $2\pi$. They bound the tongues, in which the rest
+position is unstable. A quarter period and a condition on the norm, $\int u^2 dt = 1$, make each eigenvalue a regular
+unknown: it is followed from $q = 0$, where $a = n^2$ and $u$ is a sine or a cosine. The number of zeros stays.
 
 **Check:** $a_0(5) = -5.80004602$ (Abramowitz & Stegun, Table 20.1).
 """
@@ -35,7 +35,7 @@ def follow(n, kind):
     return contin.trace(first, free=["q", "a"], limits={"q": (0, 8)}, zeros={"q": [5.0]}, max_step=0.5)
 
 
-_, axes = plt.subplots()
+_, axes = plt.subplots(figsize=(9, 4), layout="constrained")
 branches = {(kind, n): follow(n, kind) for kind, numbers in (("cos", range(4)), ("sin", range(1, 5))) for n in numbers}
 for branch in branches.values():
     branch.plot("q", "a", axes=axes)
@@ -48,6 +48,6 @@ for n in range(4):  # the rest position is stable between a_n and b_(n+1)
     axes.fill(*around, color="C2", alpha=0.2, lw=0, label=None if n else "stable")
     for name, branch in ((f"$a_{n}$", low), (f"$b_{n + 1}$", high)):
         axes.annotate(name, (8, branch.points[-1]["a"]), xytext=(6 + 16 * (name[1] == "b"), -4), textcoords="offset points")
-axes.legend(loc="upper left")
+axes.legend(loc="lower left")
 axes.set(xlabel="strength q", ylabel="eigenvalue a")
 plt.show()

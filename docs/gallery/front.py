@@ -4,8 +4,8 @@ A nerve fibre at rest and one that is excited, two phases of an alloy, two speci
 
 $$u_t = u_{xx} + u (1 - u)(u - a)$$
 
-moves with a speed that depends on the threshold $a$. In a moving frame the front is an orbit that connects two saddles. The speed is
-found with it, and followed.
+moves with a speed that depends on the threshold $a$. In a moving frame the front is an orbit that connects two saddles. The
+speed is found with it, and followed.
 
 **Check:** $c = (1 - 2a)/\sqrt 2$ exactly (Huxley; McKean 1970).
 """
@@ -37,7 +37,7 @@ worst = max(abs(point["c"] - (1 - 2 * point["a"]) / math.sqrt(2)) for point in [
 print(f"speed at a = 0.25: {wave['c']:.12f}; largest error on the branch {worst:.0e}")
 assert worst < 1e-8
 
-_, (left, right) = plt.subplots(1, 2)
+_, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 for branch in (slower, faster):
     branch.plot("a", "c", axes=left)
 a = np.linspace(0.1, 0.9, 9)

@@ -4,9 +4,9 @@ Lorenz' model of convection,
 
 $$\dot x = 10 (y - x), \qquad \dot y = r x - y - x z, \qquad \dot z = x y - \tfrac83 z ,$$
 
-has three states of rest. The fluid turns, to the left or to the right, until a Hopf bifurcation at $r = 24.74$. It is subcritical: the
-cycles that begin there are unstable, and reach back to $r = 13.93$, where they become homoclinic orbits of the fluid at rest. Between
-the two lies the origin of chaos.
+has three states of rest. The fluid turns, to the left or to the right, until a Hopf bifurcation at $r = 24.74$. It is
+subcritical: the cycles that begin there are unstable, and reach back to $r = 13.93$, where they become homoclinic orbits of
+the fluid at rest. Between the two lies the origin of chaos.
 
 **Check:** the Hopf point is $r = 470/19 = 24.7368421$ (Sparrow 1982), the homoclinic orbit lies at $r = 13.926557$.
 """
@@ -32,7 +32,7 @@ longer = contin.trace(orbit, free=["r", "time"], primary="time", limits={"time":
 print(f"homoclinic orbit at r = {longer['r']:.6f}")
 assert abs(longer["r"] - 13.926557) < 1e-6
 
-_, (left, right) = plt.subplots(1, 2)
+_, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 found.plot("r", "x", axes=left)
 left.set(xlabel="heating r", ylabel="x: rest, and extremes of cycles")
 for point in cycles.points[2:-1:3]:

@@ -5,10 +5,11 @@ temperature $y$ and the Damköhler number $D$ (Uppal, Ray & Poore 1974)
 
 $$\dot x = -x + D (1 - x) e^y, \qquad \dot y = -y + B D (1 - x) e^y - 3 y .$$
 
-The curve of steady states is an S: the reactor ignites at one fold and goes out at the other. The burning state is unstable, too, up to
-a Hopf point.
+The curve of steady states is an S: the reactor ignites at one fold and goes out at the other. The burning state is
+unstable, too, up to a Hopf point.
 
-**Check:** with $4y = Bx$ at steady states, the folds have $x (1 - x) = 4/B$, and the Hopf point $Bx - 5 = x/(1 - x)$; here $B = 22$.
+**Check:** with $4y = Bx$ at steady states, the folds have $x (1 - x) = 4/B$, and the Hopf point $Bx - 5 = x/(1 - x)$; here
+$B = 22$.
 """
 
 import math
@@ -35,7 +36,7 @@ burning = (26 + math.sqrt(26**2 - 4 * 22 * 5)) / 44  # the root of 22 x - 5 = x 
 for point, x in zip([*folds, hopf], [*roots, burning]):
     assert abs(point["D"] - x * math.exp(-22 * x / 4) / (1 - x)) < 1e-9
 
-_, (left, right) = plt.subplots(1, 2)
+_, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 found.plot("D", "x", axes=left)
 left.set(xlabel="Damköhler number D", ylabel="conversion x: steady, and extremes of cycles")
 for point in cycles.points[2::12]:

@@ -4,9 +4,10 @@ The equation of Swift and Hohenberg (1977) with a quadratic and a cubic term is 
 
 $$u_t = r u - (1 + \partial_x^2)^2 u + b\, u^2 - u^3 , \qquad b = 1.8 .$$
 
-For some $r < 0$ both the flat state and waves are stable, and so are patches of waves of any length. Their branch winds up in a snake:
-on the way from one fold to the next but one the patch grows by a wave at each end. It is the derivative of an energy, so the index
-says which patches are stable. Half of a symmetric patch is computed; perturbations that break the symmetry are not seen.
+For some $r < 0$ both the flat state and waves are stable, and so are patches of waves of any length. Their branch winds up
+in a snake: on the way from one fold to the next but one the patch grows by a wave at each end. It is the derivative of an
+energy, so the index says which patches are stable. Half of a symmetric patch is computed; perturbations that break the
+symmetry are not seen.
 
 **Check:** the folds settle at $r = -0.3390$ and $-0.2593$ (Burke & Knobloch, Chaos 2007).
 """
@@ -44,7 +45,7 @@ folds = [point["r"] for point in branch.labelled("LP")]
 print("folds at r =", [round(r, 4) for r in folds])
 assert abs(folds[4] + 0.3390) < 1e-4 and abs(folds[3] + 0.2593) < 1e-4
 
-_, (left, right) = plt.subplots(1, 2)
+_, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 branch.plot("r", "square", axes=left)
 left.set(xlabel="r", ylabel="∫u² over half of the patch")
 t = np.linspace(0, 12 * math.pi, 600)

@@ -26,7 +26,7 @@ SCRIPTS, KEPT = ROOT / "docs" / "gallery", ROOT / ".cache" / "gallery"
 #: Colours of Okabe and Ito, which the colour-blind can tell apart.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 STYLE = {
-    "figure.figsize": (8.4, 3.9), "figure.constrained_layout.use": True, "savefig.dpi": 150, "font.size": 10.5,
+    "savefig.dpi": 150, "font.size": 10.5,
     "axes.prop_cycle": f"cycler('color', {COLOURS})", "axes.spines.top": False, "axes.spines.right": False,
     "axes.titlesize": 10.5, "lines.linewidth": 1.6, "legend.frameon": False,
 }  # fmt: skip
@@ -104,9 +104,10 @@ def page(name: str, folder: Path) -> str:
     title, text, code = parts(name)
     found = json.loads((folder / "result.json").read_text())
     return (
-        f"# {title}\n\n{text}\n\n![{title}]({name}.png)\n\n```python\n{code}\n```\n\nIt prints\n\n```text\n{found['output'].strip()}\n"
-        f"```\n\nWhen this page was built, the script took {found['seconds']:.1f} s of processor time, with the start of Python and the "
-        f"compilation of what had not been compiled before. [The script as a file]({name}.py)\n"
+        f"# {title}\n\n{text}\n\n![{title}]({name}.png)\n\n```python\n{code}\n```\n\n"
+        f"It prints\n\n```text\n{found['output'].strip()}\n```\n\n"
+        f"When this page was built, the script took {found['seconds']:.1f} s of processor time, with the start of Python and "
+        f"the compilation of what had not been compiled before. [The script as a file]({name}.py)\n"
     )
 
 

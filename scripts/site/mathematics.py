@@ -11,13 +11,15 @@ import re
 from pathlib import Path
 from typing import Any
 
-from latex2mathml.converter import convert
+from math_core import LatexToMathML
 from mkdocs.structure.files import File
 
 #: The package that brings the font STIX Two Math (Open Font License), and the file in it.
 FONT = "ziamath", "fonts/STIXTwoMath-Regular.ttf"
 #: What pymdownx.arithmatex makes of $…$ and $$…$$.
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.S)
+
+CONVERTER = LatexToMathML()
 
 
 def on_files(files: Any, config: Any) -> Any:
@@ -38,5 +40,5 @@ def on_page_content(page_html: str, **_: Any) -> str:
 def _mathml(found: re.Match[str]) -> str:
     """Return the MathML of one formula; a formula of its own line goes into a box that scrolls where it is too wide."""
     alone = found[2] == "["
-    mathml = convert(html.unescape(found[3]).strip(), display="block" if alone else "inline")
+    mathml = CONVERTER.convert_with_local_state(html.unescape(found[3]).strip(), displaystyle=alone)
     return f'<div class="formula">{mathml}</div>' if alone else mathml
