@@ -17,8 +17,11 @@ from mkdocs.structure.files import File
 #: The package that brings the font STIX Two Math (Open Font License), and the file in it.
 FONT = "ziamath", "fonts/STIXTwoMath-Regular.ttf"
 #: What pymdownx.arithmatex makes of $…$ and $$…$$.
-FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.S)
+#: It takes punctuation along, so that no line begins with it.
+FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>([.,;:)]*)', re.S)
 
+#: A prime beside a letter: fonts raise it already, so that a superscript would be raised twice, and too small.
+PRIME = re.compile(r"<msup>(<mi>[^<]*</mi>)<mo>([′″])</mo></msup>")
 CONVERTER = LatexToMathML()
 
 
@@ -41,4 +44,7 @@ def _mathml(found: re.Match[str]) -> str:
     """Return the MathML of one formula; a formula of its own line goes into a box that scrolls where it is too wide."""
     alone = found[2] == "["
     mathml = CONVERTER.convert_with_local_state(html.unescape(found[3]).strip(), displaystyle=alone)
-    return f'<div class="formula">{mathml}</div>' if alone else mathml
+    mathml = PRIME.sub(r'<mrow>\1<mo lspace="0" rspace="0">\2</mo></mrow>', mathml)
+    if alone:
+        return f'<div class="formula">{mathml}</div>'
+    return f'<span class="nobreak">{mathml}{found[4]}</span>' if found[4] else mathml
