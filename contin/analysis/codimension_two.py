@@ -113,7 +113,7 @@ def _tori(base: Algebraic, x: Array, frequencies: list[float], branch: int) -> F
 def _corrected_cycle(base: Algebraic, x: Array, frequency: float, other: float | None) -> First:
     """Return a small cycle on the curve of torus bifurcations at which another pair is critical; of folds without one."""
     pair = critical_pair(base.jacobian(x), frequency)
-    degree = usual_degree(len(base.problem.states), MeshControl().tolerance)
+    degree = usual_degree(len(base.problem.state_names), MeshControl().tolerance)
     for amplitude in _AMPLITUDES:
         size = amplitude * (1 + float(np.abs(base.states(x)).max()))
         cycles, y, tangent = small_cycle(base, x, pair, size, degree)

@@ -45,7 +45,7 @@ def switched(point: Point, control: MeshControl) -> tuple[PeriodicCollocation, A
     """
     if doubles(point):
         return doubled(point)
-    return from_hopf(point, usual_degree(len(point.system.problem.states), control.tolerance))
+    return from_hopf(point, usual_degree(len(point.system.problem.state_names), control.tolerance))
 
 
 def from_hopf(point: Point, degree: int) -> tuple[CycleCollocation, Array, Array]:
