@@ -108,5 +108,5 @@ def test_extrema_of_a_column_without_known_derivatives():
 
 
 def test_extrema_of_unknown_columns():
-    with pytest.raises(ProblemError, match="'product' is neither a parameter nor a functional"):
+    with pytest.raises(ProblemError, match="'product' is no column of this problem"):
         trace(solve(sphere(), [1.0]), free=["x2"], extrema=["product"])
