@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
 
-from benchmarks import cost, fold, many, report, startup  # noqa: E402
+from benchmarks import cost, cycles, fold, many, report, startup  # noqa: E402
 from peers import auto_07p, scipy_bvp  # noqa: E402
 
 BRANCH_FILE = """\
@@ -107,3 +107,13 @@ def test_the_table_of_many_branches():
     text = many.table(results)
     assert "| one process | 8.0 s | 12.5 |" in text and "| two processes | 5.0 s | 20.0 |" in text and "60 ms a branch" in text
     assert "Dask" not in text and "| Dask cluster of two workers | 4.0 s | 25.0 |" in many.table(results | {"cluster": 4.0})
+
+
+def test_ratios_of_cycles():
+    """Twice the time for a branch of four times as many orbits is half the time for an orbit."""
+    row = {"seconds": 0.1, "points": 10, "per_orbit": 0.01, "error": 1e-9}
+    other = {"seconds": 0.2, "points": 40, "per_orbit": 0.005, "error": 1e-9}
+    results = {"results": {"lorenz": {"contin": row, "AUTO-07p": other}, "alone": {"contin": row}}}
+    assert cycles.ratio(results) == 0.5
+    assert cycles.table(results).endswith("Ratio for a branch, AUTO-07p / contin: 2.00 (lorenz).")
+    assert cycles.ratio({"results": {"alone": {"contin": row}}}) is None

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -18,7 +19,7 @@ from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint
 from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
-from contin.detection.phase import in_phase, least_distance
+from contin.detection.phase import in_phase, lasting
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
 from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
@@ -313,7 +314,8 @@ class Inspection:
         segment, system = self.segment, self.segment.trial.system
         if home.scales is not system.scales:
             return False
-        return sum(least_distance(system, end, home, x) for end in (segment.state.x, segment.trial.x)) > _REACH * segment.step
+        first, ends = lasting(home, x), (lasting(system, end) for end in (segment.state.x, segment.trial.x))
+        return sum(math.dist(first, end) for end in ends) > _REACH * segment.step
 
 
 def _same_place(point: SpecialPoint, found: list[SpecialPoint], step: float) -> bool:

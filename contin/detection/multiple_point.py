@@ -9,12 +9,14 @@ two small spheres are found from many directions; where they converge as the sph
 
 from __future__ import annotations
 
+import functools
 import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from contin.arrays import Array
+from contin.discretization.cycles import CycleCollocation
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
 from contin.linalg.singular import smallest_directions
@@ -60,7 +62,8 @@ class MultiplePoint:
     x : ndarray, shape (size,), or None
         The point, where it was located.
     tangents : tuple of ndarray
-        Unit tangents of the branches that meet there, first that of the branch it was found on; empty where it was not located.
+        Unit tangents of the branches that meet there, first that of the branch it was found on; only that one where the branch
+        ends, none where the point was not located.
     continuum : bool
         The branches are not isolated: a continuous symmetry turns each into a whole family.
 
@@ -196,7 +199,7 @@ def _described(manifold: _Manifold, s: Array, row: Array) -> MultiplePoint:
     home = row / system.weights
     along = np.array([inner(system, vector, home) for vector in basis])
     ours = along @ basis / np.linalg.norm(along)
-    directions, continuum = _branch_directions(manifold, s)
+    directions, continuum = _branch_directions(manifold, s) if may_branch(system, x) else ([], False)
     tangents = []
     for a in [] if continuum else directions:
         tangent = a @ vectors
@@ -207,6 +210,18 @@ def _described(manifold: _Manifold, s: Array, row: Array) -> MultiplePoint:
     tangents[0] = tangents[0] * (np.sign(inner(system, tangents[0], ours)) or 1.0)
     across = np.linalg.svd(along[None])[2][1:] @ basis
     return MultiplePoint(manifold.d, across, x, tuple(tangents), continuum)
+
+
+@functools.singledispatch
+def may_branch(system: Discretization, x: Array) -> bool:
+    """Return whether other branches are looked for at a multiple point. Each kind of problem registers its own answer."""
+    return True
+
+
+@may_branch.register
+def _of_cycles(system: CycleCollocation, x: Array) -> bool:
+    """Not where cycles shrink onto an equilibrium: there the branch ends, and the search would take longer than the run."""
+    return not system.has_shrunk(x)
 
 
 def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool]:

@@ -18,21 +18,14 @@ _STEPS = 5
 
 
 @functools.singledispatch
-def least_distance(system: Discretization, x: Array, home: Discretization, reference: Array) -> float:
-    """Return a lower bound of the distance between a solution and another one, given by ``home``, for any shift in time."""
-    gaps = x[system.state_size :] - reference[home.state_size :]
-    return float(np.sqrt(gaps @ gaps))
+def lasting(system: Discretization, x: Array) -> Array:
+    """Return quantities that no shift in time changes; two solutions are as far from each other as theirs, at least."""
+    return x[system.state_size :]
 
 
-@least_distance.register
-def _between_cycles(system: CycleCollocation, x: Array, home: CycleCollocation, reference: Array) -> float:
-    """The distance of parameters, means, and norms of what is left: no shift changes them."""
-    gaps = _lasting(system, x) - _lasting(home, reference)
-    return float(np.sqrt(gaps @ gaps))
-
-
-def _lasting(system: CycleCollocation, x: Array) -> Array:
-    """Return free parameters, means of the states, and the norm of the cycle without its mean."""
+@lasting.register
+def _of_one_cycle(system: CycleCollocation, x: Array) -> Array:
+    """Free parameters, means of the states, and the norm of the cycle without its mean."""
     size, n = system.state_size, len(system.problem.state_names)
     states = x[:size].reshape(-1, n)
     weights = system.weights[:size:n]

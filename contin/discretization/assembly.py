@@ -60,6 +60,23 @@ class Tables(NamedTuple):
     weights: Vector
 
 
+@kernel
+def fill_phase_row(n: int, tables: Tables, h: Vector, v: ReadOnlyVector, row: Vector) -> float:
+    """Add to the ``row`` that of the integral of u . v', v the values at the nodes; return the integral of v' . v'."""
+    value, slope, weights = tables
+    d, total = weights.size, 0.0
+    for j in range(h.size):
+        for i in range(d):
+            for a in range(n):
+                rate = 0.0  # h v'
+                for node in range(d + 1):
+                    rate += slope[i, node] * v[(j * d + node) * n + a]
+                total += weights[i] * rate * rate / h[j]
+                for node in range(d + 1):
+                    row[(j * d + node) * n + a] += weights[i] * value[i, node] * rate
+    return total
+
+
 class Bordering(NamedTuple):
     """What stands around the derivatives: ``columns`` (c, equations) and ``rows`` (r, unknowns + c)."""
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.discretization.assembly import Bordering, Tables, assemble, at_points, collocate
+from contin.discretization.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier, Discretization
@@ -353,13 +353,10 @@ class Collocation(System):
 
         The integrals are taken at the Gauss points, with v' of the piecewise polynomial v; zero where v is constant.
         """
-        rates = np.einsum("qm,jma->jqa", self.basis.slope, self._local(reference))  # h v'
-        size = float(np.sum(self.basis.weights[:, None] * rates**2 / self._h[:, None, None]))
-        shares = np.einsum("q,qm,jqa->jma", self.basis.weights, self.basis.value, rates)
-        by_node = np.zeros((self.nodes.size, self._n))
-        np.add.at(by_node, self._by_interval, shares)
         row = np.zeros(self.size)
-        row[: self.state_size] = by_node.ravel() / (size or 1.0)
+        tables = Tables(self.basis.value, self.basis.slope, self.basis.weights)
+        size = fill_phase_row(self._n, tables, self._h, np.ascontiguousarray(reference).ravel(), row)
+        row /= size or 1.0
         return row
 
     def with_reference(self, x: Array) -> Collocation:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -170,10 +169,11 @@ class PeriodicCollocation(Collocation):
                 matrices = np.concatenate([matrices, np.linalg.inv(self.turn)[None]])
             values = log_eigenvalues(matrices)
             total = float(self._quadrature @ np.einsum("kaa->k", jacobian))
-            least = values.real <= values.real.min() + _EQUAL
-            if not self._is_own_error(values, least):
+            reals = values.real.tolist()
+            smallest = [place for place, value in enumerate(reals) if value <= min(reals) + _EQUAL]
+            if smallest and not self._is_own_error(values, smallest):
                 # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
-                values[least] += (total - values.real.sum()) / np.count_nonzero(least)
+                values[smallest] += (total - sum(reals)) / len(smallest)
             self._known[key] = _on_circle(values)
         return self._known[key]
 
@@ -185,7 +185,7 @@ class PeriodicCollocation(Collocation):
         found: ComplexArray = self.order * values.real + 1j * (math.pi - (math.pi - angles) % (2 * math.pi))
         return found
 
-    def _is_own_error(self, values: ComplexArray, least: Array) -> bool:
+    def _is_own_error(self, values: ComplexArray, smallest: list[int]) -> bool:
         """Return whether the smallest multipliers are those whose error shall show."""
         return False
 
@@ -284,9 +284,9 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
             first /= self.scales.states
         return np.asarray(first / np.linalg.norm(first), dtype=float)
 
-    def _is_own_error(self, values: ComplexArray, least: Array) -> bool:
+    def _is_own_error(self, values: ComplexArray, smallest: list[int]) -> bool:
         """Return whether the smallest multiplier is the one that is 1: its error shall show."""
-        return bool(least[np.abs(values).argmin()])
+        return int(np.abs(values).argmin()) in smallest
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a torus bifurcation; None near a double multiplier -1.
@@ -349,7 +349,8 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 
     def _referring_to(self, states: Array) -> CycleCollocation:
         """Return the same on the same mesh, with a reference given by its states at the nodes."""
-        other = copy.copy(self)
+        other = type(self).__new__(type(self))
+        vars(other).update(vars(self))  # copy.copy leaves out what was computed
         other._set_reference(states)
         return other
 
@@ -372,5 +373,7 @@ def _is_opposite(frequency: float) -> bool:
 
 def _on_circle(values: ComplexArray) -> ComplexArray:
     """Return logarithms of multipliers, those of pairs on the unit circle with the real part zero."""
-    pairs = (values.imag != 0) & (np.abs(values.imag) != math.pi)
-    return np.where(pairs & (np.abs(values.real) < _ON_CIRCLE), 1j * values.imag, values)
+    for place, value in enumerate(values.tolist()):
+        if abs(value.real) < _ON_CIRCLE and value.imag and abs(value.imag) != math.pi:
+            values[place] = 1j * value.imag
+    return values

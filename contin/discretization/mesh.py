@@ -72,13 +72,13 @@ def density(basis: Basis, mesh: Array, states: Array) -> Array:
     states : ndarray, shape (N d + 1, n)
         At the nodes.
     """
-    d, h = basis.degree, np.diff(mesh)
+    d, h = basis.degree, mesh[1:] - mesh[:-1]
     if h.size < 2:
         return np.ones(1)
     local = states[d * np.arange(h.size)[:, None] + np.arange(d + 1)]
     derivative = np.einsum("l,jla->ja", basis.highest, local) / h[:, None] ** d
-    jumps = np.abs(np.diff(derivative, axis=0)) / ((h[1:] + h[:-1]) / 2)[:, None]
-    jumps = np.max(jumps / np.maximum(1.0, np.abs(states).max(axis=0)), axis=1)
+    jumps = np.abs(derivative[1:] - derivative[:-1]) / ((h[1:] + h[:-1]) / 2)[:, None]
+    jumps = (jumps / np.maximum(1.0, np.abs(states).max(axis=0))).max(axis=1)
     both = np.empty((2, h.size))
     both[0, 1:], both[1, :-1] = jumps, jumps
     both[0, 0], both[1, -1] = jumps[0], jumps[-1]
@@ -96,7 +96,7 @@ def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl)
     phi = _raised(density(basis, mesh, states), h)
     total = float(phi @ h)
     allowed = share(basis, control.tolerance)
-    wanted = int(np.clip(np.ceil(total / allowed), control.min_intervals, control.max_intervals))
+    wanted = int(min(max(np.ceil(total / allowed), control.min_intervals), control.max_intervals))
     enough = wanted <= h.size <= max(_TOO_MANY * wanted, control.min_intervals)
     if enough and (phi * h).max() <= _TOO_LARGE * max(total / h.size, allowed * wanted / h.size):
         return None
@@ -116,7 +116,7 @@ def equidistributed(basis: Basis, mesh: Array, states: Array, intervals: int) ->
 
 def _raised(phi: Array, h: Array) -> Array:
     """Return the density, smoothed and not far below its mean."""
-    padded = np.pad(phi, 1, mode="edge")
+    padded = np.concatenate([phi[:1], phi, phi[-1:]])
     phi = np.maximum(phi, (padded[:-2] + 2 * phi + padded[2:]) / 4)
     raised: Array = np.maximum(phi, _LEAST_DENSITY * (phi @ h) / h.sum())
     return raised

@@ -7,6 +7,7 @@ import pytest
 
 import contin
 from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
+from contin.linalg.periodic import log_eigenvalues
 
 
 def circle(u, p):
@@ -195,3 +196,19 @@ def test_folds_of_cycles_in_two_parameters():
     assert contin.sensitivities(fold)["a"]["mu"] == pytest.approx(-0.5, abs=1e-9)
     for point in contin.curve(fold, "a", limits={"a": (0.5, 2)}):
         assert point["mu"] == pytest.approx(-(point["a"] ** 2) / 4, abs=1e-9)
+
+
+def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
+    """On the Lorenz cycles from 24.7 to 16 nothing happens: at each cycle, and once more where the mesh changes every third."""
+    calls = []
+
+    def counted(factors):
+        calls.append(factors)
+        return log_eigenvalues(factors)
+
+    monkeypatch.setattr("contin.discretization.cycles.log_eigenvalues", counted)
+    rest = contin.solve(AlgebraicProblem(lorenz, ["x", "y", "z"], {"r": 20.0}), [math.sqrt(8 / 3 * 19)] * 2 + [19.0])
+    (hopf,) = contin.trace(rest, free=["r"], limits={"r": (19, 26)}).labelled("HB")
+    branch = contin.trace(hopf, branch=1, limits={"r": (16, 25)}, errors=False)
+    assert branch.points[-1].name == "r = 16" and not branch.labelled("PD") and not branch.labelled("TR")
+    assert len(calls) < 1.5 * len(branch)
