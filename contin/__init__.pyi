@@ -24,6 +24,7 @@ from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
 from .problems.connection import ConnectionProblem
 from .problems.cycle import CycleProblem
+from .problems.map import MapProblem
 from .problems.variational import VariationalProblem
 from .results.branch import Branch
 from .results.columns import StoredColumns, read_columns
@@ -36,9 +37,9 @@ from .stepping.trial import Monitor, TestFunction, Trial
 
 __all__ = [
     "Algebraic", "AlgebraicProblem", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint", "Collocation",
-    "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl",
-    "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise", "ProblemError", "Settings", "State", "Stop", "StoredColumns",
-    "TestFunction", "Trial", "VariationalProblem", "basis", "cache_directory", "correct", "curve", "cycle", "diagram",
-    "exact_text", "follow", "gradient", "homoclinic", "interpolation", "load", "locate_branch_point", "point_of",
+    "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MapProblem",
+    "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise", "ProblemError", "Settings", "State", "Stop",
+    "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis", "cache_directory", "correct", "curve", "cycle",
+    "diagram", "exact_text", "follow", "gradient", "homoclinic", "interpolation", "load", "locate_branch_point", "point_of",
     "read_columns", "save", "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

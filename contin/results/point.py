@@ -12,6 +12,7 @@ from contin.detection.floquet import Floquet, floquet
 from contin.detection.second_variation import SecondVariation, index_of, second_variation
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
+from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
@@ -161,15 +162,15 @@ class Point:
         return portrait.plot(self, what, states, axes)
 
     def floquet(self) -> Floquet:
-        """Return the Floquet multipliers of a cycle, with estimates of their errors.
+        """Return the Floquet multipliers of a cycle, or of one of a map, with estimates of their errors.
 
         Raises
         ------
         ProblemError
             The point is no cycle.
         """
-        if not isinstance(self.system, PeriodicCollocation):
-            raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem")
+        if not isinstance(self.system, (PeriodicCollocation, MapSystem)):
+            raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem or MapProblem")
         return floquet(self.system, self.x, self.tangent)
 
     def second_variation(self) -> SecondVariation:
