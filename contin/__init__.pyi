@@ -25,6 +25,7 @@ from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
 from .problems.connection import ConnectionProblem
 from .problems.cycle import CycleProblem
+from .problems.map import MapProblem
 from .problems.segmented import Segment, SegmentedProblem
 from .problems.variational import VariationalProblem
 from .results.auto_07p import AutoBranch, AutoSolution, read_auto
@@ -40,12 +41,11 @@ from .stepping.trial import Monitor, TestFunction, Trial
 __version__: str
 
 __all__ = [
-    "Algebraic", "AlgebraicProblem", "AutoBranch", "AutoSolution", "Batch", "BoundaryValueProblem", "Branch",
-    "BranchPoint", "Collocation",
-    "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram", "MeshControl",
-    "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise", "ProblemError", "Segment", "SegmentedProblem",
-    "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem", "basis",
-    "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow", "from_auto", "gradient", "homoclinic",
-    "interpolation", "load", "locate_branch_point", "point_of", "read_auto", "read_columns", "save", "sensitivities", "solve",
-    "temporary_name", "trace", "write_whole",
+    "Algebraic", "AlgebraicProblem", "AutoBranch", "AutoSolution", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint",
+    "Collocation", "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram",
+    "MapProblem", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise", "ProblemError", "Segment",
+    "SegmentedProblem", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem",
+    "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow", "from_auto", "gradient",
+    "homoclinic", "interpolation", "load", "locate_branch_point", "point_of", "read_auto", "read_columns", "save",
+    "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

@@ -18,6 +18,7 @@ from contin.detection.multiple_point import MultiplePoint
 from contin.detection.phase import in_phase
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
 from contin.functions.signature import argument_count
@@ -154,7 +155,7 @@ def _is_end(point: Point) -> bool:
     system = point.system
     if point.label == "HB":
         return isinstance(system, PeriodicCollocation)
-    return isinstance(system, PeriodicCollocation) and system.is_doubled(point.x)
+    return isinstance(system, (PeriodicCollocation, MapSystem)) and system.is_doubled(point.x)
 
 
 def _values(point: Point) -> dict[str, float]:

@@ -12,10 +12,9 @@ import numpy as np
 from contin import checks
 from contin.analysis.multipliers import with_guessed_multipliers
 from contin.arrays import Array
-from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
 from contin.discretization.cycles import PeriodicCollocation
-from contin.discretization.kinds import discretized
+from contin.discretization.kinds import algebraic, discretized
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.names import exact_text
@@ -57,7 +56,7 @@ def first_guess(problem: Any, guess: Guess, options: Options) -> tuple[System, A
 
 @first_guess.register
 def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tuple[System, Array]:
-    system = Algebraic(problem, options.free, options.parameters)
+    system = algebraic(problem, options.free, options.parameters)
     given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
     states = np.zeros(system.state_size) if given is None else _numbers(given, system.state_size)
     return system, system.pack(states, {**problem.parameters, **options.parameters})

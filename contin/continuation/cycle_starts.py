@@ -14,6 +14,7 @@ from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.degree import usual_degree
 from contin.discretization.kinds import discretized
+from contin.discretization.maps import MapSystem
 from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
@@ -90,7 +91,7 @@ def frequency_of(point: Point) -> float | None:
     return float(point.details["frequency"]) if known else None
 
 
-def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
+def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
     """Return the system of orbits of twice the period, a period-doubling point as such an orbit, and the tangent there.
 
     The orbit, traversed twice, is a branch point of that system; the new branch leaves along perturbations that change their
@@ -107,6 +108,8 @@ def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
     system: Any = point.system
     if not doubles(point):
         raise ProblemError(f"start: a point with the label {point.label!r} is no period doubling")
+    if isinstance(system, MapSystem):
+        return _doubled_map(system, point.x)
     adapted = system.adapted(point.x, MeshControl())  # the point is located on a mesh finer than the run needs
     system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))
     mesh = np.concatenate([system.mesh, 1 + system.mesh[1:]]) / 2
@@ -117,6 +120,18 @@ def doubled(point: Point) -> tuple[PeriodicCollocation, Array, Array]:
     x = twice.pack(np.concatenate([states, states[1:] @ system.problem.symmetry.T]), parameters)
     found = locate_branch_point(twice.with_reference(x), x)
     return twice.with_reference(found.x), found.x, _alternating(twice, found, system.problem.symmetry)
+
+
+def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:
+    """Return the same of a map: the new branch leaves along a tangent that is none of the branch of single cycles."""
+    twice, x = system.doubled(x)
+    found = locate_branch_point(twice, x)
+    jacobian = system.differentiated(found.x, system.free)[1]
+
+    def change(tangent: Array) -> float:
+        return float(np.abs(jacobian @ tangent).max())
+
+    return twice, found.x, max(found.tangents, key=change)
 
 
 def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) -> Array:

@@ -22,6 +22,7 @@ from contin.arrays import Array, ComplexArray
 from contin.detection.hopf import hopf, hopf_points
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.discretization.maps import MapSystem
 from contin.errors import ConvergenceError
 from contin.stepping.newton import correct
 from contin.stepping.trial import TestFunction, Trial, sign_changed
@@ -52,7 +53,7 @@ class Floquet:
         Natural logarithms of the multipliers, the largest first; a multiplier with a positive real part is unstable.
     errors : ndarray, shape (n,)
         Estimated errors of the logarithms: their change on a mesh halved and, for the multiplier of an autonomous system that
-        is 1, its own. NaN where the cycle is not found on that mesh.
+        is 1, its own. NaN where the cycle is not found on that mesh. Of maps, round-off.
     unstable : int
         Number of unstable multipliers, without the one that is 1.
     """
@@ -69,9 +70,12 @@ class Floquet:
         return found
 
 
-def floquet(system: PeriodicCollocation, x: Array, tangent: Array) -> Floquet:
+def floquet(system: PeriodicCollocation | MapSystem, x: Array, tangent: Array) -> Floquet:
     """Return the Floquet multipliers of a cycle with their errors; the tangent is NaN where it is not known."""
     values, trivial = system.eigenvalues(x), _trivial(system, x)
+    if isinstance(system, MapSystem):
+        size = np.linalg.norm(system.jacobian(x)) + 1.0
+        return Floquet(values, np.finfo(float).eps * size / np.exp(values.real), unstable(system, x))
     finer: Any
     finer, carry = system.refined()
     try:
@@ -104,12 +108,12 @@ def _apart(values: ComplexArray, others: ComplexArray) -> Array:
     return distances
 
 
-def _trivial(system: PeriodicCollocation, x: Array) -> int | None:
+def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
     """Return the place of the multiplier that is 1 along every autonomous cycle; None of a forced one."""
     return int(np.abs(system.eigenvalues(x)).argmin()) if isinstance(system, CycleCollocation) else None
 
 
-def unstable(system: PeriodicCollocation, x: Array) -> int:
+def unstable(system: PeriodicCollocation | MapSystem, x: Array) -> int:
     """Return the number of unstable multipliers, without the one that is 1."""
     outside, trivial = system.eigenvalues(x).real > 0, _trivial(system, x)
     if trivial is not None:

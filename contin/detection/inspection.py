@@ -38,7 +38,7 @@ _ON_ZERO = 1e-8
 #: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
 _STANDS = 1e-11
 #: A tangent's component at a branch point below this is zero: tangents there come from differences with an error of 1e-8.
-_STATIONARY = 1e-5
+_STATIONARY = 1e-7
 #: A test function vanishes at a special point where it is smaller there by this factor than at the larger end of the step: as
 #: exactly as branch points are located. Values that are typed as round numbers coincide exactly.
 _COINCIDENT = 1e-10
@@ -60,8 +60,10 @@ _SAME_WAY = 0.5
 _BACK = 0.1
 #: A first point inside a step is not further than so many steps from its end, nor from both ends together.
 _REACH = 2
-#: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point.
+#: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point ...
 _SAME, _SAME_SHARE = 1e-4, 2e-3
+#: ... unless the parameter goes from the one to the other by what the tangent at the crossing says, up to this factor.
+_EXPLAINED = 2.0
 
 #: The first point of a run: system, x, tangent.
 Start = tuple[Discretization, Array, Array]
@@ -130,7 +132,7 @@ class Inspection:
         crossings = [point for point in found if not point.name.startswith("possible")]
         for test in tests:
             found += self._zeros(test, crossings)
-        found += [fold for fold in self._folds if not _same_place(fold, found, self.segment.step)]
+        found += [fold for fold in self._folds if not self._same_place(fold, found)]
         found = [point for point in found if not self._at_the_start(point)]
         closed = self._closed()
         if closed is not None:
@@ -317,15 +319,30 @@ class Inspection:
         first, ends = lasting(home, x), (lasting(system, end) for end in (segment.state.x, segment.trial.x))
         return sum(math.dist(first, end) for end in ends) > _REACH * segment.step
 
+    def _same_place(self, fold: SpecialPoint, found: list[SpecialPoint]) -> bool:
+        """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.
 
-def _same_place(point: SpecialPoint, found: list[SpecialPoint], step: float) -> bool:
-    """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.
+        Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
+        """
+        others = [other for other in found if other.label in ("BP", "CP") or other.name == "trivial branch"]
+        if fold.label != "LP" or not others:
+            return False
+        if fold.name.startswith("possible"):  # the equations are singular at the crossing: nothing else was found
+            return True
+        near = _SAME + _SAME_SHARE * self.segment.step
+        close = [other for other in others if np.max(np.abs(fold.trial.x - other.trial.x)) < near]
+        return any(not self._is_beside(fold, other) for other in close)
 
-    Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
-    """
-    others = [other for other in found if other.label in ("BP", "CP") or other.name == "trivial branch"]
-    if point.label != "LP" or not others:
-        return False
-    lost = point.name.startswith("possible")  # the equations are singular at the crossing: nothing else was found
-    near = _SAME + _SAME_SHARE * step
-    return lost or any(np.max(np.abs(point.trial.x - other.trial.x)) < near for other in others)
+    def _is_beside(self, fold: SpecialPoint, crossing: SpecialPoint) -> bool:
+        """Return whether a fold near a branch point is another point, as the parameter does not turn at that.
+
+        With the rate c there, and the fold at a distance d, it differs by c d / 2.
+        """
+        if not isinstance(crossing.details, BranchPoint) or not crossing.details.tangents:
+            return False
+        at = self.segment.trial.system.parameter_index(fold.name)
+        rate, p = crossing.details.tangents[0][at], crossing.trial.x[at]
+        change, expected = fold.trial.x[at] - p, rate * (fold.at - crossing.at) / 2
+        if abs(rate) < _STATIONARY or abs(change) < _STANDS * (1 + abs(p)):
+            return False
+        return bool(1 / _EXPLAINED < change / expected < _EXPLAINED)

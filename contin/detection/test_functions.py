@@ -20,6 +20,7 @@ from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
 from contin.discretization.connections import ConnectionCollocation
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
 from contin.problems.connection import TIME
@@ -82,6 +83,11 @@ def _of_cycles(system: PeriodicCollocation) -> list[TestFunction]:
 @own_test_functions.register
 def _of_connections(system: ConnectionCollocation) -> list[TestFunction]:
     return homoclinic_points(system) if system.problem.homoclinic and TIME not in system.free else []
+
+
+@own_test_functions.register
+def _of_maps(system: MapSystem) -> list[TestFunction]:
+    return [doubling(), torus()]
 
 
 @own_test_functions.register
@@ -148,7 +154,7 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
 
 
 @own_end.register
-def _of_doubled_cycles(system: PeriodicCollocation, point: SpecialPoint) -> SpecialPoint:
+def _of_doubled_cycles(system: PeriodicCollocation | MapSystem, point: SpecialPoint) -> SpecialPoint:
     """Where a cycle comes to go twice round one of half its period the branch ends: beyond it is itself, half a period on."""
     if point.label != "BP" or point.name in ("start", "symmetry breaking") or not system.is_doubled(point.trial.x):
         return point

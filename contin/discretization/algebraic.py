@@ -215,7 +215,7 @@ class Algebraic(System):
         """Return the same with other free parameters, parameters or scales."""
         values = dict(zip(self.problem.parameters, self.parameters))
         kept = {"free": self.free, "parameters": values, "scales": self.scales}
-        return Algebraic(self.problem, **{**kept, **changes})
+        return type(self)(self.problem, **{**kept, **changes})
 
     def carrier(self, other: Discretization) -> Carrier:
         """Return the function that carries vectors of unknowns to another system of this problem."""

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from contin import checks
 from contin.arrays import Array, ComplexArray, Indices
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
@@ -20,7 +19,7 @@ from contin.discretization.scales import Scales
 from contin.errors import ProblemError
 from contin.linalg.periodic import log_eigenvalues
 from contin.linalg.transitions import interval_matrices, transitions
-from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
+from contin.problems.cycle import PERIOD, CycleProblem, rounds_of
 
 #: A pair on the unit circle that is this near to -1, as an angle, is no torus bifurcation: round-off of a double one is its
 #: square root.
@@ -211,12 +210,7 @@ class ForcedCollocation(PeriodicCollocation):
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         values = dict(zip(self.problem.parameters, map(float, self.parameters)))
-        rounds = values[ROUNDS]
-        if ROUNDS in self.free:
-            raise ProblemError(f"free: {ROUNDS} must not be free, as it is a whole number")
-        if not (rounds >= 1 and rounds == int(rounds)):
-            raise ProblemError(f"parameters: {ROUNDS} = {checks.shown(rounds)} must be a whole number from 1")
-        self._rounds = int(rounds)
+        self._rounds = rounds_of(self.free, values)
         problem.duration(values)
 
     def is_doubled(self, x: Array) -> bool:
@@ -229,7 +223,7 @@ class ForcedCollocation(PeriodicCollocation):
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a torus bifurcation; None near a double multiplier -1."""
-        return None if _is_opposite(frequency) else ("TR", "torus")
+        return None if is_opposite(frequency) else ("TR", "torus")
 
 
 class CycleCollocation(Conditioned, PeriodicCollocation):
@@ -295,7 +289,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         sqrt(e).
         """
         trivial = float(np.abs(np.expm1(self.eigenvalues(x))).min())
-        return None if frequency**2 < _SPLIT * trivial or _is_opposite(frequency) else ("TR", "torus")
+        return None if frequency**2 < _SPLIT * trivial or is_opposite(frequency) else ("TR", "torus")
 
     def rates(self, x: Array, points: Array) -> Array:
         """Return T F at any states (K, n) divided by their sizes, likewise scaled, shape (K, n)."""
@@ -367,7 +361,8 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         return other, self.carrier(other)
 
 
-def _is_opposite(frequency: float) -> bool:
+def is_opposite(frequency: float) -> bool:
+    """Return whether a multiplier with this angle is -1, up to round-off."""
     return abs(frequency - math.pi) < _OPPOSITE
 
 

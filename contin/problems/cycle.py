@@ -216,6 +216,22 @@ def _turn(symmetry: Any, forced: bool, count: int) -> Array:
 _STATED: weakref.WeakKeyDictionary[AlgebraicProblem, CycleProblem] = weakref.WeakKeyDictionary()
 
 
+def rounds_of(free: Sequence[str], parameters: Mapping[str, float]) -> int:
+    """Return the number of rounds after which a cycle of a forced system, or of a map, closes.
+
+    Raises
+    ------
+    ProblemError
+        It is no whole number, or free.
+    """
+    rounds = parameters[ROUNDS]
+    if ROUNDS in free:
+        raise ProblemError(f"free: {ROUNDS} must not be free, as it is a whole number")
+    if not (rounds >= 1 and rounds == int(rounds)):
+        raise ProblemError(f"parameters: {ROUNDS} = {checks.shown(rounds)} must be a whole number from 1")
+    return int(rounds)
+
+
 def _scaled_by_forcing(field: Function, period: Function, count: int) -> Function:
     """Return a forced field times the period, at the time from 0 to 1."""
     values = "".join(f"T * r[{i}], " for i in range(count))

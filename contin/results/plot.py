@@ -14,6 +14,7 @@ from contin.arrays import Array
 from contin.detection.floquet import unstable
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
+from contin.discretization.maps import MapSystem
 from contin.errors import ProblemError
 from contin.results.axes import new_axes
 from contin.results.point import Point
@@ -95,7 +96,7 @@ def _pieces(points: Sequence[Point], dynamics: bool) -> Iterator[tuple[bool | No
 
 
 def _is_cycle(point: Point) -> bool:
-    return isinstance(point.system, PeriodicCollocation)
+    return isinstance(point.system, (PeriodicCollocation, MapSystem))
 
 
 def _is_equilibrium(point: Point) -> bool:

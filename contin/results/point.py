@@ -13,6 +13,7 @@ from contin.detection.floquet import Floquet, floquet
 from contin.detection.second_variation import SecondVariation, index_of, second_variation
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
+from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
@@ -196,7 +197,7 @@ class Point:
         return Profile(self, index)
 
     def floquet(self) -> Floquet:
-        """Return the Floquet multipliers of a cycle, with estimates of their errors.
+        """Return the Floquet multipliers of a cycle, or of one of a map, with estimates of their errors.
 
         Raises
         ------
@@ -216,8 +217,8 @@ class Point:
         >>> np.abs(orbit.floquet().multipliers).round(8).tolist()  # 1 and exp(-2 mu period), the period is 2 pi
         [1.0, 0.04321392]
         """
-        if not isinstance(self.system, PeriodicCollocation):
-            raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem")
+        if not isinstance(self.system, (PeriodicCollocation, MapSystem)):
+            raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem or MapProblem")
         return floquet(self.system, self.x, self.tangent)
 
     def second_variation(self) -> SecondVariation:

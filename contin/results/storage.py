@@ -16,7 +16,7 @@ from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
-from contin.discretization.kinds import discretized
+from contin.discretization.kinds import algebraic, discretized
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
 from contin.files import write_whole
@@ -188,7 +188,7 @@ def _system(
              if name.startswith("scale_") and name.rstrip("0123456789") + str(i) == name}  # fmt: skip
     scales = Scales.of_arrays(sizes) if sizes else None
     if isinstance(problem, AlgebraicProblem):
-        return Algebraic(problem, head["free"], values, scales)
+        return algebraic(problem, head["free"], values, scales)
     return discretized(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values, scales)
 
 

@@ -200,6 +200,17 @@ def test_tor():
 
 
 @pytest.mark.full
+def test_folds_beside_branch_points_of_tor():
+    """Fold and branch point come closer by a factor of about 4 in the period each time: all are told apart to the period 55."""
+    (hopf,) = hopf_points(tor, "rn", -0.9, (0.0, 0.0, 0.0), (-0.91, -0.4))
+    branch = contin.trace(hopf, branch=1, limits={"rn": (-0.91, -0.4), "period": (0, 55)})
+    found = [point for point in branch if point.label in ("LP", "BP")][2:]
+    assert sorted(point.label for point in found) == ["BP"] * 4 + ["LP"] * 4
+    gaps = [abs(one["period"] - other["period"]) for one, other in zip(found[::2], found[1::2])]
+    assert all(3 < before / after < 5 for before, after in zip(gaps, gaps[1:]))
+
+
+@pytest.mark.full
 def test_the_tail_of_tor_ends_at_a_homoclinic_orbit():
     """Without a limit of the period: folds and period doublings follow each other ever faster, to an equilibrium beside."""
     (hopf,) = hopf_points(tor, "rn", -0.9, (0.0, 0.0, 0.0), (-0.91, -0.4))

@@ -66,3 +66,26 @@ def test_two_zeros_beside_a_fold_stay_two():
     branch = contin.trace(contin.solve(ROUND, [2.0]), free=["a"], limits={"a": (-1, 5)}, zeros={"a": [4 - 1e-6]})
     assert labels(branch) == ["EP", "UZ", "LP", "UZ", "EP"]
     assert [point.x[0] for point in branch.labelled("UZ")] == pytest.approx([1e-3, -1e-3], rel=1e-6)
+
+
+@pytest.mark.parametrize("apart", [1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_fold_close_to_a_branch_point(apart, side):
+    """mu = (x - d)^2 with y = 0 has a fold at x = d; y (x - y^2) = 0 crosses it at x = 0, where mu does not turn."""
+    d = side * apart
+    problem = contin.AlgebraicProblem(
+        lambda u, p: (p.mu - (u.x - p.d) ** 2, u.y * (u.x - u.y**2)), ["x", "y"], {"mu": 1.0, "d": d}
+    )
+    start = contin.solve(problem, [1.0 + d, 0.0])
+    branch = contin.trace(start, free=["mu"], direction=-1, limits={"mu": (-1, 1.5)})
+    found = [point for point in branch if point.label in ("LP", "BP")]
+    assert [point.label for point in found] == (["LP", "BP"] if side > 0 else ["BP", "LP"])
+    for point in found:
+        x = point.system.states(point.x)[0, 0]
+        assert x == pytest.approx(d if point.label == "LP" else 0, abs=1e-8)
+
+
+def test_a_fold_at_a_branch_point_is_the_branch_point():
+    problem = contin.AlgebraicProblem(lambda u, p: (p.mu - u.x**2, u.y * (u.x - u.y**2)), ["x", "y"], {"mu": 1.0})
+    branch = contin.trace(contin.solve(problem, [1.0, 0.0]), free=["mu"], direction=-1, limits={"mu": (-1, 1.5)})
+    assert [point.label for point in branch if point.label in ("LP", "BP")] == ["BP"]

@@ -1,0 +1,120 @@
+"""Fixed points and cycles of maps, against closed forms."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+
+import contin
+from contin import MapProblem, ProblemError
+
+
+@functools.cache
+def logistic():
+    problem = MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 0.5}, {"twice": lambda u, p: 2 * u.x})
+    zero = contin.trace(contin.solve(problem, [0.0]), free=["r"], limits={"r": (0.5, 4)})
+    return contin.trace(zero.labelled("BP")[0], branch=1, limits={"r": (1, 3.7)})
+
+
+def henon(u, p):
+    return 1 - p.a * u.x**2 + u.y, p.b * u.x
+
+
+def labels(branch):
+    return [point.label for point in branch if point.label]
+
+
+def test_the_logistic_map_doubles_its_period():
+    """Fixed points x = 1 - 1 / r; doublings at 3, 1 + sqrt(6), and 3.5440903596 (MathWorld, Logistic Map)."""
+    single = logistic()
+    assert labels(single) == ["BP", "PD", "EP"]
+    for point in single:
+        assert point["twice"] == pytest.approx(2 - 2 / point["r"], abs=1e-11)
+    known, branch = [3, 1 + math.sqrt(6), 3.5440903596], single
+    for number, place in enumerate(known):
+        (doubling,) = branch.labelled("PD")
+        assert (doubling["r"], doubling["rounds"]) == pytest.approx((place, 2**number), abs=1e-10)
+        if number < 2:
+            branch = contin.trace(doubling, branch=1, limits={"r": (1, 3.7)})
+
+
+def test_multipliers_of_the_logistic_map():
+    """2 - r at fixed points, 4 + 2 r - r**2 at cycles of two."""
+    single = logistic()
+    double = contin.trace(single.labelled("PD")[0], branch=1, limits={"r": (1, 3.7)})
+    for point in single.points[2:]:
+        assert point.floquet().multipliers[0].real == pytest.approx(2 - point["r"], abs=1e-10)
+        assert point.floquet().unstable == int(point["r"] > 3) or point.label == "PD"
+    for point in double.points[2:]:
+        r = point["r"]
+        assert point.floquet().multipliers[0].real == pytest.approx(4 + 2 * r - r * r, abs=1e-9)
+
+
+def test_special_points_of_henon():
+    """A fold at a = -(1 - b)**2 / 4, a doubling at 3 (1 - b)**2 / 4, and that of cycles of two at (5 - 6 b + 5 b**2) / 4."""
+    problem, b = MapProblem(henon, ["x", "y"], {"a": 0.1, "b": 0.3}), 0.3
+    start = contin.solve(problem, [0.6, 0.2])
+    up = contin.trace(start, free=["a"], limits={"a": (-1, 1)})
+    down = contin.trace(start, free=["a"], direction=-1, limits={"a": (-1, 2)}, max_points=20)
+    (doubling,) = up.labelled("PD")
+    assert doubling["a"] == pytest.approx(3 * (1 - b) ** 2 / 4, abs=1e-12)
+    assert down.labelled("LP")[0]["a"] == pytest.approx(-((1 - b) ** 2) / 4, abs=1e-12)
+    double = contin.trace(doubling, branch=1, limits={"a": (0, 1)})
+    assert double.labelled("PD")[0]["a"] == pytest.approx((5 - 6 * b + 5 * b * b) / 4, abs=1e-11)
+    folds = contin.curve(down.labelled("LP")[0], "b", limits={"b": (0.2, 0.6)})
+    assert folds.points[-1]["a"] == pytest.approx(-(0.4**2) / 4, abs=1e-12)
+
+
+def test_a_torus_of_the_delayed_logistic_map():
+    """x = 1 - 1 / r has multipliers of the product r - 1 and the sum 1: exp(-+ i pi / 3) at r = 2."""
+    problem = MapProblem(lambda u, p: (p.r * u.x * (1 - u.y), u.x), ["x", "y"], {"r": 1.5})
+    branch = contin.trace(contin.solve(problem, [0.3, 0.3]), free=["r"], limits={"r": (1.2, 2.5)})
+    (torus,) = branch.labelled("TR")
+    assert torus["r"] == pytest.approx(2, abs=1e-12)
+    assert torus.details["frequency"] == pytest.approx(math.pi / 3, abs=1e-12)
+    assert [point.floquet().unstable for point in (branch.points[0], branch.points[-1])] == [0, 2]
+
+
+def test_a_cycle_of_three():
+    """The window of period three of the logistic map opens at 1 + sqrt(8), a fold."""
+    problem = MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 3.84})
+    cycle = contin.solve(problem, [0.15], {"rounds": 3})
+    branch = contin.trace(cycle, free=["r"], direction=-1, limits={"r": (3.82, 3.9)}, max_points=30)
+    assert branch.labelled("LP")[0]["r"] == pytest.approx(1 + math.sqrt(8), abs=1e-11)
+
+
+def test_a_stored_doubling_goes_on(tmp_path):
+    single = logistic()
+    contin.save(single, tmp_path / "map.npz")
+    (doubling,) = contin.load(single.points[0].system.problem, tmp_path / "map.npz").labelled("PD")
+    double = contin.trace(doubling, branch=1, limits={"r": (1, 3.5)})
+    assert double.labelled("PD")[0]["r"] == pytest.approx(1 + math.sqrt(6), abs=1e-10)
+
+
+def test_a_diagram_finds_all_of_it():
+    start = contin.solve(logistic().points[0].system.problem, [0.0])
+    found = contin.diagram(start, free=["r"], depth=2, limits={"r": (0.5, 3.5)})
+    assert [(junction.point.label, junction.point["rounds"]) for junction in found.junctions] == [
+        ("BP", 1),
+        ("PD", 1),
+        ("PD", 2),
+    ]
+    assert np.isfinite(found.branches[0].points[0]["r"])
+
+
+@pytest.mark.parametrize(
+    ("statement", "words"),
+    [
+        (lambda: MapProblem(lambda u, p: (u.x, u.x), ["x"], {"r": 1.0}), "map returns 2 values for the 1 states x"),
+        (lambda: MapProblem(lambda u, p: (u.x,), ["x"], {"rounds": 1.0}), "rounds is a parameter of every map by itself"),
+        (
+            lambda: contin.solve(MapProblem(henon, ["x", "y"], {"a": 0.1, "b": 0.3}), [0, 0], {"rounds": 1.5}),
+            "whole number from 1",
+        ),
+        (lambda: contin.trace(logistic().points[0], free=["rounds"]), "rounds must not be free"),
+    ],
+)
+def test_what_is_refused(statement, words):
+    with pytest.raises(ProblemError, match=words):
+        statement()
