@@ -66,9 +66,16 @@ def homoclinic() -> TestFunction:
 
 
 def _liveliness(trial: Trial) -> float:
-    """Return a number that is positive where the least speed of a cycle can be told from zero."""
-    speeds = _speeds(trial.system, trial.x)
-    return float(np.log10(speeds.min() / speeds.max() / _STILL)) if speeds.min() > 0 else 1.0
+    """Return a number that is positive where the least speed of a cycle can be told from zero.
+
+    The slow stretches of relaxation oscillations are beside no equilibrium, and end nothing.
+    """
+    system: Any = trial.system
+    speeds = _speeds(system, trial.x)
+    if not speeds.min() > 0:
+        return 1.0
+    value = float(np.log10(speeds.min() / speeds.max() / _STILL))
+    return value if value > 0 or resting_place(system, trial.x) is not None else 1.0
 
 
 def _speeds(system: Any, x: Array) -> Array:

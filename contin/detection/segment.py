@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +46,8 @@ class SpecialPoint:
         Vanishes here.
     same_as : SpecialPoint, optional
         The fold or branch point that lies at the same place and is located better.
+    errors : mapping of str to float, optional
+        Errors of the free parameters, where they are known from how the point was found.
     """
 
     at: float
@@ -55,6 +58,7 @@ class SpecialPoint:
     details: Any = None
     test: TestFunction | None = None
     same_as: SpecialPoint | None = None
+    errors: Mapping[str, float] | None = None
 
 
 class Segment:

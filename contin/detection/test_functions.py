@@ -20,9 +20,13 @@ from contin.discretization.collocation import Collocation
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
+from contin.problems.cycle import PERIOD
 from contin.problems.variational import VariationalProblem
 from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
+
+#: Decimal places of a parameter that stands still: it does up to errors of meshes with the tolerance 1e-12.
+_DIGITS = 9
 
 
 def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
@@ -148,6 +152,23 @@ def _of_shrunk_cycles(system: CycleCollocation, point: SpecialPoint) -> SpecialP
         return _of_doubled_cycles(system, point)
     stop = Stop("Hopf", "the cycles shrink onto an equilibrium, a Hopf point")
     return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
+
+
+@functools.singledispatch
+def own_standstill(system: Discretization, trial: Trial, primary: str) -> Stop | None:
+    """Return the reason to end a run whose primary parameter has not moved; None to go on. Each kind registers its own."""
+    return None
+
+
+@own_standstill.register
+def _of_vertical_families(system: CycleCollocation, trial: Trial, primary: str) -> Stop:
+    """The cycles of a Hamiltonian or linear system fill an area at one value of the parameter."""
+    value = round(trial[primary], _DIGITS) + 0.0
+    message = f"{primary} stays at {value:.10g}, up to errors of the mesh: a vertical family, as of a conservative system"
+    if primary == PERIOD:
+        return Stop("standstill", message, "all its cycles have this period; follow another parameter")
+    advice = f'follow it with primary="{PERIOD}", where {primary} must be a parameter that breaks the conservation (unfolds it)'
+    return Stop("standstill", message, advice)
 
 
 @functools.singledispatch

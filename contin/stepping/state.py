@@ -31,6 +31,10 @@ class State:
         Number of regular points.
     singular : bool
         x is a branch point.
+    sense : float
+        The sign in which the primary parameter went where that could be told last; zero where it never could.
+    sensed : ndarray, or None
+        The free parameters there, in the user's units.
     """
 
     system: Discretization
@@ -43,6 +47,8 @@ class State:
     arclength: float
     accepted: int
     singular: bool
+    sense: float = 0.0
+    sensed: Array | None = None
 
     @property
     def row(self) -> Array:
