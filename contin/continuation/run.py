@@ -25,7 +25,7 @@ from contin.continuation.scaling import outgrown, scaled
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
-from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.detection.segment import Place, Segment, SpecialPoint, with_details
 from contin.detection.significance import free_values, sense
 from contin.detection.test_functions import (
     fold,
@@ -255,6 +255,7 @@ class Continuation:
         for point, change in zip(special, changes):
             if point.stop is not None:
                 self.stop = own_stop(point.trial.system, point.trial, point.stop)
+                point = with_details(point, self.stop)
             yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -157,3 +157,10 @@ def stop_of(test: TestFunction) -> Stop | None:
     if not test.terminal:
         return None
     return Stop("limit", f"reached {test.name}") if test.limit else Stop("event", f"met {test.name}")
+
+
+def with_details(point: SpecialPoint, stop: Stop) -> SpecialPoint:
+    """Return a special point with the numbers that the reason of the end brings, unless it has details of another kind."""
+    if not stop.details or not isinstance(point.details, (dict, type(None))):
+        return point
+    return replace(point, details={**(point.details or {}), **stop.details})

@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.floquet import doubling, torus
-from contin.detection.homoclinic import homoclinic, resting_place
+from contin.detection.homoclinic import homoclinic, limit_of_parameter, resting_place
 from contin.detection.hopf import hopf
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.second_variation import legendre
@@ -179,8 +180,14 @@ def own_stop(system: Discretization, trial: Trial, stop: Stop) -> Stop:
 
 @own_stop.register
 def _of_slow_cycles(system: CycleCollocation, trial: Trial, stop: Stop) -> Stop:
-    """Where the period runs away: the equilibrium near which the cycle spends its time."""
-    place = resting_place(trial.system, trial.x)  # type: ignore[arg-type]
+    """Where the period runs away: the equilibrium near which the cycle spends its time, and the limit of the parameter."""
+    cycles: Any = trial.system
+    place = resting_place(cycles, trial.x)
     if place is None:
         return stop
-    return dataclasses.replace(stop, message=f"{stop.message}; {place.describe(trial.system.problem.states)}")
+    message = f"{stop.message}; {place.describe(cycles.problem.states)}"
+    limit = limit_of_parameter(cycles, trial.x, place.eigenvalues)
+    if limit is None:
+        return dataclasses.replace(stop, message=message)
+    details = {f"limit_{limit.name}": limit.value, f"limit_{limit.name}_error": limit.error}
+    return dataclasses.replace(stop, message=f"{message}; {limit.describe()}", details=details)

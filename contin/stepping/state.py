@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -63,11 +64,12 @@ def standing_at(system: Discretization, x: Array, tangent: Array, step: float) -
 
 @dataclass(frozen=True)
 class Stop:
-    """Why a run ended: a short ``reason``, a sentence, and what could be changed."""
+    """Why a run ended: a short ``reason``, a sentence, what could be changed, and numbers for the details of the last point."""
 
     reason: str
     message: str
     advice: str = ""
+    details: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"{self.message}; {self.advice}" if self.advice else self.message
