@@ -93,7 +93,7 @@ class Diagram:
         if cycles and y is None:
             y = cycles[0].problem.state_names[0]
         for points in drawn:
-            axes = plot.plot(points, x, y, axes, dynamics=True)
+            axes = plot.plot(points, x, y, axes)
         return axes
 
     def graph(self) -> Any:

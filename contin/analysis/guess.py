@@ -25,8 +25,8 @@ from contin.problems.segmented import SegmentedProblem
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point
 
-#: A mesh point of a guess that lies closer to the end of the part that is computed is left out; Newton's method bears it ten
-#: times larger or smaller.
+#: A mesh point of a guess that lies closer to the end of the part that is computed is left out. Ten times
+#: larger, the first mesh has a longer interval there; it is adapted in any case.
 _LEAST_INTERVAL = 1e-3
 
 Guess = Callable[[float], Any] | Point | Sequence[float] | tuple[Sequence[float] | Array, Any] | None

@@ -20,6 +20,7 @@ from contin.discretization.system import System
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.cycle import PERIOD, CycleProblem
 from contin.problems.statement import with_multipliers
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point, point_of, system_of
@@ -45,7 +46,9 @@ def solve(
     parameters : mapping of str to float
         Values that differ from the defaults (of the problem, or of the guess if it is a point).
     free : sequence of str
-        Parameters to be found along with the states, for problems with more conditions than states.
+        Parameters to be found along with the states, for problems with more conditions than states. Of an autonomous
+        `CycleProblem`, a parameter to be found in place of the period, which is held: in a family of a conservative system
+        the period does not follow from the parameters.
     intervals : int
         Of the first mesh, which is uniform unless the guess has one.
     degree : int, optional
@@ -83,31 +86,46 @@ def solve(
         there = len(problem.state_names) + needed
         kind = "equations" if isinstance(problem, AlgebraicProblem) else "boundary and integral conditions"
         raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
-    if len(free) != needed:
+    held = PERIOD if isinstance(problem, CycleProblem) and PERIOD in free and len(free) == needed + 1 else None
+    if len(free) != needed and held is None:
         raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
     if degree is None:
         degree = guess.system.degree if isinstance(guess, Point) else usual_degree(len(problem.state_names), control.tolerance)
     system, x = first_guess(problem, guess, Options(parameters, free, intervals, degree))
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
-    return solved(system, x, control, newton, others)
+    return solved(system, x, control, newton, others, held)
 
 
-def solved(system: System, x: Array, control: MeshControl, newton: Newton, others: Sequence[Point] = ()) -> Point:
-    """Return the solution near a vector of unknowns, on a mesh adapted to it.
+def solved(
+    system: System, x: Array, control: MeshControl, newton: Newton, others: Sequence[Point] = (), held: str | None = None
+) -> Point:
+    """Return the solution near a vector of unknowns, on a mesh adapted to it; one of the free parameters may be held.
 
     Raises
     ------
     ConvergenceError, ProblemError
     """
     for _ in range(_ROUNDS):
-        done = _corrected(system, x, others, newton)
+        done = _corrected(system, x, others, newton) if held is None else _holding(system, x, held, newton)
         adapted = system.adapted(done.x, control)
         if adapted is None:
             break
         system, carry = adapted
         x = carry(done.x)
     return point_of(system, done.x, done.iterations, done.error)
+
+
+def _holding(system: System, x: Array, name: str, newton: Newton) -> Corrected:
+    """Return the solution near x with the value of a free parameter that x has.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    row = np.zeros(system.size)
+    row[system.parameter_index(name)] = 1.0
+    return correct(system, x, row, row @ x, newton, unscaled=True)
 
 
 def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:

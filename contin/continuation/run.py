@@ -26,12 +26,14 @@ from contin.detection.extrema import extremum
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
-from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.detection.segment import Place, Segment, SpecialPoint, with_details
+from contin.detection.significance import free_values, sense
 from contin.detection.test_functions import (
     fold,
     limits,
     own_end,
     own_normal_form,
+    own_standstill,
     own_stop,
     own_test_functions,
     user_zeros,
@@ -77,6 +79,8 @@ _ROUNDS = 3
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
 #: small as min_step come much nearer, and regular points do not come so near.
 _NEARLY = 1e-2
+#: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
+_STANDING = 6
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
@@ -140,7 +144,7 @@ class Continuation:
         self._at_start: dict[str, float] = {}
         general = self._general_test_functions()
         self._tests = [*general, *self._own]
-        self._comparable = [*general, *([self._fold] if self._fold else [])]  # have the same sign on every mesh
+        self._comparable = general  # have the same sign on every mesh
         self._index = index_of(self.state.system)
         self.notes: list[str] = []
         self._resumed = state is not None
@@ -260,6 +264,7 @@ class Continuation:
         for point, change in zip(special, changes):
             if point.stop is not None:
                 self.stop = own_stop(point.trial.system, point.trial, point.stop)
+                point = with_details(point, self.stop)
             yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return
@@ -267,7 +272,9 @@ class Continuation:
         self._end = segment.trial
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
-        label, name = ("EP", "max points") if self.stop else ("", "")
+        elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
+            self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
+        label, name = ("EP", self.stop.reason) if self.stop else ("", "")
         yield self._point(SpecialPoint(segment.step, label, name, segment.trial), segment.state)
 
     def _failure(self, error: ConvergenceError) -> Stop:
@@ -406,7 +413,12 @@ class Continuation:
         missed = abs(guess[at] - trial.x[at])
         tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
         change = step * max(abs(tangent[at]) for tangent in tangents)
-        return bool(missed > _MISSED * change and missed > _NOISE * (1 + abs(trial.x[at])))
+        jumped = missed > _MISSED * change and missed > _NOISE * (1 + abs(trial.x[at]))
+        return bool(jumped and self._sense(trial))
+
+    def _sense(self, trial: Trial) -> float:
+        """Return the sense in which the primary parameter goes; zero where that cannot be told, or is not wanted."""
+        return 0.0 if self._fold is None else sense(trial, self._fold, self.settings.newton)
 
     def _exact_tangent(self, state: State) -> Array:
         """Return the tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""
@@ -424,10 +436,11 @@ class Continuation:
         longest = min(settings.max_step, settings.change * float(np.min((1 + np.abs(p)) / (np.abs(rate) + _NO_RATE))))
         longer = step * np.clip(factor, _SHORTER, _LONGER)
         following = float(np.clip(longer, settings.min_step, max(longest, settings.min_step)))
-        gone = trial.x - state.x
+        gone, way = trial.x - state.x, self._sense(trial)
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
+            way or state.sense, free_values(trial) if way else state.sensed,
         )  # fmt: skip
 
     # --- the index -----------------------------------------------------------------------------------------------
@@ -484,6 +497,8 @@ class Continuation:
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):
             return  # a special point would fall between the meshes; the next point will do as well
+        if self._sense(before) * self._sense(end) < 0:
+            return  # so would a fold
         if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, self.settings.newton):
             return
         self._end = end
@@ -498,7 +513,9 @@ class Continuation:
         errors: Mapping[str, float] = {}
         labelled = found.label not in ("", "MX") and found.name != "closed"  # closed: the first point once more
         coarse = own_normal_form(found.trial.system, found)
-        if labelled and self.settings.errors:
+        if found.errors is not None:
+            errors = found.errors
+        elif labelled and self.settings.errors:
             again = refined(found.same_as or found, self.settings)
             details = found.details if found.same_as else again.details
             found, errors = dataclasses.replace(found, trial=again.trial, details=details), again.errors

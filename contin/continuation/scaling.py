@@ -37,6 +37,9 @@ _CANCELLED, _PASSES = 1e-5, 3
 _NEGLIGIBLE = 1e-60
 #: States without any known size are looked for within so many powers of ten around one.
 _DECADES = 12
+#: A parameter that is zero and changes less than this while states change by their size stands still: that is round-off. Ten
+#: times larger, a parameter of that unit that begins at zero must have its size stated.
+_STILL = 1e-12
 #: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
 _TINY = 1e-14
 
@@ -67,7 +70,8 @@ def scaled(
         moves = rates > 0
         stated = np.array([known.get(name, found) for name, found in zip(states, size)])
         needed = usual(np.where(stated > 0, stated, 1.0))[moves] * rate_of_free[at] / rates[moves]
-        free[at] = min(1.0, needed.min(initial=1.0))
+        least = needed.min(initial=1.0)
+        free[at] = min(1.0, least) if least > _STILL else 1.0
     change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
     response = np.minimum(1.0, rates * change)
     size = np.maximum(size, np.where(response > noise, response, 0.0))

@@ -21,10 +21,11 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.detection.hopf import hopf, hopf_points
 from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.detection.significance import on_finer_mesh
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.maps import MapSystem
 from contin.errors import ConvergenceError
-from contin.stepping.newton import correct
+from contin.stepping.newton import Newton, correct
 from contin.stepping.trial import TestFunction, Trial, sign_changed
 
 #: Into how many parts a step is divided to look inside it, on the cubic.
@@ -159,7 +160,8 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda place: place[0])
     knots = sorted([*knots, *_below(segment, knots, test)], key=lambda place: place[0])
     pieces = [(left, right) for left, right in itertools.pairwise(knots)
-              if sign_changed(left[1].value(test), right[1].value(test))]  # fmt: skip
+              if sign_changed(left[1].value(test), right[1].value(test))
+              and _changes_on_finer_mesh(left[1], right[1], test, segment.newton)]  # fmt: skip
     return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
 
 
@@ -201,6 +203,16 @@ def _from_torus(values: list[complex]) -> list[float]:
         partners = [sizes[other] for other in range(len(values)) if other != place and angles[other] == angle]
         found.append(max(size, min(partners, default=math.inf)))
     return found
+
+
+def _changes_on_finer_mesh(left: Trial, right: Trial, test: TestFunction, newton: Newton) -> bool:
+    """Return whether a test function changes its sign on the mesh halved, too; looked at where multipliers are in doubt."""
+    system: Any = left.system
+    if not any(system.is_drifted(trial.x) for trial in (left, right)):
+        return True
+    finer = [on_finer_mesh(trial, newton) for trial in (left, right)]
+    values = [trial.value(test) for trial in finer if trial is not None]
+    return len(values) == 2 and sign_changed(*values)
 
 
 def _dips(places: list[Place], values: list[float]) -> list[tuple[float, float]]:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin.detection.segment import Place, Segment, SpecialPoint
+from contin.detection.significance import on_plateau, senses
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
 from contin.stepping.trial import TestFunction, Trial, sign_changed
@@ -74,10 +75,12 @@ class FoldSearch:
 
         The parameter goes one way before a fold and the other way behind it. Where its rate is so small that it may be
         round-off, and the parameter itself does not differ from one fold to the next, or to both ends of the step, there is
-        none.
+        none. For rates that may be errors of the mesh see `contin.detection.significance`.
         """
         segment = self.segment
         left, right = (segment.low, segment.before), (segment.step, segment.trial)
+        if not all(senses(segment, self.fold)):
+            return on_plateau(segment, self.fold)
         found = self.between(left, right)
         if max(abs(trial.value(self.fold)) for _, trial in (left, right)) >= _ROUND_OFF:
             return found

@@ -14,8 +14,10 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.discretization.cycles import CycleCollocation
+from contin.errors import ConvergenceError
 from contin.problems.cycle import PERIOD
-from contin.stepping.trial import TestFunction, Trial
+from contin.stepping.newton import correct
+from contin.stepping.trial import TestFunction, Trial, linearization
 
 #: A branch ends where the least speed of a cycle is below this part of the largest: the square root of round-off. Ten times
 #: larger, homoclinic points are known to 1e-14 and not to the last digit.
@@ -66,9 +68,16 @@ def homoclinic() -> TestFunction:
 
 
 def _liveliness(trial: Trial) -> float:
-    """Return a number that is positive where the least speed of a cycle can be told from zero."""
-    speeds = _speeds(trial.system, trial.x)
-    return float(np.log10(speeds.min() / speeds.max() / _STILL)) if speeds.min() > 0 else 1.0
+    """Return a number that is positive where the least speed of a cycle can be told from zero.
+
+    The slow stretches of relaxation oscillations are beside no equilibrium, and end nothing.
+    """
+    system: Any = trial.system
+    speeds = _speeds(system, trial.x)
+    if not speeds.min() > 0:
+        return 1.0
+    value = float(np.log10(speeds.min() / speeds.max() / _STILL))
+    return value if value > 0 or resting_place(system, trial.x) is not None else 1.0
 
 
 def _speeds(system: Any, x: Array) -> Array:
@@ -119,3 +128,58 @@ def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
         return None
     scales = np.ones(len(states)) if system.scales is None else system.scales.states
     return RestingPlace(states * scales, eigenvalues, share)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The value that a parameter tends to as the period grows without bound, with an estimate of its error."""
+
+    name: str
+    value: float
+    error: float
+
+    def describe(self) -> str:
+        """Return it as a clause."""
+        places = int(np.clip(1 - np.floor(np.log10(max(self.error, 1e-15))), 0, 15))
+        return f"as the period grows, {self.name} tends to {self.value:.{places}f} +- {self.error:.1g}"
+
+
+def limit_of_parameter(system: CycleCollocation, x: Array, eigenvalues: ComplexArray) -> Limit | None:
+    """Return the limit of the free parameter p on a branch that tends to a homoclinic orbit; None where it is not known.
+
+    Near a saddle p - limit = A exp(-k T), with the eigenvalue k or -k that is nearest to the imaginary axis, so that the limit
+    is p + (dp/dT) / k. The error is its difference from that of a cycle with half the rate dp/dT, where the next exponentials
+    are larger, and from that on the mesh halved. Of a complex leading eigenvalue p oscillates, and is not extrapolated.
+    """
+    (name, *_), rates = [name for name in system.free if name != PERIOD], np.abs(eigenvalues.real)
+    leading = eigenvalues[rates.argmin()]
+    if leading.imag or not rates.min() > 0 or len(set(np.sign(eigenvalues.real))) < 2:
+        return None
+    k = float(rates.min()) / system.order
+    try:
+        value = _extrapolated(system, x, (name, k), 0.0)
+        shorter = _extrapolated(system, x, (name, k), np.log(2) / k)
+        finer, carry = system.refined()
+        better = _extrapolated(finer, carry(x), (name, k), 0.0)  # type: ignore[arg-type]
+    except ConvergenceError:
+        return None
+    error = abs(value - shorter) + abs(value - better) + np.finfo(float).eps * abs(value)
+    return Limit(name, better, float(error)) if np.isfinite(error) else None
+
+
+def _extrapolated(system: CycleCollocation, x: Array, law: tuple[str, float], less: float) -> float:
+    """Return p + (dp/dT) / k, for ``law`` (p, k), at a period that is shorter by some time.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    (name, k), row = law, np.zeros(system.size)
+    at, of_period = system.parameter_index(name), system.parameter_index(PERIOD)
+    sizes = system.free_scales[[i - system.state_size for i in (at, of_period)]]
+    row[of_period] = 1.0
+    tangent = linearization(system, x, row).tangent
+    guess = x - tangent / tangent[of_period] * less / sizes[1]
+    found = correct(system, guess, row, guess[of_period]).x
+    tangent = linearization(system, found, row).tangent
+    return float(sizes[0] * (found[at] + tangent[at] / tangent[of_period] / (k * sizes[1])))

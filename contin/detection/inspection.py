@@ -21,6 +21,7 @@ from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
 from contin.detection.phase import in_phase, lasting
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
+from contin.detection.significance import senses
 from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
 from contin.stepping.settings import Settings
@@ -108,6 +109,8 @@ class Inspection:
         if self.fold is None:
             return True
         before, trial = self.segment.before, self.segment.trial
+        if not all(senses(self.segment, self.fold)):
+            return True  # it stands still as far as can be told
         knots = [before, *(fold.trial for fold in self._folds), trial]
         at = trial.system.parameter_index(self.fold.name)
         sense = np.sign(before.value(self.fold))

@@ -137,7 +137,9 @@ def _zero_again(system: Discretization, x: Array, tangent: Array, test: TestFunc
             return trial
         trial, before = at(s), value
         value = test.function(trial)
-        if abs(s - last) < _LAST or value == before:
+        if abs(s - last) < _LAST:
             return trial
+        if value == before:
+            break  # it does not depend on the place, and is not zero
         s, last = s - value * (s - last) / (value - before), s
     raise ConvergenceError("the point was not found again on the finer mesh")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,8 @@ class SpecialPoint:
         Vanishes here.
     same_as : SpecialPoint, optional
         The fold or branch point that lies at the same place and is located better.
+    errors : mapping of str to float, optional
+        Errors of the free parameters, where they are known from how the point was found.
     """
 
     at: float
@@ -55,6 +58,7 @@ class SpecialPoint:
     details: Any = None
     test: TestFunction | None = None
     same_as: SpecialPoint | None = None
+    errors: Mapping[str, float] | None = None
 
 
 class Segment:
@@ -153,3 +157,10 @@ def stop_of(test: TestFunction) -> Stop | None:
     if not test.terminal:
         return None
     return Stop("limit", f"reached {test.name}") if test.limit else Stop("event", f"met {test.name}")
+
+
+def with_details(point: SpecialPoint, stop: Stop) -> SpecialPoint:
+    """Return a special point with the numbers that the reason of the end brings, unless it has details of another kind."""
+    if not stop.details or not isinstance(point.details, (dict, type(None))):
+        return point
+    return replace(point, details={**(point.details or {}), **stop.details})

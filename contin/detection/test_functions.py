@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.floquet import doubling, torus
-from contin.detection.homoclinic import homoclinic, resting_place
+from contin.detection.homoclinic import homoclinic, limit_of_parameter, resting_place
 from contin.detection.homoclinic_points import homoclinic_points, own_names
 from contin.detection.hopf import hopf
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
@@ -24,9 +25,13 @@ from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.names import value_names
 from contin.problems.connection import TIME
+from contin.problems.cycle import PERIOD
 from contin.problems.variational import VariationalProblem
 from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
+
+#: Decimal places of a parameter that stands still: it does up to errors of meshes with the tolerance 1e-12.
+_DIGITS = 9
 
 
 def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
@@ -172,6 +177,23 @@ def _of_shrunk_cycles(system: CycleCollocation, point: SpecialPoint) -> SpecialP
 
 
 @functools.singledispatch
+def own_standstill(system: Discretization, trial: Trial, primary: str) -> Stop | None:
+    """Return the reason to end a run whose primary parameter has not moved; None to go on. Each kind registers its own."""
+    return None
+
+
+@own_standstill.register
+def _of_vertical_families(system: CycleCollocation, trial: Trial, primary: str) -> Stop:
+    """The cycles of a Hamiltonian or linear system fill an area at one value of the parameter."""
+    value = round(trial[primary], _DIGITS) + 0.0
+    message = f"{primary} stays at {value:.10g}, up to errors of the mesh: a vertical family, as of a conservative system"
+    if primary == PERIOD:
+        return Stop("standstill", message, "all its cycles have this period; follow another parameter")
+    advice = f'follow it with primary="{PERIOD}", where {primary} must be a parameter that breaks the conservation (unfolds it)'
+    return Stop("standstill", message, advice)
+
+
+@functools.singledispatch
 def own_stop(system: Discretization, trial: Trial, stop: Stop) -> Stop:
     """Return the reason why a run ends, with what a kind of problem knows of its last point. Each kind registers its own."""
     return stop
@@ -179,8 +201,14 @@ def own_stop(system: Discretization, trial: Trial, stop: Stop) -> Stop:
 
 @own_stop.register
 def _of_slow_cycles(system: CycleCollocation, trial: Trial, stop: Stop) -> Stop:
-    """Where the period runs away: the equilibrium near which the cycle spends its time."""
-    place = resting_place(trial.system, trial.x)  # type: ignore[arg-type]
+    """Where the period runs away: the equilibrium near which the cycle spends its time, and the limit of the parameter."""
+    cycles: Any = trial.system
+    place = resting_place(cycles, trial.x)
     if place is None:
         return stop
-    return dataclasses.replace(stop, message=f"{stop.message}; {place.describe(trial.system.problem.states)}")
+    message = f"{stop.message}; {place.describe(cycles.problem.states)}"
+    limit = limit_of_parameter(cycles, trial.x, place.eigenvalues)
+    if limit is None:
+        return dataclasses.replace(stop, message=message)
+    details = {f"limit_{limit.name}": limit.value, f"limit_{limit.name}_error": limit.error}
+    return dataclasses.replace(stop, message=f"{message}; {limit.describe()}", details=details)

@@ -17,7 +17,7 @@ from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
-from contin.linalg.periodic import log_eigenvalues
+from contin.linalg.periodic import log_eigenvalues, log_eigenvalues_along
 from contin.linalg.transitions import interval_matrices, transitions
 from contin.problems.cycle import PERIOD, CycleProblem, rounds_of
 
@@ -31,6 +31,9 @@ _EQUAL, _KEPT = 1e-9, 50
 #: A pair whose logarithm has a smaller real part lies on the unit circle: in a conservative system pairs stay there, up to
 #: round-off of their product. Ten times larger, a torus bifurcation is located as much worse.
 _ON_CIRCLE = 1e-12
+#: Where the logarithm of the multiplier 1 is larger, the direction of the flow is split off: others are hidden by as
+#: much. It is 1e-7 where both multipliers of a conservative system are 1. Ten times smaller, the same is done there.
+_DRIFTED = 1e-6
 #: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
 _SHRUNK = 1e-7
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
@@ -166,7 +169,7 @@ class PeriodicCollocation(Collocation):
             matrices = transitions(self.basis.value, self.basis.slope, self._h, jacobian)
             if self.order > 1:
                 matrices = np.concatenate([matrices, np.linalg.inv(self.turn)[None]])
-            values = log_eigenvalues(matrices)
+            values = self._logarithms(x, matrices)
             total = float(self._quadrature @ np.einsum("kaa->k", jacobian))
             reals = values.real.tolist()
             smallest = [place for place, value in enumerate(reals) if value <= min(reals) + _EQUAL]
@@ -175,6 +178,14 @@ class PeriodicCollocation(Collocation):
                 values[smallest] += (total - sum(reals)) / len(smallest)
             self._known[key] = _on_circle(values)
         return self._known[key]
+
+    def _logarithms(self, x: Array, transitions: Array) -> ComplexArray:
+        """Return the logarithms of the eigenvalues of the product of the transition matrices."""
+        return log_eigenvalues(transitions)
+
+    def is_drifted(self, x: Array) -> bool:
+        """Return whether round-off has moved a multiplier that is known, so that those on this mesh are in doubt."""
+        return False
 
     def whole_round(self, values: ComplexArray) -> ComplexArray:
         """Return the logarithms of the multipliers over the whole period, n times those over one n-th of it."""
@@ -247,6 +258,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         self.equations = self._conditions + 1
+        self._drifted: set[bytes] = set()
         self._set_reference(np.zeros((self.nodes.size, self._n)))
 
     def _set_reference(self, reference: Array) -> None:
@@ -277,6 +289,24 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         if self.scales is not None:
             first /= self.scales.states
         return np.asarray(first / np.linalg.norm(first), dtype=float)
+
+    def _logarithms(self, x: Array, transitions: Array) -> ComplexArray:
+        """Return the logarithms of all multipliers; where the one that is 1 has drifted, the flow's direction is split off.
+
+        After a repelling stretch, as of a canard, round-off in that direction hides all other multipliers.
+        """
+        values = log_eigenvalues(transitions)
+        if np.abs(values).min() <= _DRIFTED or not np.all(np.isfinite(transitions)):
+            self._drifted.discard(x.tobytes())
+            return values
+        self._drifted.add(x.tobytes())
+        flow = self.rates(x, np.ascontiguousarray(self._scaled_states(x)[:: self._d]))
+        return log_eigenvalues_along(transitions, np.concatenate([flow[: len(transitions)], flow[:1]]))
+
+    def is_drifted(self, x: Array) -> bool:
+        """Return whether the multiplier that is 1 is off before the direction of the flow is split off."""
+        self.eigenvalues(x)
+        return x.tobytes() in self._drifted
 
     def _is_own_error(self, values: ComplexArray, smallest: list[int]) -> bool:
         """Return whether the smallest multiplier is the one that is 1: its error shall show."""

@@ -16,7 +16,7 @@ from contin.problems.vector_field import generated
 #: The largest order of a symmetry: rings of more oscillators are rare, and one n-th of a cycle should be worth a mesh.
 _MOST = 60
 #: S^n is 1, and F(S u) is S F(u), up to this part of their size: entries like cos(2 pi / 3) are known to round-off. Ten times
-#: larger or smaller, the same matrices pass.
+#: larger, matrices typed with eight digits would pass.
 _EQUAL = 1e-9
 #: Places at which the symmetry of a field is checked, from this seed, with states between -1 and 1.
 _PLACES, _SEED = 5, 7

@@ -93,7 +93,8 @@ class Branch:
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
         """Draw one column against another, with marks at labelled points.
 
-        Where the index is known (`VariationalProblem`), and of cycles, stable parts are solid and unstable ones dashed.
+        Of cycles and equilibria, and where the index is known (`VariationalProblem`), stable parts are solid and unstable ones
+        dashed. The solutions of an `AlgebraicProblem` count as equilibria unless it is stated with ``dynamics=False``.
 
         Parameters
         ----------

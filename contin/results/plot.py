@@ -35,14 +35,11 @@ _LINES = {True: ("-", "stable"), False: ((0, (3, 2)), "unstable"), None: ("-", N
 _AREA = {"*": 90, "": 30}
 
 
-def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Any = None, dynamics: bool = False) -> Any:
-    """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`.
-
-    With ``dynamics`` the stability of equilibria is drawn, too.
-    """
+def plot(points: Sequence[Point], x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+    """Draw one column against another, with marks at labelled points; see `contin.Branch.plot`."""
     x, columns, name = _columns(points, x, y)
     axes = new_axes() if axes is None else axes
-    pieces = list(_pieces(points, dynamics))
+    pieces = list(_pieces(points))
     named: set[str | None] = set(axes.get_legend_handles_labels()[1])
     for column_name in columns:
         named |= _draw(points, (x, column_name), pieces, named, axes)
@@ -74,7 +71,7 @@ def _draw(
     return named
 
 
-def _pieces(points: Sequence[Point], dynamics: bool) -> Iterator[tuple[bool | None, slice]]:
+def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
     """Cut a branch where its stability changes; without any index, there is one piece.
 
     Yields
@@ -84,7 +81,7 @@ def _pieces(points: Sequence[Point], dynamics: bool) -> Iterator[tuple[bool | No
     piece : slice
         Points of the piece; its ends belong to the pieces beside it too.
     """
-    moving = bool(points) and (_is_cycle(points[0]) or (dynamics and _is_equilibrium(points[0])))
+    moving = bool(points) and (_is_cycle(points[0]) or _is_equilibrium(points[0]))
     if len(points) < 2 or (not moving and all(point.index is None for point in points)):
         yield None, slice(None)
         return
@@ -100,7 +97,8 @@ def _is_cycle(point: Point) -> bool:
 
 
 def _is_equilibrium(point: Point) -> bool:
-    return isinstance(point.system, Algebraic) and point.system.problem.dynamics
+    system = point.system
+    return isinstance(system, Algebraic) and system.problem.dynamics and not system.is_sparse
 
 
 def _of_motions(points: Sequence[Point]) -> list[bool | None]:

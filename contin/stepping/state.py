@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,6 +32,10 @@ class State:
         Number of regular points.
     singular : bool
         x is a branch point.
+    sense : float
+        The sign in which the primary parameter went where that could be told last; zero where it never could.
+    sensed : ndarray, or None
+        The free parameters there, in the user's units.
 
     Examples
     --------
@@ -56,6 +61,8 @@ class State:
     arclength: float
     accepted: int
     singular: bool
+    sense: float = 0.0
+    sensed: Array | None = None
 
     @property
     def row(self) -> Array:
@@ -70,7 +77,7 @@ def standing_at(system: Discretization, x: Array, tangent: Array, step: float) -
 
 @dataclass(frozen=True)
 class Stop:
-    """Why a run ended: a short ``reason``, a sentence, and what could be changed.
+    """Why a run ended: a short ``reason``, a sentence, what could be changed, and numbers for the details of the last point.
 
     Examples
     --------
@@ -84,6 +91,7 @@ class Stop:
     reason: str
     message: str
     advice: str = ""
+    details: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"{self.message}; {self.advice}" if self.advice else self.message

@@ -49,3 +49,15 @@ def test_a_fast_cycle_is_near_nothing():
     problem = CycleProblem(lambda u, p: (u.v, p.mu * (1 - u.x**2) * u.v - u.x), ["x", "v"], {"mu": 1.0})
     orbit = contin.cycle(problem, [0.1, 0.0])
     assert resting_place(orbit.system, orbit.x) is None
+
+
+@pytest.mark.parametrize("longest", [4, 7])
+def test_the_parameter_is_extrapolated(longest):
+    """r = 13.926557407520 where the period is infinite (the value to 14 digits that the project states); the error covers the difference."""
+    side = math.sqrt(8 / 3 * 19)
+    equilibria = AlgebraicProblem(lorenz, ["x", "y", "z"], {"r": 20.0})
+    line = contin.trace(contin.solve(equilibria, [side, side, 19.0]), free=["r"], limits={"r": (15, 30)})
+    branch = contin.trace(line.labelled("HB")[0], branch=1, limits={"r": (10, 30), "period": (0, longest)})
+    found = branch.points[-1].details
+    assert abs(found["limit_r"] - 13.926557407520) <= found["limit_r_error"] + 5e-13 < 1e-6
+    assert "; as the period grows, r tends to 13.926557" in str(branch.stop)

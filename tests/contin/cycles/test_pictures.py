@@ -104,3 +104,15 @@ def test_a_solution_without_multipliers():
     assert len(point.plot(axes=Figure().subplots(1, 2))) == 2
     with pytest.raises(ProblemError, match="must be one of portrait, series"):
         point.plot("multipliers")
+
+
+def test_equilibria_that_are_not_stable_are_dashed():
+    """A pitchfork: x = 0 loses its stability at a = 0. Equations that are no equilibria are drawn without."""
+    for dynamics, styles in ((True, ["-", "--"]), (False, ["-"])):
+        problem = AlgebraicProblem(lambda u, p: (p.a * u.x - u.x**3,), ["x"], {"a": -1.0}, dynamics=dynamics)
+        line = contin.trace(contin.solve(problem, [0.0]), free=["a"], limits={"a": (-1, 1)})
+        axes = line.plot(axes=Figure().subplots())
+        assert [part.get_linestyle() for part in axes.lines] == styles
+        texts = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert texts == (["stable", "unstable", "EP", "BP"] if dynamics else ["EP", "BP"])
+    assert axes.lines[0].get_xdata()[-1] == 1

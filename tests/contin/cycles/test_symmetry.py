@@ -155,3 +155,22 @@ def test_what_is_refused(symmetry, words):
 def test_no_symmetry_of_forced_fields():
     with pytest.raises(ProblemError, match="symmetry: must be left out where a period is given"):
         CycleProblem(lambda t, u, p: (u.y, -u.x), ["x", "y"], {}, period=1.0, symmetry=[-1, -1])
+
+
+@pytest.mark.full
+def test_van_der_pol_to_a_thousand():
+    """The second multiplier at mu = 100 is 10^-12593.67, that is the integral of mu (1 - x^2) over the period.
+
+    The period at mu = 1000 is that of the expansion (3 - 2 log 2) mu + 7.014322 mu^(-1/3) - (2/3) log(mu) / mu - 1.3233 / mu
+    (Urabe 1963), whose next term is of the order mu^(-5/3).
+    """
+    problem = CycleProblem(van_der_pol, ["x", "y"], {"mu": 1.0}, symmetry=[-1, -1])
+    orbit = contin.solve(problem, turning, {"period": 6.5})
+    branch = contin.trace(orbit, free=["mu"], limits={"mu": (1, 1000)}, zeros={"mu": [10, 100]})
+    ten, hundred = branch.labelled("UZ")
+    assert ten["period"] == pytest.approx(19.0783695, abs=1e-7)
+    assert hundred.floquet().logarithms[1].real / math.log(10) == pytest.approx(-12593.67, abs=5e-3)
+    last = branch.points[-1]
+    expansion = (3 - 2 * math.log(2)) * 1000 + 7.014322 / 10 - 2 / 3 * math.log(1000) / 1000 - 1.3233 / 1000
+    assert str(branch.stop) == "reached mu = 1000" and last["period"] == pytest.approx(expansion, abs=1e-4)
+    assert last.floquet().unstable == 0

@@ -1,0 +1,95 @@
+"""The sense in which the primary parameter goes along a branch, where that is more than an error of the discretization.
+
+In a canard explosion a parameter stays within 1e-10 or less over many steps, while its rate on the mesh is 1e-11 with an
+arbitrary sign: that of the error of the mesh. A rate that small is compared with the one on a finer mesh. Where they differ,
+the parameter stands still as far as can be told, and no fold is seen there. A fold lies on such a plateau if the parameter
+leaves it in the other sense than the one it came in.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.detection.segment import Segment, SpecialPoint
+from contin.errors import ConvergenceError
+from contin.stepping.newton import Newton, correct
+from contin.stepping.trial import TestFunction, Trial, linearization
+
+#: Rates above this are significant without a look at a finer mesh. Ten times larger, more steps take twice as long.
+_CLEAR = 1e-6
+#: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
+_STANDS = 1e-13
+#: Rates below this are round-off of tangents; it is 1e-16 to 1e-15 in the canard explosions of the tests.
+_ROUND_OFF = 1e-14
+#: A rate is significant where that on the finer mesh differs by less than this part of it.
+_AGREES = 0.5
+
+
+def sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
+    """Return the sign of the primary parameter's rate at a trial, computed once; zero where it is not significant."""
+    return trial.value(_sense_function(fold, newton))
+
+
+@functools.lru_cache(maxsize=8)
+def _sense_function(fold: TestFunction, newton: Newton) -> TestFunction:
+    return TestFunction(fold.label, f"sense of {fold.name}", lambda trial: _sense(trial, fold, newton))
+
+
+def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
+    rate = trial.value(fold)
+    if not abs(rate) < _CLEAR:
+        return float(np.sign(rate))
+    if trial.system.refined() is None:
+        return float(np.sign(rate))  # without a mesh, there is round-off only
+    finer = on_finer_mesh(trial, newton)
+    if finer is None:
+        return 0.0
+    again = finer.value(fold)
+    significant = abs(again) > _ROUND_OFF and abs(again - rate) < _AGREES * abs(rate)
+    return float(np.sign(rate)) if significant else 0.0
+
+
+def on_finer_mesh(trial: Trial, newton: Newton) -> Trial | None:
+    """Return a trial corrected on the mesh halved; None where it is not found there."""
+    finer: Any = trial.system.refined()
+    system, carry = finer
+    x, row = carry(trial.x), system.weights * carry(trial.tangent)
+    try:
+        better = correct(system, x, row, row @ x, newton).x
+    except ConvergenceError:
+        return None
+    return Trial(system, better, linearization(system, better, row))
+
+
+def senses(segment: Segment, fold: TestFunction) -> tuple[float, float]:
+    """Return the sense at both ends of a step.
+
+    Beside a branch point or Hopf point tangents are blurred: there the parameter itself must have gone the same way.
+    """
+    state, before = segment.state, segment.before
+    first, last = sense(before, fold, segment.newton), sense(segment.trial, fold, segment.newton)
+    at = before.system.parameter_index(fold.name)
+    gone = before.x[at] - state.x[at] if state.singular else 0.0
+    return (0.0 if gone * first < -_STANDS * (1 + abs(before.x[at])) else first), last
+
+
+def on_plateau(segment: Segment, fold: TestFunction) -> list[SpecialPoint]:
+    """Return the fold of a step with an end where the parameter stands still: none, unless the step leaves a plateau.
+
+    The errors of such a fold are the length of the plateau, in all free parameters.
+    """
+    state, (before, behind) = segment.state, senses(segment, fold)
+    if before or not state.sense * behind < 0 or state.sensed is None:
+        return []
+    lengths = np.abs(free_values(segment.trial) - state.sensed)
+    errors = dict(zip(state.system.free, map(float, lengths)))
+    return [SpecialPoint(0.0, fold.label, fold.name, segment.before, test=fold, errors=errors)]
+
+
+def free_values(trial: Trial) -> Array:
+    """Return the free parameters of a trial in the user's units."""
+    return np.array([trial[name] for name in trial.system.free])
