@@ -1,8 +1,8 @@
 """The default degree and tolerance against other settings, on the problems of the test bank and on larger ones.
 
 Every boundary value problem of the bank is run at the defaults, and at other degrees with the tolerances 1e-12 (the default)
-and 1e-8. A setting counts if it finds all special points with errors below 1e-9. Times are processor times. Where the first runs
-show that another setting may be faster, times are medians of several runs in turns.
+and 1e-8. A setting counts if it finds all special points with errors below 1e-9. Times are processor times, medians of several
+runs in turns where the first runs show that another setting may be faster.
 """
 
 from __future__ import annotations
