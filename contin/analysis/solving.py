@@ -84,12 +84,18 @@ def solve(
         raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
     if len(free) != needed:
         raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
-    if degree is None:
-        degree = guess.system.degree if isinstance(guess, Point) else usual_degree(len(problem.state_names), control.tolerance)
+    degree = degree or _degree(problem, guess, control)
     system, x = first_guess(problem, guess, Options(parameters, free, intervals, degree))
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
     return solved(system, x, control, newton, others)
+
+
+def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
+    """Return the degree where none is given."""
+    if isinstance(guess, Point):
+        return guess.system.degree
+    return usual_degree(len(problem.state_names), control.tolerance)
 
 
 def solved(system: System, x: Array, control: MeshControl, newton: Newton, others: Sequence[Point] = ()) -> Point:
