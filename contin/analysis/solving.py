@@ -77,15 +77,9 @@ def solve(
     parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
         parameters = {**guess.parameters, **parameters}
-    needed = problem.free_size - 1
-    if needed < 0:
-        there = len(problem.state_names) + needed
-        kind = "equations" if isinstance(problem, AlgebraicProblem) else "boundary and integral conditions"
-        raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
-    if len(free) != needed:
-        raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
-    degree = degree or _degree(problem, guess, control)
-    system, x = first_guess(problem, guess, Options(parameters, free, intervals, degree))
+    _check_count(problem, free)
+    options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))
+    system, x = first_guess(problem, guess, options)
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
     return solved(system, x, control, newton, others)
@@ -141,6 +135,16 @@ def _check_options(problem: object, intervals: object, degree: object, control: 
         checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
     checks.instance("mesh", control, MeshControl, "a MeshControl")
     checks.instance("newton", newton, Newton, "a Newton")
+
+
+def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> None:
+    needed = problem.free_size - 1
+    if needed < 0:
+        there = len(problem.state_names) + needed
+        kind = "equations" if isinstance(problem, AlgebraicProblem) else "boundary and integral conditions"
+        raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
+    if len(free) != needed:
+        raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
 
 
 def _check_others(problem: BoundaryValueProblem | AlgebraicProblem, others: Sequence[Point]) -> None:
