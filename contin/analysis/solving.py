@@ -81,20 +81,19 @@ def solve(
     parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
         parameters = {**guess.parameters, **parameters}
-    needed = problem.free_size - 1
-    if needed < 0:
-        there = len(problem.state_names) + needed
-        kind = "equations" if isinstance(problem, AlgebraicProblem) else "boundary and integral conditions"
-        raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
-    held = PERIOD if isinstance(problem, CycleProblem) and PERIOD in free and len(free) == needed + 1 else None
-    if len(free) != needed and held is None:
-        raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
-    if degree is None:
-        degree = guess.system.degree if isinstance(guess, Point) else usual_degree(len(problem.state_names), control.tolerance)
-    system, x = first_guess(problem, guess, Options(parameters, free, intervals, degree))
+    held = _check_count(problem, free)
+    options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))
+    system, x = first_guess(problem, guess, options)
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
     return solved(system, x, control, newton, others, held)
+
+
+def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
+    """Return the degree where none is given."""
+    if isinstance(guess, Point):
+        return guess.system.degree
+    return usual_degree(len(problem.state_names), control.tolerance)
 
 
 def solved(
@@ -157,6 +156,26 @@ def _check_options(problem: object, intervals: object, degree: object, control: 
         checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
     checks.instance("mesh", control, MeshControl, "a MeshControl")
     checks.instance("newton", newton, Newton, "a Newton")
+
+
+def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:
+    """Return the free parameter that is held because another one is found in its place, if there is one.
+
+    Raises
+    ------
+    ProblemError
+        Too many or too few parameters are free.
+    """
+    needed = problem.free_size - 1
+    if needed < 0:
+        there = len(problem.state_names) + needed
+        kind = "equations" if isinstance(problem, AlgebraicProblem) else "boundary and integral conditions"
+        raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
+    if isinstance(problem, CycleProblem) and PERIOD in free and len(free) == needed + 1:
+        return PERIOD
+    if len(free) != needed:
+        raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
+    return None
 
 
 def _check_others(problem: BoundaryValueProblem | AlgebraicProblem, others: Sequence[Point]) -> None:
