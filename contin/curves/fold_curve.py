@@ -133,7 +133,7 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
 
     found = [
         TestFunction("CP", "cusp", cusp, search=lambda segment, _: None if _singular_point(segment) is None else []),
-        TestFunction("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment)),
+        _MEETS,
     ]
     if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
         found += _of_equilibria()
@@ -163,7 +163,7 @@ def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
     The extended system is singular there. At a pitchfork the curve turns back as its mirror image, so that the run ends; at a
     transcritical bifurcation it goes on.
     """
-    a, b = (_by_first(trial) for trial in (segment.before, segment.trial))
+    a, b = (trial.value(_MEETS) for trial in (segment.before, segment.trial))
     if not a * b < 0:
         return None
     near = segment.low + (segment.step - segment.low) * a / (a - b)
@@ -173,10 +173,14 @@ def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
     found = interpolated_zero(segment, (_by_first, _by_last), near)
     if found is None:
         return None
-    system, name = segment.state.system, "fold meets a branch point"
+    system = segment.state.system
     turns = np.abs(found.trial.tangent[[system.state_size, system.size - 1]]).max() < _TURNS
     stop = Stop("pitchfork", "the folds end on a pitchfork: beyond it the curve is its own mirror image") if turns else None
-    return [SpecialPoint(found.at, "BP", name, found.trial, stop, found, TestFunction("BP", name, _by_first))]
+    return [SpecialPoint(found.at, _MEETS.label, _MEETS.name, found.trial, stop, found, _MEETS)]
+
+
+#: Where the fold meets a branch point: w.F_lambda = 0.
+_MEETS = TestFunction("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment))
 
 
 def shrinking(cycles: PeriodicCollocation) -> list[TestFunction]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices
+from contin.discretization.given import check_given
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
@@ -84,13 +85,18 @@ class Algebraic(System):
 
     @functools.cached_property
     def is_sparse(self) -> bool:
-        """The matrix is kept sparse: it is large, and few colours suffice for its entries."""
+        """The matrix is kept sparse: it is large, and few colours suffice for its entries, or it is given as a sparse one."""
+        if self.problem.jacobian is not None:
+            return self.state_size >= _MANY and self.problem.gives_sparse_matrix
         colours = len(self._residual.colouring(self._free).owner)
         return self.state_size >= _MANY and colours <= _FEW * self.size
 
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
+        check_given(self.problem, self.states(x)[0], self.all_parameters(x))
         given = _NO_TIME, x[: self.state_size].reshape(1, -1), _none(self.state_size), self._scaled_parameters(x)
+        if self.problem.jacobian is not None:
+            return self._given_jacobian(x, given)
         colours = self._residual.colouring(self._free)
         if not self.is_sparse:
             values, jacobian = self._residual.jacobian(*given, colours)
@@ -100,6 +106,26 @@ class Algebraic(System):
         residual, entries = self._residual.entries(*given, colours)
         rows, columns, _ = colours.entries
         return residual, csr_array((entries, (rows, columns)), shape=(self.equations, self.size))
+
+    def _given_jacobian(self, x: Array, given: Any) -> tuple[Array, Any]:
+        """Return the same with the derivatives by states from the user's function."""
+        values, by_parameters = self._residual.jacobian(*given, self._residual.colouring(self._free, ()))
+        matrix: Any = self._own_jacobian(self.states(x)[0], self.all_parameters(x))
+        if self.scales is not None:
+            rows, columns = 1 / self.scales.rows["residual"], self.scales.states
+            matrix = (
+                matrix * columns * rows[:, None] if not self.is_sparse else matrix.multiply(columns).multiply(rows[:, None])
+            )
+        if not self.is_sparse:
+            return values[0], np.hstack([matrix, by_parameters[0]])
+        from scipy.sparse import csr_array, hstack
+
+        return values[0], hstack([csr_array(matrix), csr_array(by_parameters[0])]).tocsr()
+
+    def _own_jacobian(self, u: Array, p: Array) -> Any:
+        """Return the user's Jacobian; dense unless `is_sparse`."""
+        matrix = self.problem.jacobian_at(u, p)
+        return matrix if self.is_sparse or isinstance(matrix, np.ndarray) else matrix.toarray()
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
@@ -120,6 +146,9 @@ class Algebraic(System):
         which = self._indices(names)
         u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
         batch = self._residual
+        if self.problem.jacobian is not None:
+            found: Array = batch.jacobian(_NO_TIME, u, _none(n), p, batch.colouring(which, ()))[1][0]
+            return found
         colours = batch.colouring(which)
         if self.is_sparse:
             rows, places, _ = colours.entries
@@ -142,8 +171,11 @@ class Algebraic(System):
 
     def jacobians(self, x: Array, states: Array) -> Array:
         """Return F_u in the user's units at other states (K, n), with the parameters of x; shape (K, equations, n)."""
+        p = self.all_parameters(x)
+        if self.problem.jacobian is not None:
+            return np.array([np.asarray(self._own_jacobian(u, p)) for u in states])
         batch, times = self.problem.batch("residual"), np.zeros(len(states))
-        jacobians: Array = batch.jacobian(times, states, _none(self.state_size), self.all_parameters(x), batch.colouring([]))[1]
+        jacobians: Array = batch.jacobian(times, states, _none(self.state_size), p, batch.colouring([]))[1]
         return jacobians
 
     def field_jacobian(self, x: Array) -> Array:

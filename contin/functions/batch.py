@@ -21,7 +21,7 @@ from contin import threads
 from contin.arrays import Array, Function, Indices, Pattern
 from contin.errors import CompilationError, ProblemError
 from contin.functions.cache import keep_text, kept_text
-from contin.functions.colouring import Colouring, colouring
+from contin.functions.colouring import Colouring, SparsePattern, colouring
 from contin.functions.complex_step import ComplexStep
 from contin.functions.interpreted import Interpreted
 from contin.functions.kernel import Kernel
@@ -76,6 +76,8 @@ class Batch:
         The functions take t; ``f(u, p)`` without.
     derivatives : bool
         There is a Jacobian. Without, half as much is compiled.
+    pattern : SparsePattern, optional
+        Which values depend on which inputs, where that is known; traced by default.
     reads : sequence of str, optional
         The parameters that the functions read, if it is known: the compiled code then serves problems with others, too.
 
@@ -111,6 +113,7 @@ class Batch:
         times: bool = True,
         derivatives: bool = True,
         reads: Sequence[str] | None = None,
+        pattern: SparsePattern | None = None,
     ) -> None:
         read = parameters if reads is None else sorted(set(reads) & set(parameters))
         self.signature = Signature(tuple(states), tuple(read), times and not ends, ends)
@@ -121,6 +124,7 @@ class Batch:
         self._counts = tuple(counts)
         if not self._functions or len(functions) != len(counts):
             raise ProblemError("functions: there must be at least one, with a count for each")
+        self._pattern = pattern
         self._colourings: dict[tuple[int, ...], Colouring] = {}
         self._seconds: dict[int, float] = {}  # a place takes, by the number of colours
         try:
@@ -226,7 +230,7 @@ class Batch:
         inputs = len(self.signature.states) * (1 + self.signature.ends)
         columns = (*(range(inputs) if order is None else map(int, order)), *(inputs + int(slot) for slot in free))
         if columns not in self._colourings:
-            found = colouring(self.depends, columns)
+            found = colouring(self.depends if self._pattern is None else self._pattern, columns)
             starts, places = len(found.owner) + 1, {int(slot): place for place, slot in enumerate(self._inputs)}
             perturbed = [places[slot] for slot in found.inputs[starts:].tolist()]  # as the compiled code numbers them
             self._colourings[columns] = found._replace(inputs=np.array([*found.inputs[:starts], *perturbed], dtype=np.int64))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from contin.arrays import Indices, Pattern
 
 #: With more columns than this, and this part of all entries or more, each input has a colour of its own: the search takes the
-#: number of columns times that of colours times that of values.
+#: number of entries times that of colours.
 _MOST_COLUMNS, _DENSE = 500, 0.1
 
 
@@ -43,35 +43,59 @@ class Colouring(NamedTuple):
         return Colouring(self.inputs, owner, np.arange(len(owner)))
 
 
-def colouring(depends: Pattern, columns: Sequence[int] | Indices) -> Colouring:
+class SparsePattern(NamedTuple):
+    """A sparsity pattern by inputs: ``values[starts[j]:starts[j + 1]]`` are those that depend on input j, of ``height``."""
+
+    starts: Indices
+    values: Indices
+    height: int
+
+    @classmethod
+    def of_entries(cls, values: Indices, inputs: Indices, shape: tuple[int, int]) -> SparsePattern:
+        """Return the pattern with these entries; ``shape`` is the number of values, and of inputs."""
+        order = np.lexsort((values, inputs))
+        starts = np.searchsorted(inputs[order], np.arange(shape[1] + 1))
+        return cls(starts.astype(np.int64), values[order].astype(np.int64), shape[0])
+
+    def of_input(self, slot: int) -> Indices:
+        """Return the values that depend on an input."""
+        return self.values[self.starts[slot] : self.starts[slot + 1]]
+
+
+def colouring(depends: Pattern | SparsePattern, columns: Sequence[int] | Indices) -> Colouring:
     """Return a colouring for derivatives by the inputs ``columns``, by first fit.
 
     Parameters
     ----------
-    depends : ndarray of bool, shape (values, inputs)
+    depends : ndarray of bool, shape (values, inputs), or SparsePattern
         Sparsity pattern.
     columns : sequence of int
         The inputs to differentiate by, one for each column of the Jacobian.
     """
-    search = len(columns) <= _MOST_COLUMNS or depends.mean() < _DENSE
+    if isinstance(depends, SparsePattern):
+        count, search = depends.height, True
+    else:
+        count, search = len(depends), len(columns) <= _MOST_COLUMNS or bool(depends.mean() < _DENSE)
     together: list[list[int]] = []
-    taken: list[Any] = []
+    owner = np.full((_ROOM, count), -1, dtype=np.int64)
     for column, slot in enumerate(columns):
-        mine = depends[:, slot]
-        if not mine.any():
+        mine = depends.of_input(slot) if isinstance(depends, SparsePattern) else np.flatnonzero(depends[:, slot])
+        if not mine.size:
             continue
-        at = len(taken)
-        if search:
-            at = next((c for c, others in enumerate(taken) if not (others & mine).any()), at)
-        if at == len(taken):
+        at = len(together)
+        if search and at:
+            free = np.flatnonzero((owner[:at, mine] < 0).all(axis=1))
+            at = int(free[0]) if free.size else at
+        if at == len(together):
             together.append([])
-            taken.append(np.zeros_like(mine))
+            if at == len(owner):
+                owner = np.concatenate([owner, np.full_like(owner, -1)])
         together[at].append(column)
-        taken[at] = taken[at] | mine
-    owner = np.full((len(together), len(depends)), -1, dtype=np.int64)
-    for c, group in enumerate(together):
-        for column in group:
-            owner[c, depends[:, columns[column]]] = column
+        owner[at, mine] = column
     starts = len(together) + 1 + np.cumsum([0, *map(len, together)])
     inputs = np.array([*starts, *(columns[column] for group in together for column in group)], dtype=np.int64)
-    return Colouring(inputs, owner, np.array(columns, dtype=np.int64))
+    return Colouring(inputs, owner[: len(together)].copy(), np.array(columns, dtype=np.int64))
+
+
+#: Colours that there is room for at first; the room is doubled where they do not suffice.
+_ROOM = 8

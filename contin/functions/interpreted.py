@@ -30,6 +30,8 @@ _DIFFERENCE, _LEAST = 2e-4, 1e-4
 _WEIGHTS = (8 / 12, -1 / 12)
 #: Places beside the first one where the ways to evaluate a function are compared, their distance, and how well they must agree.
 _PLACES, _ASIDE, _AGREES = 3, 0.1, 1e-6
+#: With more inputs than this the ways are compared along as many random directions, not for each input.
+_MANY = 100
 
 
 class Interpreted:
@@ -58,8 +60,12 @@ class Interpreted:
         rows = np.arange(out.shape[1])
         for colour in range(len(owner)):
             mine = owner[colour] >= 0
-            for slot in inputs[inputs[colour] : inputs[colour + 1]]:
-                change = self._derivative(t, x, int(slot), self._complex)
+            slots = inputs[inputs[colour] : inputs[colour + 1]]
+            together = self._complex or x.shape[1] > _MANY  # a difference of each input alone has the right length for it
+            for group in [slots] if together else slots[:, None]:
+                direction = np.zeros(x.shape[1])
+                direction[group] = 1.0
+                change = self._derivative(t, x, direction, self._complex)
                 jac[:, rows[mine], owner[colour][mine]] += change[:, mine]
 
     def _say(self) -> None:
@@ -72,19 +78,16 @@ class Interpreted:
 
     # --- derivatives ---------------------------------------------------------------------------------------------
 
-    def _derivative(self, t: Array, x: Array, slot: int, by_complex_step: bool) -> Array:
-        """Return the derivatives of all values by one input, shape (places, count)."""
+    def _derivative(self, t: Array, x: Array, direction: Array, by_complex_step: bool) -> Array:
+        """Return the derivatives of all values along a direction (inputs,), shape (places, count)."""
         if by_complex_step:
-            z = x.astype(complex)
-            z[:, slot] += 1j * _STEP
-            return self._values(t, z).imag / _STEP
-        h = _DIFFERENCE * max(float(self._sizes[slot]), _LEAST)
+            return self._values(t, x + 1j * _STEP * direction).imag / _STEP
+        moving = direction != 0
+        h = _DIFFERENCE * max(float((self._sizes[moving] / np.abs(direction[moving])).min()), _LEAST)
         change = np.zeros((len(x), self._count))
         for k, weight in enumerate(_WEIGHTS, start=1):
             for sign in (1, -1):
-                moved = x.copy()
-                moved[:, slot] += sign * k * h
-                change += sign * weight * self._values(t, moved)
+                change += sign * weight * self._values(t, x + sign * k * h * direction)
         return change / h
 
     @property
@@ -96,10 +99,10 @@ class Interpreted:
         places, agreed = _beside(x), 0
         times = np.repeat(t, len(places))
         try:
-            for slot in range(x.shape[1]):
-                difference = self._derivative(times, places, slot, False)
+            for direction in _directions(x.shape[1]):
+                difference = self._derivative(times, places, direction, False)
                 known = np.all(np.isfinite(difference), axis=1)
-                step = self._derivative(times[known], places[known], slot, True)
+                step = self._derivative(times[known], places[known], direction, True)
                 scale = 1 + np.abs(difference[known])
                 if not np.all(np.abs(step - difference[known]) <= _AGREES * scale):
                     return False
@@ -182,6 +185,16 @@ class Interpreted:
         result = np.zeros(shape, dtype=np.asarray(x).dtype)
         function(*arguments, result)
         return result
+
+
+def _directions(count: int) -> Array:
+    """Return the directions in which derivatives are compared: every input or, of many, some mixtures of all."""
+    random = np.random.default_rng(5)
+    return (
+        np.eye(count)
+        if count <= _MANY
+        else random.uniform(0.5, 1.0, (_PLACES, count)) * random.choice([-1, 1], (_PLACES, count))
+    )
 
 
 def _users_level() -> int:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
+from typing import Any, cast
+
+import numpy as np
 
 from contin import checks
-from contin.arrays import Function
+from contin.arrays import Array, Function, Indices
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
+from contin.functions.colouring import SparsePattern
 from contin.functions.signature import Signature, argument_count, result_count
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
@@ -34,6 +39,14 @@ class AlgebraicProblem(Restated):
         sparse Jacobian, only the eigenvalues near the imaginary axis and right of it are computed.
     count : int, optional
         Number of equations of a residual that fills an array; as many as states by default.
+    jacobian : callable, optional
+        ``jacobian(u, p)``, with the arguments of the residual, returns the derivatives by the states: an array (equations,
+        states) or a sparse matrix of SciPy. It is called in Python. Derivatives by parameters are still found.
+    pattern : sparse matrix, array of bool, or pair of arrays, optional
+        Which equations depend on which states: a matrix (equations, states) whose entries that are not zero count, or the
+        numbers of equations and of states, from 0. It is found by tracing the residual otherwise.
+
+    A Jacobian or pattern is compared with differences of the residual once, near the first solution.
 
     Raises
     ------
@@ -53,6 +66,8 @@ class AlgebraicProblem(Restated):
     functionals: Mapping[str, Function] = field(default_factory=dict)
     dynamics: bool = True
     count: int | None = None
+    jacobian: Function | None = None
+    pattern: Any = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
@@ -63,6 +78,10 @@ class AlgebraicProblem(Restated):
         arguments = argument_count(self.residual)
         if arguments not in (2, 3):
             raise ProblemError(f"residual takes {arguments} arguments, must take 2 (or 3, to fill the last)")
+        if self.jacobian is not None and argument_count(checks.function("jacobian", self.jacobian)) != 2:
+            raise ProblemError("jacobian must take 2 arguments, (u, p)")
+        if self.pattern is not None:
+            _ = self._sparsity  # checked
         if self.dynamics and self.equation_size != len(self.state_names):
             object.__setattr__(self, "dynamics", False)
 
@@ -105,8 +124,93 @@ class AlgebraicProblem(Restated):
     def _compiled(self, name: str) -> Batch:
         u, p = self.state_names, tuple(self.parameters)
         if name == "residual":
-            return Batch([self.residual], [self._shape], u, p, times=False)
+            return Batch([self.residual], [self._shape], u, p, times=False, pattern=self._sparsity)
         functions = list(self.functionals.values())
         if any(result_count(f, self._signature.arguments, "a functional") for f in functions):
             raise ProblemError("functionals: each must be f(u, p) and return one number")
         return Batch(functions, [0] * len(functions), u, p, times=False)
+
+    @functools.cached_property
+    def _sparsity(self) -> SparsePattern | None:
+        """The pattern of states and parameters, of which all equations may depend; None where none was given.
+
+        With a Jacobian only the derivatives by parameters are asked for.
+
+        Raises
+        ------
+        ProblemError
+            The pattern does not fit.
+        """
+        count, states, parameters = self.equation_size, len(self.state_names), len(self.parameters)
+        if self.pattern is None and self.jacobian is None:
+            return None
+        equations, inputs = _entries(self.pattern, (count, states))
+        by_parameters = np.repeat(states + np.arange(parameters), count)
+        equations = np.concatenate([equations, np.tile(np.arange(count), parameters)])
+        return SparsePattern.of_entries(equations, np.concatenate([inputs, by_parameters]), (count, states + parameters))
+
+    @functools.cached_property
+    def compared(self) -> list[bool]:
+        """Holds an entry when the given Jacobian or pattern has been compared with differences."""
+        return []
+
+    @functools.cached_property
+    def gives_sparse_matrix(self) -> bool:
+        """The given Jacobian is a sparse matrix."""
+        for number in (0.5, 1.5, -0.5, 0.0):  # in the domain of most functions
+            with contextlib.suppress(ArithmeticError, ValueError), np.errstate(all="ignore"):
+                found = self.jacobian_at(np.full(len(self.state_names), number), np.full(len(self.parameters), number))
+                return not isinstance(found, np.ndarray)
+        return False
+
+    def jacobian_at(self, u: Array, p: Array) -> Any:
+        """Return the given Jacobian at states (n,) and parameters: an array (equations, n), or a sparse array in rows.
+
+        Raises
+        ------
+        ProblemError
+            It is no matrix of that shape.
+        """
+        assert self.jacobian is not None
+        arguments: Any = (u, p)
+        if not self._signature.fills(self.residual):
+            kinds: list[Any] = [namedtuple("Values", names) for names in (self.state_names, tuple(self.parameters))]  # noqa: PYI024
+            arguments = [kind(*values.tolist()) for kind, values in zip(kinds, (u, p))]
+        found = self.jacobian(*arguments)
+        shape = (self.equation_size, len(self.state_names))
+        if hasattr(found, "tocsr"):
+            matrix = found.tocsr()
+        else:
+            try:
+                matrix = np.asarray(found, dtype=float)
+            except (TypeError, ValueError):
+                raise ProblemError(f"jacobian: {checks.shown(found)} must be a matrix of numbers") from None
+        if matrix.shape != shape:
+            raise ProblemError(f"jacobian: its shape {matrix.shape} must be {shape}, equations by states")
+        return matrix
+
+
+def _entries(pattern: Any, shape: tuple[int, int]) -> tuple[Indices, Indices]:
+    """Return equations and states of the entries of a user's pattern; none without one.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if pattern is None:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    allowed = f"a matrix of shape {shape}, equations by states, or two arrays of their numbers from 0"
+    try:
+        if isinstance(pattern, tuple) and len(pattern) == 2:
+            equations, states = (np.asarray(part, dtype=np.int64).ravel() for part in pattern)
+            fits = equations.size == states.size and bool(
+                np.all((equations >= 0) & (equations < shape[0]) & (states >= 0) & (states < shape[1]))
+            )
+        else:
+            matrix = pattern if hasattr(pattern, "tocoo") else np.asarray(pattern, dtype=bool)
+            fits, (equations, states) = matrix.shape == shape, matrix.nonzero()
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        raise ProblemError(f"pattern: {checks.shown(pattern)} must be {allowed}")
+    return equations, states

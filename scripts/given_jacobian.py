@@ -1,0 +1,73 @@
+"""CPU time and memory of a large equilibrium problem, by what is known of its Jacobian.
+
+``python scripts/given_jacobian.py [N ...]``: Bratu's problem by finite differences with N unknowns is followed to its fold,
+with the traced pattern, with a given pattern, and with a given Jacobian. Each run is a process of its own, after a small run
+that loads what all need; compiled code is there from a run before. Time to the first solution includes the pattern and its
+colouring.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+import time
+
+import numpy as np
+from scipy import sparse
+
+import contin
+
+KINDS = ("traced", "pattern", "Jacobian")
+
+
+def bratu(u, p, out):
+    h = 1.0 / (len(u) + 1)
+    out[:] = -2 * u + h**2 * p[0] * np.exp(u)
+    out[1:] += u[:-1]
+    out[:-1] += u[1:]
+
+
+def derivatives(u, p):
+    off = np.ones(len(u) - 1)
+    return sparse.diags_array([off, -2 + p[0] * np.exp(u) / (len(u) + 1) ** 2, off], offsets=[-1, 0, 1])
+
+
+def measure(count: int, kind: str) -> dict[str, float]:
+    """Return seconds to the first solution and per point after it, megabytes at most, and the fold."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    given = {"Jacobian": {"jacobian": derivatives}, "pattern": {"pattern": derivatives(np.zeros(count), [0.0])}, "traced": {}}
+    problem = contin.AlgebraicProblem(bratu, count, {"lam": 0.0}, count=count, dynamics=False, **given[kind])
+    began = time.process_time()
+    start = contin.solve(problem, np.zeros(count))
+    solved = time.process_time()
+    branch = contin.trace(start, free=["lam"], limits={"lam": (0, 4)}, max_points=12)
+    done = time.process_time()
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {
+        "first": solved - began, "point": (done - solved) / len(branch), "memory": (most - before) / 1024,
+        "fold": branch.labelled("LP")[0]["lam"],
+    }  # fmt: skip
+
+
+def main(counts: list[int]) -> None:
+    """Print the table."""
+    print("| unknowns | Jacobian | first solution | per point | memory | fold |\n|---|---|---|---|---|---|")
+    for count in counts:
+        for kind in KINDS:
+            for _ in range(2):  # the first one compiles
+                done = subprocess.run(
+                    [sys.executable, __file__, "--one", str(count), kind], capture_output=True, text=True, check=True
+                )
+            found = json.loads(done.stdout)
+            times = f"{found['first']:.3f} s | {1e3 * found['point']:.1f} ms"
+            print(f"| {count} | {kind} | {times} | {found['memory']:.0f} MB | {found['fold']:.9f} |", flush=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--one"]:
+        measure(12, sys.argv[3])
+        print(json.dumps(measure(int(sys.argv[2]), sys.argv[3])))
+    else:
+        main([int(word) for word in sys.argv[1:]] or [10, 100, 1000, 10_000])

@@ -1,0 +1,124 @@
+"""Jacobians and sparsity patterns that a user gives."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from contin import AlgebraicProblem, ProblemError, curve, solve, trace
+from contin.errors import InterpretedWarning
+
+SIZE = 30
+
+
+def bratu(u, p, out):
+    h = 1.0 / (len(u) + 1)
+    out[:] = -2 * u + h**2 * p[0] * np.exp(u)
+    out[1:] += u[:-1]
+    out[:-1] += u[1:]
+
+
+CALLS, MIDDLE = [], {"entry": -2.0}
+
+
+def in_python(u, p, out):
+    """The same with a dictionary and a list, which are not compiled."""
+    CALLS.append(1)
+    bratu(u, p, out)
+    out += (2.0 + MIDDLE["entry"]) * u
+
+
+def derivatives(u, p):
+    n = len(u)
+    off = np.ones(n - 1)
+    return sparse.diags_array([off, -2 + p[0] * np.exp(u) / (n + 1) ** 2, off], offsets=[-1, 0, 1])
+
+
+def without_the_exponential(u, p):
+    off = np.ones(len(u) - 1)
+    return sparse.diags_array([off, -2 * np.ones(len(u)), off], offsets=[-1, 0, 1])
+
+
+def tridiagonal(n):
+    return sparse.diags_array([np.ones(n - 1), np.ones(n), np.ones(n - 1)], offsets=[-1, 0, 1])
+
+
+def fold(n=SIZE, residual=bratu, **given):
+    problem = AlgebraicProblem(residual, n, {"lam": 0.0}, count=n, dynamics=False, **given)
+    branch = trace(solve(problem, [0.0] * n), free=["lam"], limits={"lam": (0, 4)}, max_points=12)
+    return branch.labelled("LP")[0]
+
+
+@pytest.mark.parametrize("n", [SIZE, 250])
+def test_the_fold_is_the_same(n):
+    """Traced, with a pattern, and with a Jacobian, sparse and dense; from 200 states on the matrix is kept sparse."""
+    expected = fold(n)
+    rows, columns = tridiagonal(n).nonzero()
+    for given in (
+        {"pattern": tridiagonal(n)},
+        {"pattern": (rows, columns)},
+        {"jacobian": derivatives},
+        {"jacobian": lambda u, p: derivatives(u, p).toarray()},
+    ):
+        found = fold(n, **given)
+        assert found["lam"] == pytest.approx(expected["lam"], abs=1e-11)
+    assert fold(n, jacobian=derivatives).system.is_sparse == (n == 250)
+
+
+def test_a_function_in_python_is_called_once_for_each_colour_or_not_at_all():
+    """Three colours, one parameter; more calls compare the given derivatives and the complex step with differences, once."""
+    counts = {}
+    for name, given in (("pattern", {"pattern": tridiagonal(150)}), ("jacobian", {"jacobian": derivatives})):
+        with pytest.warns(InterpretedWarning):
+            problem = AlgebraicProblem(in_python, 150, {"lam": 1.0}, count=150, dynamics=False, **given)
+            point = solve(problem, [0.0] * 150)
+        CALLS.clear()
+        point.system.linearize(point.x, np.eye(point.system.size)[point.system.equations :])
+        counts[name] = len(CALLS)
+    assert counts == {"pattern": 4, "jacobian": 1}
+
+
+def test_named_states_scales_and_a_curve_of_folds():
+    """x^3 - b x + a = 0 in large units: the cusp at the origin."""
+    problem = AlgebraicProblem(
+        lambda u, p: (u.x**3 - p.b * u.x + p.a, u.y - 1e6 * u.x), ["x", "y"], {"a": 2.0, "b": 1.0},
+        jacobian=lambda u, p: [[3 * u.x**2 - p.b, 0.0], [-1e6, 1.0]],
+    )  # fmt: skip
+    branch = trace(solve(problem, [-1.5, -1.5e6]), free=["a"], direction=-1, limits={"a": (-2, 3)})
+    (cusp,) = curve(branch.labelled("LP")[0], "b", direction=-1, limits={"b": (-1, 2)}).labelled("CP")
+    assert abs(cusp["b"]) < 1e-9
+
+
+def test_stability_with_a_given_jacobian():
+    problem = AlgebraicProblem(
+        lambda u, p: (1 - (p.b + 1) * u.x + u.x**2 * u.y, p.b * u.x - u.x**2 * u.y), ["x", "y"], {"b": 1.0},
+        jacobian=lambda u, p: ((-p.b - 1 + 2 * u.x * u.y, u.x**2), (p.b - 2 * u.x * u.y, -(u.x**2))),
+    )  # fmt: skip
+    (hopf,) = trace(solve(problem, [1.0, 1.0]), free=["b"], limits={"b": (0.5, 3)}).labelled("HB")
+    assert hopf["b"] == pytest.approx(2, abs=1e-9)
+
+
+def test_wrong_ones_are_refused():
+    with pytest.raises(
+        ProblemError, match=r"jacobian: the derivative of equation \d+ by u\d+ is -2, must be -1.99.* \(by differences"
+    ):
+        fold_at_one(jacobian=without_the_exponential)
+    diagonal = sparse.eye_array(SIZE)
+    with pytest.raises(
+        ProblemError, match=r"pattern: equation (\d+) depends on u\d+, so the pattern must have the entry \(\1, \d+\)"
+    ):
+        fold(pattern=diagonal)
+    with pytest.raises(ProblemError, match=r"jacobian: its shape \(2, 2\) must be \(30, 30\), equations by states"):
+        fold(jacobian=lambda u, p: np.eye(2))
+    with pytest.raises(
+        ProblemError, match=r"pattern: .* must be a matrix of shape \(30, 30\), equations by states, or two arrays"
+    ):
+        fold(pattern=np.eye(3))
+    with pytest.raises(ProblemError, match="jacobian must take 2 arguments"):
+        fold(jacobian=lambda u: u)
+    with pytest.raises(ProblemError, match="jacobian: None must be a matrix of numbers|jacobian: its shape"):
+        fold(jacobian=lambda u, p: None)
+
+
+def fold_at_one(**given):
+    problem = AlgebraicProblem(bratu, SIZE, {"lam": 1.0}, count=SIZE, dynamics=False, **given)
+    return solve(problem, [0.0] * SIZE)
