@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array, Function
+from contin.arrays import Array, Function, Indices
 from contin.errors import InterpretedWarning, ProblemError
 from contin.functions.signature import Signature, named_values
 
@@ -58,8 +58,9 @@ class Interpreted:
         rows = np.arange(out.shape[1])
         for colour in range(len(owner)):
             mine = owner[colour] >= 0
-            for slot in inputs[inputs[colour] : inputs[colour + 1]]:
-                change = self._derivative(t, x, int(slot), self._complex)
+            slots = inputs[inputs[colour] : inputs[colour + 1]]
+            for together in [slots] if self._complex else slots[:, None]:  # differences have a length for each input
+                change = self._derivative(t, x, together, self._complex)
                 jac[:, rows[mine], owner[colour][mine]] += change[:, mine]
 
     def _say(self) -> None:
@@ -72,13 +73,13 @@ class Interpreted:
 
     # --- derivatives ---------------------------------------------------------------------------------------------
 
-    def _derivative(self, t: Array, x: Array, slot: int, by_complex_step: bool) -> Array:
-        """Return the derivatives of all values by one input, shape (places, count)."""
+    def _derivative(self, t: Array, x: Array, slot: Indices, by_complex_step: bool) -> Array:
+        """Return the derivatives of all values by one input, shape (places, count), or by several that share no value."""
         if by_complex_step:
             z = x.astype(complex)
             z[:, slot] += 1j * _STEP
             return self._values(t, z).imag / _STEP
-        h = _DIFFERENCE * max(float(self._sizes[slot]), _LEAST)
+        h = _DIFFERENCE * max(float(self._sizes[slot].max()), _LEAST)
         change = np.zeros((len(x), self._count))
         for k, weight in enumerate(_WEIGHTS, start=1):
             for sign in (1, -1):
@@ -96,7 +97,7 @@ class Interpreted:
         places, agreed = _beside(x), 0
         times = np.repeat(t, len(places))
         try:
-            for slot in range(x.shape[1]):
+            for slot in np.arange(x.shape[1])[:, None]:
                 difference = self._derivative(times, places, slot, False)
                 known = np.all(np.isfinite(difference), axis=1)
                 step = self._derivative(times[known], places[known], slot, True)
