@@ -19,7 +19,7 @@ from contin.discretization.system import System
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
-from contin.problems.statement import with_multipliers
+from contin.problems.statement import forget_changed, with_multipliers
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point, point_of, system_of
 from contin.stepping.newton import Corrected, Newton, approached, correct
@@ -71,6 +71,7 @@ def solve(
     control = MeshControl() if mesh is None else mesh
     _check_options(problem, intervals, degree, control, newton)
     _check_others(problem, others)
+    forget_changed(problem)
     parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
         parameters = {**guess.parameters, **parameters}

@@ -8,7 +8,7 @@ import numpy as np
 
 from contin.arrays import ComplexArray
 
-#: Eigenvalues that each operator gives at first, dimension of the Krylov space for each, restarts, and the tolerance. Those that
+#: Eigenvalues that each operator gives at first, dimension of the Krylov space for each, restarts, tolerance. Those that
 #: converge late are not wanted: without a bound on restarts, a reaction-diffusion problem takes a hundred times as long.
 _COUNT, _SPACE, _RESTARTS, _TOLERANCE = 12, 4, 12, 1e-11
 #: Shifts of the Cayley transforms, as multiples of the largest eigenvalue near zero: oscillations with frequencies up to ten
