@@ -21,7 +21,7 @@ from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import PERIOD, CycleProblem
-from contin.problems.statement import with_multipliers
+from contin.problems.statement import forget_changed, with_multipliers
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point, point_of, system_of
 from contin.stepping.newton import Corrected, Newton, approached, correct
@@ -78,6 +78,7 @@ def solve(
     control = MeshControl() if mesh is None else mesh
     _check_options(problem, intervals, degree, control, newton)
     _check_others(problem, others)
+    forget_changed(problem)
     parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
         parameters = {**guess.parameters, **parameters}

@@ -81,6 +81,9 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
+#: The way along the tangent on which a corner is looked for, and the part that its bend has of the usual change of the residual
+#: on such a way: for a smooth function, it is about as large as the way.
+_CORNER, _JUMP = 1e-4, 0.1
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
@@ -288,10 +291,25 @@ class Continuation:
                 "no convergence", f"the equations have no finite value a step of min_step = {exact_text(least)} further on",
                 "look for what they divide by, or take a root or logarithm of: their domain ends there",
             )  # fmt: skip
+        if self._meets_corner():
+            return Stop(
+                "no convergence", f"the derivatives of the equations jump a step of min_step = {exact_text(least)} further on",
+                "abs, max, min, if and tables have corners; a smooth form such as sqrt(x**2 + d**2) for abs(x) can be followed",
+            )  # fmt: skip
         return Stop(
             "no convergence", f"the step became smaller than min_step = {exact_text(least)} ({error})",
             "more intervals, a smaller min_step, scales for unknowns far from one, or a start elsewhere may help",
         )  # fmt: skip
+
+    def _meets_corner(self) -> bool:
+        """Return whether the residual bends within a short way along the tangent as only a corner does."""
+        system, x, way = self.state.system, self.state.x, _CORNER * self.state.tangent
+        here = system.residual(x)
+        forth, back = (system.residual(x + sign * way) - here for sign in (1, -1))
+        across = np.random.default_rng(17).standard_normal(system.size)
+        across *= _CORNER / np.sqrt(inner(system, across, across))
+        usual = np.max(np.abs(system.residual(x + across) - here), initial=0.0)
+        return bool(np.max(np.abs(forth + back), initial=0.0) > _JUMP * usual)
 
     # --- one step ------------------------------------------------------------------------------------------------
 

@@ -10,7 +10,9 @@ from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.run import follow_until_interrupted
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
+from contin.discretization.system import System
 from contin.errors import ProblemError
+from contin.problems.statement import forget_changed
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of
 from contin.stepping.settings import Settings, settings_with
@@ -50,8 +52,10 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     checks.instance("start", start, Point, "a Point")
     settings = settings_with(settings, options)
     system, x = start.system, start.x
+    if isinstance(system, System) and forget_changed(system.problem):
+        system = system.with_parameters({})
     if free is not None and checks.names("free", free) != system.free:
-        system, x = system_of(start, "start").with_free(free, x)
+        system, x = system_of(start, "start").with_free(free, x) if system is start.system else system.with_free(free, x)
     if branch is None:
         return follow_until_interrupted(system, x, settings)
     checks.whole("branch", branch, 0, 10)

@@ -56,6 +56,7 @@ class Algebraic(System):
         self.size = self.state_size + len(self.free)
         self.equations = problem.equation_size
         self.weights = np.ones(self.size)
+        self._found: dict[bytes, ComplexArray] = {}
 
     @property
     def nodes(self) -> Array:
@@ -195,7 +196,10 @@ class Algebraic(System):
         All n of them or, of a matrix that is kept sparse, those right of the imaginary axis or near to it.
         """
         if self.is_sparse:
-            return rightmost(self.as_field().field_jacobian(x))
+            key = x.tobytes()
+            if key not in self._found:  # the ends of a step and of its parts are asked for several times
+                self._found = {**dict(list(self._found.items())[-_KEPT:]), key: rightmost(self.as_field().field_jacobian(x))}
+            return self._found[key]
         return np.linalg.eigvals(self.jacobian(x)).astype(complex, copy=False)
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
@@ -273,6 +277,8 @@ class Algebraic(System):
 #: From so many states on the matrix is kept sparse where no more colours than this part of the columns suffice for it. Below, a
 #: dense factorization takes no longer.
 _MANY, _FEW = 200, 0.1
+#: Sets of eigenvalues that are kept: more than a search for Hopf points compares.
+_KEPT = 16
 #: The t of functions that do not take it.
 _NO_TIME = np.zeros(1)
 

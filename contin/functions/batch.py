@@ -139,13 +139,22 @@ class Batch:
         ------
         CompilationError
         """
-        rewriter = self._rewritten()
         source = _source(self.signature, self._functions, self._counts, derivatives)
-        rewriter.note(source, self.signature.states, self.signature.parameters)
-        return _evaluate(rewriter.fingerprint(), source, self.signature, self._functions)
+        self._key = self._fingerprint(source)
+        return _evaluate(self._key, source, self.signature, self._functions)
 
-    def _rewritten(self) -> ComplexStep:
-        """Return the rewriter that has met all functions, and everything that they read.
+    def is_current(self) -> bool:
+        """Return whether all constants that the functions read still have the values that were compiled."""
+        if isinstance(self._evaluate, Interpreted):
+            return True  # it reads them at each call
+        source = _source(self.signature, self._functions, self._counts, self._derivatives)
+        try:
+            return self._fingerprint(source) == self._key
+        except CompilationError:
+            return False
+
+    def _fingerprint(self, source: str) -> str:
+        """Return the fingerprint of the functions, and of everything that they read.
 
         Raises
         ------
@@ -156,7 +165,8 @@ class Batch:
             rewriter.function(parts(function)[0])
         for solve in searches(self._functions):
             rewriter.function(solve)
-        return rewriter
+        rewriter.note(source, self.signature.states, self.signature.parameters)
+        return rewriter.fingerprint()
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""

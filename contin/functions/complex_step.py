@@ -139,11 +139,11 @@ def makers(kind: type) -> dict[Any, Function]:
     return {maker: replaced(maker) for maker in MAKERS + MAKERS_LIKE}
 
 
-class ComplexStep(Rewriter):
-    """Rewrite functions for the complex step.
+class RealFunctions(Rewriter):
+    """Rewrite functions of real numbers.
 
     A function that computes with complex numbers of its own is refused: their real parts, conjugates and absolute values are
-    not analytic, and both values and derivatives would be wrong.
+    not analytic, and values, derivatives and sparsity pattern would be wrong.
     """
 
     def _names(self, code: types.CodeType) -> tuple[set[str], set[str]]:
@@ -156,6 +156,10 @@ class ComplexStep(Rewriter):
         if isinstance(value, (complex, np.complexfloating)) or (isinstance(value, np.ndarray) and value.dtype.kind == "c"):
             raise CompilationError(_OWN_COMPLEX)
         return super()._value(value, attributes)
+
+
+class ComplexStep(RealFunctions):
+    """Rewrite functions for the complex step."""
 
     def stand_in(self, value: Any) -> Any:
         """Return the function that takes the place of one that is not analytic; None for all other values."""

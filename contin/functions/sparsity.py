@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Function, Pattern
-from contin.functions.complex_step import analytic, makers, stand_in_of
+from contin.functions.complex_step import RealFunctions, analytic, makers, stand_in_of
 from contin.functions.pointwise import parts
-from contin.functions.rewriting import Rewriter
 from contin.functions.signature import Signature, named_values, result_count
 
 #: With more inputs the pattern is not looked for: it would take a gigabyte.
@@ -76,7 +75,7 @@ class _TracedMatrix:
     dot = __matmul__
 
 
-class _Traceable(Rewriter):
+class _Traceable(RealFunctions):
     """Functions for a call in Python: with numpy's functions in place of those of ``math``, which want ordinary numbers."""
 
     def finished(self, copy: types.FunctionType) -> Any:

@@ -8,11 +8,14 @@ import numpy as np
 
 from contin.arrays import ComplexArray
 
-#: Eigenvalues that each operator gives at first. Ten times more take ten times as long.
-_COUNT = 24
-#: Shifts of the Cayley transforms, as multiples of the largest eigenvalue near zero: an oscillation whose frequency is a hundred
-#: times the largest shift converges slowly.
+#: Eigenvalues that each operator gives at first, dimension of the Krylov space for each, restarts, tolerance. Those that
+#: converge late are not wanted: without a bound on restarts, a reaction-diffusion problem takes a hundred times as long.
+_COUNT, _SPACE, _RESTARTS, _TOLERANCE = 12, 4, 12, 1e-11
+#: Shifts of the Cayley transforms, as multiples of the largest eigenvalue near zero: oscillations with frequencies up to ten
+#: times the largest shift are found.
 _SHIFTS = (1.0, 30.0)
+#: Cayley transforms look right of the line Re z = -_STRIP times the shift.
+_STRIP = 0.2
 #: Two eigenvalues closer than this, relative to 1 + their size, are the same one, found twice.
 _SAME = 1e-7
 
@@ -20,9 +23,9 @@ _SAME = 1e-7
 def rightmost(matrix: Any) -> ComplexArray:
     """Return the eigenvalues of a real sparse matrix that lie right of the imaginary axis or near to it, by Arnoldi's method.
 
-    The Cayley transform (A - s)^-1 (A + s) with s > 0 has the eigenvalues (z + s) / (z - s): larger than one exactly for the z
-    right of the axis, so that Arnoldi's method finds these first (Meerbergen, Spence and Roose 1994). Its shifts s come from
-    the eigenvalues that are nearest to zero. Eigenvalues far left of the axis are not looked for.
+    The Cayley transform (A - s)^-1 (A + s + 2 d) with s, d > 0 has the eigenvalues (z + s + 2 d) / (z - s): larger than one
+    exactly for the z with Re z > -d, so that Arnoldi's method finds these first (Meerbergen, Spence and Roose 1994). Its shifts
+    s come from the eigenvalues that are nearest to zero. Eigenvalues far left of the axis are not looked for.
 
     Parameters
     ----------
@@ -36,9 +39,8 @@ def rightmost(matrix: Any) -> ComplexArray:
     Examples
     --------
     >>> from scipy.sparse import diags_array
-    >>> rows = np.arange(60)
-    >>> rotating = diags_array([np.append([0.5, 0.5], -1.0 - rows), np.append(3.0, 0 * rows), np.append(-3.0, 0 * rows)], offsets=[0, 1, -1])
-    >>> values = rightmost(rotating)
+    >>> turning = np.append(3.0, np.zeros(60))
+    >>> values = rightmost(diags_array([np.append([0.5, 0.5], -np.arange(60)), turning, -turning], offsets=[0, 1, -1]))
     >>> [complex(z) for z in np.round(values[values.real > 0], 9)]
     [(0.5+3j), (0.5-3j)]
     """
@@ -53,10 +55,10 @@ def rightmost(matrix: Any) -> ComplexArray:
     scale = float(np.abs(found[0]).max(initial=0.0)) or 1.0
     for share in _SHIFTS:
         shift, count = min(share * scale, size), _COUNT
-        found.append(_transformed(matrix, one, shift, shift))
+        found.append(_transformed(matrix, one, shift, (1 + 2 * _STRIP) * shift))
         while np.all(found[-1].real > 0) and found[-1].size and 2 * count < matrix.shape[0]:  # there may be more
             count *= 2
-            found.append(_transformed(matrix, one, shift, shift, count))
+            found.append(_transformed(matrix, one, shift, (1 + 2 * _STRIP) * shift, count))
     return _distinct(np.concatenate(found))
 
 
@@ -71,8 +73,9 @@ def _transformed(matrix: Any, one: Any, pole: float, zero: float, count: int = _
         return np.empty(0, dtype=complex)
     operator = LinearOperator((n, n), (lambda v: factors.solve(after @ v)) if zero else factors.solve, dtype=float)
     start = np.random.default_rng(11).standard_normal(n)
+    options = {"ncv": min(_SPACE * count, n), "maxiter": _RESTARTS, "tol": _TOLERANCE, "return_eigenvectors": False}
     try:
-        values = eigs(operator, min(count, n - 2), v0=start, return_eigenvectors=False)
+        values = eigs(operator, min(count, n - 2), v0=start, **options)
     except ArpackNoConvergence as error:
         values = error.eigenvalues
     except ArpackError:

@@ -61,6 +61,18 @@ def _restated(kind: Any, arguments: tuple[Any, ...], options: dict[str, Any]) ->
     return kind(*arguments, **options)
 
 
+def forget_changed(problem: Any) -> bool:
+    """Forget compiled functions that read constants which have changed since; return whether there were any.
+
+    A program may assign a global constant, an attribute of an object or an entry of a dictionary between two runs.
+    """
+    batches: dict[str, Batch] = getattr(problem, "_batches", {})
+    changed = [name for name, batch in batches.items() if not batch.is_current()]
+    for name in changed:
+        del batches[name]
+    return bool(changed)
+
+
 def with_multipliers(problem: Statement, free: Sequence[str]) -> tuple[str, ...]:
     """Return the free parameters with those that a problem adds by itself: its ``multipliers``, if it has any."""
     names = checks.names("free", free)
