@@ -135,7 +135,7 @@ def _located(system: System, x: Array, solution: AutoSolution) -> Point:
     primary = system.free[0]
     way = 1 if x[system.parameter_index(primary)] >= back[primary] else -1
     for direction in (way, -way):
-        for point in follow(back.system, back.x, Settings(direction=direction, max_points=_LOOKS, **near)):  # type: ignore[arg-type]
+        for point in follow(back.system, back.x, Settings(direction=direction, max_points=_LOOKS, **near)):
             if point.label == solution.label:
                 return point
     raise ConvergenceError(
