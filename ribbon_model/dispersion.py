@@ -20,6 +20,12 @@ def mode_matrix(moment: float, g: float, t: float, k: float, omega_squared: floa
 
     Row 11 is the law of M_2. For g infinite it is divided by g, which leaves the constraint omega_2 = 0, i k psi_2 = psi_3;
     det A is then the limit of det A / g.
+
+    Examples
+    --------
+    >>> in_plane, out_of_plane = squared_frequencies(0.0, math.inf, 2.0, 2.0)
+    >>> bool(abs(np.linalg.det(mode_matrix(0.0, math.inf, 2.0, 2.0, out_of_plane))) < 1e-10)
+    True
     """
     matrix = np.zeros((12, 12), dtype=complex)
     derivative = np.array([[1j * k, 0, 0], [0, 1j * k, -1], [0, 1, 1j * k]])  # (19)
@@ -38,14 +44,27 @@ def mode_matrix(moment: float, g: float, t: float, k: float, omega_squared: floa
 
 
 def coefficients(moment, g, t, k) -> tuple:
-    """Return b and c of (25b), (25c); arrays broadcast. For g infinite, b = t (1 - k**2) - moment and c = 1."""
+    """Return b and c of (25b), (25c); arrays broadcast. For g infinite, b = t (1 - k**2) - moment and c = 1.
+
+    Examples
+    --------
+    >>> coefficients(-1.5, math.inf, 2.0, 2.0)
+    (-4.5, 1.0)
+    """
     if math.isinf(g):
         return t * (1 - k**2) - moment, 1 + 0 * moment * k
     return moment**2 / g - (1 + t / g) * moment + t * (1 - k**2), 1 + (k**2 * t - moment) / g
 
 
 def determinant(moment, g, t, k, omega_squared):
-    """Return det A from its factors, (25a) with the sign corrected; for g infinite the limit of det A / g, as `mode_matrix`."""
+    """Return det A from its factors, (25a) with the sign corrected; for g infinite the limit of det A / g, as `mode_matrix`.
+
+    Examples
+    --------
+    >>> in_plane, out_of_plane = squared_frequencies(0.0, math.inf, 2.0, 2.0)
+    >>> abs(determinant(0.0, math.inf, 2.0, 2.0, in_plane)) < 1e-12
+    True
+    """
     b, c = coefficients(moment, g, t, k)
     in_plane = (1 + k**2) * omega_squared - k**2 * (1 - k**2) ** 2
     out_of_plane = c * omega_squared - b * k**2 * (1 - k**2)
@@ -56,6 +75,11 @@ def squared_frequencies(moment, g, t, k) -> tuple:
     """Return the roots Omega**2 of (26): the in-plane root, never negative, and the root that determines stability.
 
     If c = 0, the second one is infinite: a pure twist has no inertia in the model (with floats: ZeroDivisionError).
+
+    Examples
+    --------
+    >>> squared_frequencies(0.0, math.inf, 2.0, 2.0)  # a naturally circular loop
+    (7.2, 72.0)
     """
     b, c = coefficients(moment, g, t, k)
     return k**2 * (1 - k**2) ** 2 / (1 + k**2), b * k**2 * (1 - k**2) / c

@@ -22,7 +22,13 @@ LOADS = ("M1", "M2", "M3", "R1", "R2", "R3", "unfold")
 
 
 def directors(q0, q1, q2, q3):
-    """Return the components of d1, d2, d3 on the lab axes (nine numbers, director by director) from the quaternion."""
+    """Return the components of d1, d2, d3 on the lab axes (nine numbers, director by director) from the quaternion.
+
+    Examples
+    --------
+    >>> directors(1.0, 0.0, 0.0, 0.0)
+    (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    """
     return (
         q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, 2 * (q1 * q2 + q0 * q3), 2 * (q1 * q3 - q0 * q2),
         2 * (q1 * q2 - q0 * q3), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, 2 * (q2 * q3 + q0 * q1),
@@ -40,7 +46,13 @@ def spin(q0, q1, q2, q3, w1, w2, w3, length):
 
 
 def on_directors(q0, q1, q2, q3, a1, a2, a3):
-    """Return the components on the directors of the vector that has components a on the lab axes."""
+    """Return the components on the directors of the vector that has components a on the lab axes.
+
+    Examples
+    --------
+    >>> on_directors(1.0, 0.0, 0.0, 0.0, 2.0, 3.0, 4.0)
+    (2.0, 3.0, 4.0)
+    """
     d11, d12, d13, d21, d22, d23, d31, d32, d33 = directors(q0, q1, q2, q3)
     return (
         d11 * a1 + d12 * a2 + d13 * a3, d21 * a1 + d22 * a2 + d23 * a3, d31 * a1 + d32 * a2 + d33 * a3,

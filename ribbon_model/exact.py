@@ -77,6 +77,11 @@ def bifurcation(m, n, nu):
 
     Raises ValueError if (m, n) is not a buckling mode or nu is outside (-1, 1), and ZeroDivisionError if the branch starts
     at infinite kappa_n (some nu < 0).
+
+    Examples
+    --------
+    >>> bifurcation(1, 2, 0.3)
+    2.5
     """
     _check_mode(m, n, nu)
     return m * (2 * n**2 - m**2) / (m**2 + 2 * nu * (n**2 - m**2))  # (27) with the common factor nu cancelled
@@ -110,6 +115,12 @@ def solve(m, n, nu, guess, *, kappa_n=None, amplitude=None, law="ribbon", root=0
         None or both are given, or `residuals` raises it.
     RuntimeError
         If Newton does not converge. Near a fold of kappa_n prescribe the amplitude, and conversely.
+
+    Examples
+    --------
+    >>> point = solve(1, 2, 0.3, curve(1, 2, 0.3)[5], kappa_n=3.0)
+    >>> round(point.kappa_n, 12)
+    3.0
     """
     if (kappa_n is None) == (amplitude is None):
         raise ValueError("give exactly one of kappa_n and amplitude")
@@ -161,6 +172,12 @@ def curve(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), step=0.05, law="ribbon", r
         As `bifurcation`, if m is a multiple of 2n, or if the branch starts outside `kappa_limits`.
     RuntimeError
         If the follower cannot proceed.
+
+    Examples
+    --------
+    >>> branch = curve(1, 2, 0.3)
+    >>> [point.label for point in branch if point.label]
+    ['BP', 'LP', 'BP']
     """
     if law in _FOLLOWERS:
         return _FOLLOWERS[law](m, n, nu, Gamma, kappa_limits, step)
@@ -199,6 +216,11 @@ def initial_slope(m, n, nu, law="ribbon", root=0):
     """Return d kappa_n / dA at the start of the branch, with the squared amplitude A: its sign is the pitchfork's sense.
 
     It is zero if a fold is born from the pitchfork. Raises as `curve` does.
+
+    Examples
+    --------
+    >>> initial_slope(1, 2, 0.3) > 0  # kappa_n grows: the pitchfork is supercritical
+    True
     """
     family = _family(law, m, n, nu, root)
     defect, numerator, denominator = FLOAT.gradients(family.parts, family.circle(m))
@@ -207,7 +229,13 @@ def initial_slope(m, n, nu, law="ribbon", root=0):
 
 
 def folds(m, n, nu=0.3, kappa_limits=(-100.0, 100.0), law="ribbon", root=0, Gamma=None):
-    """Return the points of `curve` at which kappa_n is stationary, in order. Raises as `curve` does."""
+    """Return the points of `curve` at which kappa_n is stationary, in order. Raises as `curve` does.
+
+    Examples
+    --------
+    >>> [round(point.kappa_n, 6) for point in folds(1, 2, 0.3)]
+    [4.075668]
+    """
     return [point for point in curve(m, n, nu, kappa_limits, law=law, root=root, Gamma=Gamma) if point.label == "LP"]
 
 
@@ -216,6 +244,11 @@ def end(m, n, nu, law="ribbon", root=0):
 
     None if the branch never returns to a circle (2n < m, except for the isotropic rod), or has infinite kappa_n somewhere on
     the way. The index is kappa_star there: negative, on some branches of the isotropic rod, if omega_1 is.
+
+    Examples
+    --------
+    >>> end(1, 2, 0.3)
+    (3, -0.5)
     """
     family = _family(law, m, n, nu, root)
     if family.finish is None:
@@ -248,6 +281,12 @@ def refine(point, digits):
     ------
     RuntimeError
         If the iteration does not converge.
+
+    Examples
+    --------
+    >>> (fold,) = folds(1, 2, 0.3)
+    >>> [str(value)[:10] for value in refine(fold, 20)]
+    ['4.07566753', '1.51966095']
     """
     import mpmath  # only this function needs it
 

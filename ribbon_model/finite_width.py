@@ -50,7 +50,13 @@ _TERMS = len(_COEFFICIENTS)
 
 
 def membrane(z):
-    """g, g' and g'' at z = x**4 >= 0; free of overflow and of cancellation in g."""
+    """g, g' and g'' at z = x**4 >= 0; free of overflow and of cancellation in g.
+
+    Examples
+    --------
+    >>> round(float(membrane(0.0)[0]) * 180, 12)
+    1.0
+    """
     if z < SERIES_LIMIT:
         g, slope, half_curvature = 0.0, 0.0, 0.0
         for i in range(_TERMS):
@@ -97,7 +103,13 @@ def on_circle(ratio, nu, width) -> tuple:
 
 
 def convex_limits(nu, width) -> list[float]:
-    """Return the kappa_n r0 where the torsional or the tangent bending modulus of a planar circle vanishes, in any order."""
+    """Return the kappa_n r0 where the torsional or the tangent bending modulus of a planar circle vanishes, in any order.
+
+    Examples
+    --------
+    >>> convex_limits(0.3, 0.0)  # without width it is the flat rod, which is convex
+    []
+    """
     t0, slope = on_circle(1.0, nu, width)[1], on_circle(0.0, nu, width)[1] - on_circle(1.0, nu, width)[1]
     zeros = [-float(t0 / slope)] if slope else []
     b0, b1, b2 = (on_circle(1 - y, nu, width)[2] for y in (0.0, 1.0, -1.0))

@@ -48,6 +48,11 @@ class Law:
         The law's own parameters, in the order in which they are passed: ``nu``, and for some laws more.
     gradient : callable, optional
         The response, if H cannot be differentiated symbolically; prepared for compilation by `contin`.
+
+    Examples
+    --------
+    >>> RIBBON.thresholds(1, 2, 0.3)[0]  # where (1, 2) leaves the single loop
+    2.5
     """
 
     name: str
@@ -431,11 +436,24 @@ LAWS = PAPER_LAWS | {FINITE_WIDTH.name: FINITE_WIDTH}
 
 
 def label(law: str, Gamma: float | None = None) -> str:
-    """Return a law with its Gamma, if it has one, as one name."""
+    """Return a law with its Gamma, if it has one, as one name.
+
+    Examples
+    --------
+    >>> label("ribbon"), label("finite width", 30.0)
+    ('ribbon', 'finite width, Gamma = 30')
+    """
     return law if Gamma is None else f"{law}, Gamma = {Gamma:.12g}"
 
 
 def from_label(name: str) -> tuple[Law, float | None]:
-    """Return the law and the Gamma of a `label`."""
+    """Return the law and the Gamma of a `label`.
+
+    Examples
+    --------
+    >>> law, Gamma = from_label(label("finite width", 30.0))
+    >>> law.name, Gamma
+    ('finite width', 30.0)
+    """
     law, _, Gamma = name.partition(", Gamma = ")
     return LAWS[law], float(Gamma) if Gamma else None

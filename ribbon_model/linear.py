@@ -33,6 +33,12 @@ def thresholds(law: Law, m: int, n: int, nu: float, Gamma: float | None = None) 
         n = m, a rigid rotation; or, for nu < 0, a mode whose threshold lies beyond kappa_n = m / nu, where the ribbon's
         tangent twisting modulus t = 2 (1 - nu K) is not positive and the law's regular root ends. Finite width: no threshold
         where the law is convex. Gamma: see `Law.values`.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> [round(thresholds(RIBBON, 1, n, 0.3)[0], 6) for n in (2, 3)]
+    [2.5, 2.931034]
     """
     law.values(nu, Gamma)
     if n == m:
@@ -41,7 +47,14 @@ def thresholds(law: Law, m: int, n: int, nu: float, Gamma: float | None = None) 
 
 
 def circle(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = None) -> dict[str, float]:
-    """M1, kappa_star (28) and energy (over 2 pi B / L, without the constant kappa_n**2/2) of the planar m-covered circle."""
+    """M1, kappa_star (28) and energy (over 2 pi B / L, without the constant kappa_n**2/2) of the planar m-covered circle.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> circle(RIBBON, 1, 2.5, 0.3)
+    {'M1': -1.5, 'kappa_star': 1, 'energy': -2.0}
+    """
     return law.circle(m, kappa_n, nu, Gamma)
 
 
@@ -50,6 +63,13 @@ def covering(kappa_n: float, kappa_star: float, energy: float) -> int:
 
     The energy of a planar circle is a multiple of (omega_1 - kappa_n)**2, without kappa_n**2 / 2, so kappa_n**2 + 2 energy is
     (m - kappa_n) (kappa_star - kappa_n). Negative where the circle is curled against its natural curvature.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> values = circle(RIBBON, 3, 2.5, 0.3)
+    >>> covering(2.5, values["kappa_star"], values["energy"])
+    3
     """
     if kappa_star == kappa_n:  # the natural state
         return round(kappa_n)
@@ -71,6 +91,12 @@ def stability_interval(law: Law, m: int, nu: float, Gamma: float | None = None) 
     ------
     ValueError
         m < 1, nu outside (-1, 1), or a law without closed formulas.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> stability_interval(RIBBON, 1, 0.3)
+    (-inf, 2.5)
     """
     _check(m, nu)
     ends = []
@@ -89,6 +115,12 @@ def energy_interval(law: Law, m: int, nu: float, Gamma: float | None = None) -> 
     It is `stability_interval`, cut at kappa_n r0 = 1 - g: below that the moment of the circle, 1 - kappa_n r0, exceeds g, and
     turning the strip about its own centreline lowers the energy (n = 0, not among the modes of (26): it moves no mass). This
     affects the isotropic rod, g = 1, at m = 1: a ring cannot be stable inside out.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import ISOTROPIC_ROD
+    >>> round(energy_interval(ISOTROPIC_ROD, 1, 0.3)[0], 6), round(stability_interval(ISOTROPIC_ROD, 1, 0.3)[0], 6)
+    (0.0, -1.642522)
     """
     low, high = stability_interval(law, m, nu, Gamma)
     g, _ = law.tangent_moduli(1.0, nu, _width(law, m, nu, Gamma))
@@ -118,6 +150,12 @@ def index(law: Law, m: int, kappa_n: float, nu: float, Gamma: float | None = Non
     ------
     ValueError
         See `stability_interval`. On a bifurcation the zero directions are not counted.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> [index(RIBBON, 1, kappa_n, 0.3) for kappa_n in (1.0, 3.0, 6.0)]
+    [0, 4, inf]
     """
     _check(m, nu)
     ratio, width = kappa_n / m, _width(law, m, nu, Gamma)

@@ -28,6 +28,13 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
     ------
     ValueError
         n = m, a threshold that does not exist, or m / n even.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> system, x, tangent = primary_branch(RIBBON, 1, 2, 0.3)
+    >>> round(float(x[system.parameter_index("kappa_n")]), 9)
+    2.5
     """
     if m % n == 0 and (m // n) % 2 == 0:
         raise ValueError(f"m = {m}, n = {n}: with m / n even the symmetry of the mode does not close the loop")
@@ -37,7 +44,15 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
 
 
 def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, degree: int = 4, root: int = 0, Gamma=None):
-    """Return the same as `primary_branch` on the half loop, which has all wavenumbers."""
+    """Return the same as `primary_branch` on the half loop, which has all wavenumbers.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> system, x, tangent = half_loop_branch(RIBBON, 1, 2, 0.3)
+    >>> round(float(x[system.parameter_index("kappa_n")]), 9)
+    2.5
+    """
     kappa_n = thresholds(law, m, n, nu, Gamma)[root]
     system = HALF_LOOP.discretize(law, intervals, degree, law.values(nu, Gamma))
     return leave_circle(system, HALF_LOOP.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))

@@ -25,6 +25,12 @@ class Strip:
     ------
     ValueError
         A field that is not positive and finite, or a strip that is not thinner than wide and narrower than long.
+
+    Examples
+    --------
+    >>> steel = Strip(0.016, 0.00012, 0.6, 0.03, 0.3, 200e9)
+    >>> round(steel.kappa_n, 4), round(steel.Gamma, 2)
+    (3.1831, 22.34)
     """
 
     width: float

@@ -41,6 +41,12 @@ def system_matrix(law: Law, nu, xi, width: float | None = None) -> np.ndarray:
     ------
     ValueError
         xi = 1 (no radius), the ribbon at xi = 1 - nu (t = 0), or a law that is not in Table 2.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> system_matrix(RIBBON, 0.3, 0.5).shape
+    (6, 6)
     """
     nu, xi = np.broadcast_arrays(np.asarray(nu, float), np.asarray(xi, float))
     if np.any(xi == 1):
@@ -71,6 +77,13 @@ def shooting_determinant(law: Law, nu, xi, theta_n: float = math.pi, ends=CLAMPE
     ------
     ValueError
         As `system_matrix`.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> closed, shot = (first_root(RIBBON, 0.3, method=method) for method in ("closed form", "shooting"))
+    >>> abs(closed - shot) < 1e-9
+    True
     """
     from scipy.linalg import expm
 
@@ -99,6 +112,13 @@ def factors(law: Law, nu, xi, theta_n: float = math.pi, width: float | None = No
     ------
     ValueError
         xi = 0 or a law that is not in Table 2. Where T = 0 (the ribbon at xi = 1 - nu) the result is not a number.
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> root = first_root(RIBBON, 0.3)
+    >>> min(abs(float(factor)) for factor in factors(RIBBON, 0.3, root)) < 1e-9
+    True
     """
     nu, xi = np.broadcast_arrays(np.asarray(nu, float), np.asarray(xi, float))
     if np.any(xi == 0):
@@ -164,6 +184,12 @@ def first_root(
         As `Law.values` for the width; nu outside (-1, 1), theta_n or ``largest`` not positive, an unknown method,
         `HINGED` with the closed form, or a
         determinant that is zero throughout (isotropic rod with `HINGED` ends, nu = 0, where t = g).
+
+    Examples
+    --------
+    >>> from ribbon_model.laws import RIBBON
+    >>> round(first_root(RIBBON, 0.3), 6)
+    0.696057
     """
     from scipy.optimize import brentq
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,9 +25,12 @@ from contin.stepping.settings import Settings
 
 #: Labels of points that contin locates, too.
 _LOCATED = ("BP", "LP", "HB", "PD", "TR")
-#: The run goes back from AUTO's solution and locates the point in steps of this length, and looks at so many. AUTO's default
-#: tolerance of special points is 1e-4; with steps ten times larger, the next point of the same kind could be found.
-_STEP, _LOOKS = 0.01, 12
+#: The run goes back from AUTO's solution, and then looks for the point at so many places, in steps that begin with this length.
+#: With steps ten times larger, more than one point of a kind can lie in the first one.
+_STEP, _LOOKS = 0.01, 20
+#: The point found is AUTO's if its parameter is as close as this: AUTO's tolerance of special points is 1e-4 by default. Ten
+#: times larger, the next point of the same kind could be taken.
+_CLOSE = 1e-2
 #: AUTO's number of the period.
 _PERIOD = "PAR(11)"
 
@@ -130,14 +133,24 @@ def _located(system: System, x: Array, solution: AutoSolution) -> Point:
     ConvergenceError
         There is none of this label.
     """
-    near: dict[str, Any] = {"step": _STEP, "max_step": _STEP}
-    back = follow(system, x, Settings(direction=-1, max_points=3, errors=False, **near)).points[-1]
-    primary = system.free[0]
-    way = 1 if x[system.parameter_index(primary)] >= back[primary] else -1
-    for direction in (way, -way):
-        for point in follow(back.system, back.x, Settings(direction=direction, max_points=_LOOKS, **near)):  # type: ignore[arg-type]
+    sizes = dict.fromkeys((*system.problem.states, *system.free), 1.0)  # at a special point, those of x may not be typical
+    for scales in (sizes, {}):
+        for point in _looked_for(system, x, scales):
             if point.label == solution.label:
                 return point
     raise ConvergenceError(
         f"solution: no {solution.label} of the problem is near AUTO's label {solution.number}; compare the equations"
     )
+
+
+def _looked_for(system: System, x: Array, scales: Mapping[str, float]) -> Iterator[Point]:
+    """Yield the labelled points near x, from some steps back on, both ways."""
+    primary = system.free[0]
+    wanted = float(x[system.parameter_index(primary)])
+    back = follow(system, x, Settings(direction=-1, step=_STEP, max_points=2, errors=False, scales=scales)).points[-1]
+    way = 1 if wanted >= back[primary] else -1
+    for direction in (way, -way):
+        settings = Settings(direction=direction, step=_STEP, max_points=_LOOKS, scales=scales)
+        yield from (
+            p for p in Continuation(back.system, back.x, settings) if abs(p[primary] - wanted) <= _CLOSE * (1 + abs(wanted))
+        )

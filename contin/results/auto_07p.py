@@ -159,7 +159,7 @@ def read_auto(folder: str | Path, name: str | None = None, *, parameters: Mappin
     ...     )
     ...     _ = (pathlib.Path(folder) / "fort.8").write_text("")
     ...     read_auto(folder, parameters={1: "mu"})
-    [AutoBranch(1 points: EP; mu)]
+    [AutoBranch(1 points: EP; mu, L2-NORM)]
     """
     given = {} if parameters is None else parameters
     if not isinstance(given, Mapping) or not all(isinstance(i, int) and isinstance(word, str) for i, word in given.items()):

@@ -221,5 +221,6 @@ def test_an_interrupt_ends_a_computation():
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(timeout=3)
             break
+    process.kill()  # where it has not ended: it would compute for ever
     said = process.communicate(timeout=30)[1]
     assert process.returncode == -signal.SIGINT and said.rstrip().endswith("KeyboardInterrupt")

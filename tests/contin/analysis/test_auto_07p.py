@@ -14,6 +14,7 @@ import pytest
 
 from contin import (
     AlgebraicProblem,
+    AutoSolution,
     BoundaryValueProblem,
     ConvergenceError,
     CycleProblem,
@@ -172,3 +173,13 @@ def test_auto_writes_what_is_stored(tmp_path):
             assert np.allclose(here.columns[name], stored.columns[name], rtol=1e-5, atol=1e-5)
         for one, other in zip(here.solutions, stored.solutions):
             assert np.allclose(one.states, other.states, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize(("x", "a"), [(0.0, 1e-5), (0.0, -1e-5), (1e-3, 1e-6), (0.0, 0.0)])
+def test_a_branch_point_that_auto_located_roughly(x, a):
+    """The pitchfork a x - x^3 at 0; AUTO's default tolerance of special points is 1e-4."""
+    pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+    found = AutoSolution("BP", 7, {"a": a}, np.zeros(1), np.array([[x]]), 1, 0)
+    point = from_auto(pitchfork, found, free=["a"])
+    assert point.label == "BP" and abs(point["a"]) < 1e-8
+    assert len(trace(point, branch=1, max_points=3)) == 4
