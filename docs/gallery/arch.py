@@ -1,15 +1,15 @@
 r"""# A shallow arch: snapping through on one side
 
 An arch on pins, $y_0 = e \sin t$, carries a load that is distributed like a sine. It shortens, and its thrust $P$ grows.
-In suitable units (after Fung & Kaplan 1952)
+In suitable units (after Fung & Kaplan 1952) the energy and the thrust are
 
 $$E = \int_0^\pi \tfrac12 (y'' - y_0'')^2 + \tfrac18 P^2 + q\, y \sin t \; dt, \qquad
 P = \frac2\pi \int_0^\pi (y_0'^2 - y'^2)\, dt .$$
 
 A high arch does not wait for its limit load: it leans to one side first, at a branch point, and goes through that way.
 
-**Check:** $y = a_1 \sin t + a_2 \sin 2t$ solves the equations exactly. So the branch point is at $q = e + 3\sqrt{e^2 - 4}$, where $P = 4$, and the limit load is $q = e + 2 ((e^2 -
-1)/3)^{3/2}$; here $e = 3$.
+**Check:** $y = a_1 \sin t + a_2 \sin 2t$ solves the equations exactly. So the branch point is at $q = e + 3\sqrt{e^2 - 4}$,
+where $P = 4$, and the limit load is $q = e + 2 ((e^2 - 1)/3)^{3/2}$; here $e = 3$.
 """
 
 import math

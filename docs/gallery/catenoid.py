@@ -8,7 +8,7 @@ $$A = 2\pi \int_0^1 r \sqrt{g^2 + r'^2}\, dt .$$
 The energy is all that the program is told. It derives the equations, and from the second variation the index: the wide neck
 is a minimum, the narrow one is not. Pulled beyond the fold, the film breaks.
 
-**Check:** the largest half distance is $0.6627434193$ radii, where $\cosh a = a \sinh a$ (Goldschmidt 1831).
+**Check:** the largest half distance is $1/\sinh a = 0.6627434193$ radii, with $a \tanh a = 1$ (Goldschmidt 1831).
 """
 
 import math

@@ -5,8 +5,8 @@ A pendulum whose pivot shakes, an ion in a quadrupole trap: both obey Mathieu's 
 $$u'' + \left(a - 2 q \cos 2t\right) u = 0 .$$
 
 For each $q$ there are eigenvalues $a$ with solutions of period $\pi$ or $2\pi$. They bound the tongues, in which the rest
-position is unstable. A quarter period and a condition on the norm, $\int u^2 dt = 1$, make each eigenvalue a regular
-unknown: it is followed from $q = 0$, where $a = n^2$ and $u$ is a sine or a cosine. The number of zeros stays.
+position is unstable. By symmetry the interval from 0 to $\pi/2$ is enough. A condition on the norm, $\int u^2 dt = 1$, makes
+each eigenvalue a regular unknown. It is followed from $q = 0$, where $a = n^2$ and $u$ is a sine or a cosine.
 
 **Check:** $a_0(5) = -5.80004602$ (Abramowitz & Stegun, Table 20.1).
 """
@@ -29,7 +29,7 @@ def follow(n, kind):
         parameters={"q": 0.0, "a": float(n * n)},
         domain=(0, math.pi / 2),
     )
-    size = math.sqrt((4 if n else 2) / math.pi) * math.sqrt(2 / math.pi)  # of the norm that the integral asks for
+    size = math.sqrt((4 if n else 2) / math.pi)  # of the norm that the integral asks for
     wave, slope = (math.cos, lambda x: -math.sin(x)) if kind == "cos" else (math.sin, math.cos)
     first = contin.solve(mathieu, lambda t: (size * wave(n * t), n * size * slope(n * t)), free=["a"])
     return contin.trace(first, free=["q", "a"], limits={"q": (0, 8)}, zeros={"q": [5.0]}, max_step=0.5)

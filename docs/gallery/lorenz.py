@@ -6,9 +6,9 @@ $$\dot x = 10 (y - x), \qquad \dot y = r x - y - x z, \qquad \dot z = x y - \tfr
 
 has three states of rest. The fluid turns, to the left or to the right, until a Hopf bifurcation at $r = 24.74$. It is
 subcritical: the cycles that begin there are unstable, and reach back to $r = 13.93$, where they become homoclinic orbits of
-the fluid at rest. Between the two lies the origin of chaos.
+the fluid at rest. The complicated motions of these equations begin there.
 
-**Check:** the Hopf point is $r = 470/19 = 24.7368421$ (Sparrow 1982), the homoclinic orbit lies at $r = 13.926557$.
+**Check:** the Hopf point is $r = 470/19 = 24.7368421$, and the homoclinic orbit lies at $r = 13.926$ (Sparrow 1982).
 """
 
 import matplotlib.pyplot as plt

@@ -6,7 +6,7 @@ temperature $y$ and the Damköhler number $D$ (Uppal, Ray & Poore 1974)
 $$\dot x = -x + D (1 - x) e^y, \qquad \dot y = -y + B D (1 - x) e^y - 3 y .$$
 
 The curve of steady states is an S: the reactor ignites at one fold and goes out at the other. The burning state is
-unstable, too, up to a Hopf point.
+unstable, too, up to a Hopf point. The oscillations that begin there become large within a narrow range of $D$.
 
 **Check:** with $4y = Bx$ at steady states, the folds have $x (1 - x) = 4/B$, and the Hopf point $Bx - 5 = x/(1 - x)$; here
 $B = 22$.

@@ -1,11 +1,11 @@
 r"""# A twisted ring: when a rod leaves the plane
 
 A straight rod is bent to a ring, and one end is turned before it is joined to the other one. The ring stays flat up to a
-certain twist, and then leaves its plane: everybody has seen it in a telephone cord or a rubber band. It is a *scene* of
-[open strips](../open-strips.md) whose ends are joined.
+certain twist, and then jumps out of its plane: the states that begin there exist at smaller twists, and are unstable. It is
+a *scene* of [open strips](../open-strips.md) whose ends are joined.
 
-At the critical twist two modes become unstable at once, since the buckle can sit anywhere along the ring; the `phases` hold
-it.
+At the critical twist two modes become unstable at once, since the buckle can sit anywhere along the ring. The `phases` hold
+it in its place; the index does not count the mode that is held.
 
 **Check:** the twist is $2\pi\sqrt3\, B/C$ (Michell 1889; Zajac 1962); here $C = 0.8\, B$.
 """

@@ -4,7 +4,7 @@ A ruler is clamped at one end, on edge, and carries a load at its tip. It cannot
 seen. At a critical load it twists and bends away sideways. Open strips are stated as a *scene*: what the strip is made of,
 how its ends are held, and which numbers are followed ([open strips](../open-strips.md)).
 
-The same scene takes clamps, hinges, rollers, weight, half twists, and dimensions in metres.
+Scenes also take clamps, hinges, rollers, weight, half twists, and dimensions in metres.
 
 **Check:** the load is $4.0126 \sqrt{B C}/L^2$ (Michell 1899; Prandtl 1899). The factor is the first zero of
 $J_{-1/4}(z/2)$; a flat rod has $C = 2B/(1 + \nu)$.

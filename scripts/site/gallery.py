@@ -2,7 +2,8 @@
 
     python scripts/site/gallery.py SCRIPT FOLDER    # run one script as the build of the site does
 
-Pictures are kept in .cache/gallery, under a name that depends on the script and on the packages; the rest is made again.
+The docstring of a script is its text: a title, and a paragraph that begins with **Check:** and says where the number comes from that
+the code asserts. The navigation in mkdocs.yml says to which field it belongs. Pictures are kept in .cache/gallery, under a name that depends on the script and on the packages; the rest is made again.
 """
 
 from __future__ import annotations
@@ -62,7 +63,10 @@ def result(name: str) -> Path:
         with tempfile.TemporaryDirectory() as elsewhere:  # where a script may write
             words = [sys.executable, __file__, str(script), str(folder)]
             done = subprocess.run(words, cwd=elsewhere, env=environment, capture_output=True, text=True)
-        assert done.returncode == 0, f"{script} failed: {done.stderr}"
+        if done.returncode:
+            from mkdocs.exceptions import PluginError
+
+            raise PluginError(f"{script.relative_to(ROOT)} failed: {done.stderr.strip()}")
     return folder
 
 

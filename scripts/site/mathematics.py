@@ -11,7 +11,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from math_core import LatexToMathML
+from math_core import LatexError, LatexToMathML
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
 #: The package that brings the font STIX Two Math (Open Font License), and the file in it.
@@ -35,9 +36,12 @@ def on_files(files: Any, config: Any) -> Any:
     return files
 
 
-def on_page_content(page_html: str, **_: Any) -> str:
+def on_page_content(page_html: str, page: Any, **_: Any) -> str:
     """Replace every formula of a page."""
-    return FORMULA.sub(_mathml, page_html)
+    try:
+        return FORMULA.sub(_mathml, page_html)
+    except LatexError as error:
+        raise PluginError(f"{page.file.src_uri}: a formula cannot be typeset: {error}") from error
 
 
 def _mathml(found: re.Match[str]) -> str:
