@@ -34,7 +34,7 @@ def switches(point: Point) -> bool:
     return point.label == "HB" or doubles(point)
 
 
-def switched(point: Point, control: MeshControl) -> tuple[PeriodicCollocation, Array, Array]:
+def switched(point: Point, control: MeshControl) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
     """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
 
     Raises
@@ -46,7 +46,8 @@ def switched(point: Point, control: MeshControl) -> tuple[PeriodicCollocation, A
     """
     if doubles(point):
         return doubled(point)
-    return from_hopf(point, usual_degree(len(point.system.problem.state_names), control.tolerance))
+    system: Any = point.system
+    return from_hopf(point, usual_degree(len(system.problem.state_names), control.tolerance))
 
 
 def from_hopf(point: Point, degree: int) -> tuple[CycleCollocation, Array, Array]:

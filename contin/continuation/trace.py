@@ -51,11 +51,13 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     """
     checks.instance("start", start, Point, "a Point")
     settings = settings_with(settings, options)
-    system, x = start.system, start.x
+    system: Any = start.system
+    x = start.x
     if isinstance(system, System) and forget_changed(system.problem):
         system = system.with_parameters({})
     if free is not None and checks.names("free", free) != system.free:
-        system, x = system_of(start, "start").with_free(free, x) if system is start.system else system.with_free(free, x)
+        system_of(start, "start")  # a curve in two parameters keeps its parameters
+        system, x = system.with_free(free, x)
     if branch is None:
         return follow_until_interrupted(system, x, settings)
     checks.whole("branch", branch, 0, 10)
