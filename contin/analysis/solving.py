@@ -20,7 +20,7 @@ from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import with_multipliers
 from contin.problems.variational import VariationalProblem
-from contin.results.point import Point, point_of, system_of
+from contin.results.point import Point, point_of, system_of, underlying
 from contin.stepping.newton import Corrected, Newton, correct
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
@@ -72,6 +72,7 @@ def solve(
     _check_others(problem, others)
     parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
+        guess = underlying(guess)
         parameters = {**guess.parameters, **parameters}
     needed = problem.free_size - 1
     if needed < 0:

@@ -12,7 +12,7 @@ from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.errors import ProblemError
 from contin.results.branch import Branch
-from contin.results.point import Point, system_of
+from contin.results.point import Point, system_of, underlying
 from contin.stepping.settings import Settings, settings_with
 
 
@@ -29,7 +29,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     settings : Settings, optional
         Or any of its fields by name.
     free : sequence of str, optional
-        Free parameters, if they shall differ from those of ``start``; the first is the primary one.
+        Free parameters, if they shall differ from those of ``start``; the first is the primary one. From a point of a curve in
+        two parameters they lead to the branch of solutions through it.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
         the opposite way.
@@ -49,6 +50,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     """
     checks.instance("start", start, Point, "a Point")
     settings = settings_with(settings, options)
+    start = start if free is None else underlying(start)
     system, x = start.system, start.x
     if free is not None and checks.names("free", free) != system.free:
         system, x = system_of(start, "start").with_free(free, x)
