@@ -23,7 +23,7 @@ from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import PERIOD, CycleProblem
 from contin.problems.statement import forget_changed, with_multipliers
 from contin.problems.variational import VariationalProblem
-from contin.results.point import Point, point_of, system_of
+from contin.results.point import Point, point_of, system_of, underlying
 from contin.stepping.newton import Corrected, Newton, approached, correct
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
@@ -81,6 +81,7 @@ def solve(
     forget_changed(problem)
     parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
+        guess = underlying(guess)
         parameters = {**guess.parameters, **parameters}
     held = _check_count(problem, free)
     options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))

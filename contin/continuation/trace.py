@@ -14,7 +14,7 @@ from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.problems.statement import forget_changed
 from contin.results.branch import Branch
-from contin.results.point import Point, system_of
+from contin.results.point import Point, underlying
 from contin.stepping.settings import Settings, settings_with
 
 
@@ -31,7 +31,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     settings : Settings, optional
         Or any of its fields by name.
     free : sequence of str, optional
-        Free parameters, if they shall differ from those of ``start``; the first is the primary one.
+        Free parameters, if they shall differ from those of ``start``; the first is the primary one. From a point of a curve in
+        two parameters they lead to the branch of solutions through it.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
         the opposite way.
@@ -51,12 +52,12 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     """
     checks.instance("start", start, Point, "a Point")
     settings = settings_with(settings, options)
+    start = start if free is None else underlying(start)
     system: Any = start.system
     x = start.x
     if isinstance(system, System) and forget_changed(system.problem):
         system = system.with_parameters({})
     if free is not None and checks.names("free", free) != system.free:
-        system_of(start, "start")  # a curve in two parameters keeps its parameters
         system, x = system.with_free(free, x)
     if branch is None:
         return follow_until_interrupted(system, x, settings)

@@ -82,7 +82,7 @@ def read_columns(path: str | Path) -> StoredColumns:
 
 def _columns(head: dict[str, Any], arrays: dict[str, Array]) -> StoredColumns:
     rows, places = head["points"], [head["names"].index(name) for name in head["free"]]
-    values = np.array([_parameters(row, arrays, number, places) for number, row in enumerate(rows)])
+    values = np.array([_parameters(head, row, arrays, number, places) for number, row in enumerate(rows)])
     columns = {"arclength": np.array([row["arclength"] for row in rows])}
     columns |= dict(zip(head["names"], values.T))
     columns |= {name: np.array([row["functionals"][name] for row in rows]) for name in rows[0]["functionals"]}
@@ -95,20 +95,26 @@ def _columns(head: dict[str, Any], arrays: dict[str, Array]) -> StoredColumns:
     )  # fmt: skip
 
 
-def _parameters(row: dict[str, Any], arrays: dict[str, Array], number: int, places: list[int]) -> Array:
+def _solution(head: dict[str, Any], arrays: dict[str, Array], number: int) -> Array:
+    """Return the unknowns of a point without those that a curve in two parameters adds."""
+    x: Array = arrays[f"x{number}"]
+    return x[: len(x) - head.get("further", 0)]
+
+
+def _parameters(head: dict[str, Any], row: dict[str, Any], arrays: dict[str, Array], number: int, places: list[int]) -> Array:
     """Return all parameters of a point, the free ones from the end of x."""
     at, count = row["system"], len(places)
     values = np.array(arrays[f"parameters{at}"], dtype=float)
     if count:
         sizes = arrays.get(f"scale_parameters{at}")
-        values[places] = arrays[f"x{number}"][-count:] * (1 if sizes is None else sizes[places])
+        values[places] = _solution(head, arrays, number)[-count:] * (1 if sizes is None else sizes[places])
     return values
 
 
 def _profile(head: dict[str, Any], row: dict[str, Any], arrays: dict[str, Array], number: int) -> tuple[Array, Array]:
     """Return the nodes and the states of a point."""
     at, count = row["system"], len(head["states"])
-    x = arrays[f"x{number}"]
+    x = _solution(head, arrays, number)
     states = x[: len(x) - len(head["free"])].reshape(-1, count)
     if f"scale_states{at}" in arrays:
         states = states * arrays[f"scale_states{at}"]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from contin import checks
 from contin.arrays import Array
@@ -38,6 +41,16 @@ def system_of(point: Point, what: str) -> System:
     if not isinstance(point.system, System):
         raise ProblemError(f"{what}: must not be a point of a curve in two parameters")
     return point.system
+
+
+def underlying(point: Point) -> Point:
+    """Return the solution itself of a point of a curve in two parameters; other points as they are."""
+    if not isinstance(point.system, Extended):
+        return point
+    base = point.system.base
+    nowhere = np.full(base.size, np.nan)
+    below = dataclasses.replace(point, label="", name="", x=point.x[: base.size], tangent=nowhere, system=base, details=None)
+    return underlying(below)
 
 
 @dataclass(frozen=True, eq=False)

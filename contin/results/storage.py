@@ -12,11 +12,18 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.curves.branch_point_curve import BranchPointCurve
+from contin.curves.critical_curve import CriticalCurve
+from contin.curves.cycle_curves import DoublingCurve, TorusCurve
+from contin.curves.extended import Extended
+from contin.curves.fold_curve import FoldCurve
+from contin.curves.hopf_curve import HopfCurve
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
 from contin.discretization.kinds import algebraic, discretized
+from contin.discretization.protocol import Discretization
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
 from contin.files import write_whole
@@ -29,14 +36,18 @@ from contin.stepping.state import Stop
 
 Result = TypeVar("Result")
 
-#: First entry of every file; another number where an older version could not read it.
-_FORMAT = "contin branch 1"
+#: First entry of every file, and of a curve in two parameters: another number where an older version could not read it.
+_FORMAT, _OF_CURVE = "contin branch 1", "contin branch 2"
+#: The extended systems of curves, by the label of their points.
+_CURVES: dict[str, type[Extended]] = {
+    kind.kind: kind for kind in (FoldCurve, BranchPointCurve, HopfCurve, DoublingCurve, TorusCurve)
+}
 #: Arrays of a branch point that are stored besides its tangents.
 _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 
 
 def save(branch: Branch, path: str | Path) -> None:
-    """Write a branch to a file: all its points, with their solutions.
+    """Write a branch, or a curve in two parameters, to a file: all its points, with their solutions.
 
     The problem is code and is not stored: `load` takes it again. Details of special points are kept where they are those of a
     branch point or a dictionary of numbers.
@@ -46,7 +57,7 @@ def save(branch: Branch, path: str | Path) -> None:
     OSError
         The file cannot be written; the one that was there is left as it was.
     ProblemError
-        Points of an extended system (`contin.curve`), which cannot start other runs.
+        It has no points, or points of a kind that is not stored.
 
     Examples
     --------
@@ -62,20 +73,14 @@ def save(branch: Branch, path: str | Path) -> None:
     checks.instance("branch", branch, Branch, "a Branch")
     if not branch.points:
         raise ProblemError("branch: has no points")
-    systems: list[Collocation | Algebraic] = []
+    systems: list[Discretization] = []
     rows: list[dict[str, Any]] = []
     arrays: dict[str, Any] = {}
     for number, point in enumerate(branch.points):
-        if not isinstance(point.system, (Collocation, Algebraic)):
-            raise ProblemError("points of a curve in two parameters are not stored; keep their columns")
         at = next((i for i, system in enumerate(systems) if system is point.system), len(systems))
         if at == len(systems):
             systems.append(point.system)
-            arrays[f"parameters{at}"] = point.system.parameters
-            if isinstance(point.system, Collocation):
-                arrays[f"mesh{at}"] = point.system.mesh
-            if point.system.scales is not None:
-                arrays |= {f"scale_{name}{at}": sizes for name, sizes in point.system.scales.arrays().items()}
+            arrays |= _arrays_of(point.system, at)
         arrays[f"x{number}"], arrays[f"tangent{number}"] = point.x, point.tangent
         if isinstance(point.details, BranchPoint):
             for name in _OF_BRANCH_POINT:
@@ -86,11 +91,14 @@ def save(branch: Branch, path: str | Path) -> None:
             arrays[f"tangents{number}"] = np.array(point.details.tangents)
         rows.append(_row(point, at))
     first = branch.points[0].system
+    curves = [[system.kind, getattr(system, "kappa_size", 1.0)] for system in systems if isinstance(system, Extended)]
+    further = first.size - first.base.size if isinstance(first, Extended) else 0  # unknowns that a curve adds
     stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
     head = {
-        "format": _FORMAT, "points": rows, "stop": stop, "free": first.free, "degrees": [s.degree for s in systems],
-        "states": first.problem.states, "names": list(first.problem.parameters), "symmetry": _symmetry(first.problem),
-    }  # fmt: skip
+        "format": _OF_CURVE if curves else _FORMAT, "points": rows, "stop": stop, "free": first.free,
+        "degrees": [s.degree for s in systems], "states": first.problem.states, "names": list(first.problem.parameters),
+        "symmetry": _symmetry(first.problem),
+    } | ({"curves": curves, "further": further} if curves else {})  # fmt: skip
     image = io.BytesIO()
     np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
     write_whole(path, image.getvalue())
@@ -111,6 +119,27 @@ def _row(point: Point, at: int) -> dict[str, Any]:
         "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
         "details": _numbers(point.details),
     }  # fmt: skip
+
+
+def _arrays_of(system: Discretization, number: int) -> dict[str, Array]:
+    """Return what is stored of a discretized problem.
+
+    Raises
+    ------
+    ProblemError
+        It is of a kind that is not stored.
+    """
+    base = system.base if isinstance(system, Extended) else system
+    if isinstance(system, Extended) and system.kind not in _CURVES:
+        raise ProblemError("branch: points of this kind of curve are not stored; keep their columns")
+    if not isinstance(base, (Collocation, Algebraic)):
+        raise ProblemError(f"branch: points of a {type(base).__name__} are not stored; keep their columns")
+    arrays = {f"parameters{number}": base.parameters}
+    if isinstance(base, Collocation):
+        arrays[f"mesh{number}"] = base.mesh
+    if base.scales is not None:
+        arrays |= {f"scale_{name}{number}": sizes for name, sizes in base.scales.arrays().items()}
+    return arrays
 
 
 def _numbers(details: Any) -> dict[str, float] | None:
@@ -171,7 +200,7 @@ def contents(path: str | Path, make: Callable[[dict[str, Any], dict[str, Array]]
     try:
         with np.load(path, allow_pickle=False) as file:
             head = json.loads(file["head"].tobytes())
-            if head["format"] != _FORMAT:
+            if head["format"] not in (_FORMAT, _OF_CURVE):
                 raise KeyError("format")
             return make(head, {name: file[name] for name in file.files})
     except ProblemError:
@@ -181,6 +210,17 @@ def contents(path: str | Path, make: Callable[[dict[str, Any], dict[str, Array]]
 
 
 def _system(
+    problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, Any], arrays: dict[str, Array], i: int
+) -> Discretization:
+    base = _base(problem, head, arrays, i)
+    if not head.get("curves"):
+        return base
+    kind, size = head["curves"][i]
+    curve = _CURVES[kind]
+    return curve(base, None, size) if issubclass(curve, CriticalCurve) else curve(base, None)
+
+
+def _base(
     problem: BoundaryValueProblem | AlgebraicProblem, head: dict[str, Any], arrays: dict[str, Array], i: int
 ) -> Collocation | Algebraic:
     values = dict(zip(head["names"], arrays[f"parameters{i}"]))
@@ -192,9 +232,17 @@ def _system(
     return discretized(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values, scales)
 
 
-def _point(row: dict[str, Any], system: Collocation | Algebraic, arrays: dict[str, Array], number: int) -> Point:
+def _with_reference(system: Discretization, x: Array) -> Discretization:
+    """Return a discretized problem with a stored point as the reference, if it has one."""
+    if isinstance(system, Extended):
+        base: Any = _with_reference(system.base, x[: system.base.size])
+        return system if base is system.base else system.on(base)
+    return system.with_reference(x) if isinstance(system, Collocation) else system
+
+
+def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array], number: int) -> Point:
     x = arrays[f"x{number}"]
-    system = system.with_reference(x) if isinstance(system, Collocation) else system
+    system = _with_reference(system, x)
     details: BranchPoint | MultiplePoint | dict[str, float] | None = row.get("details")
     if row["imperfection"] is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}

@@ -272,3 +272,41 @@ def test_a_kind_needs_a_point_of_a_curve():
     with pytest.raises(ProblemError, match="kind: is for points of codimension two of a curve"):
         contin.curve(line.labelled("HB")[0], "n", kind="LP")
     assert np.isfinite(line.labelled("HB")[0]["m"])
+
+
+# --- stored curves --------------------------------------------------------------------------------------------------
+
+
+def test_a_stored_curve_goes_on(tmp_path):
+    """The Hopf points m = n**2 of Takens's equations: the curve, another one from its end, and a branch of equilibria."""
+    problem = AlgebraicProblem(takens, ["x", "y"], {"m": 4.0, "n": -1.0})
+    line = contin.trace(contin.solve(problem, [2, 0]), free=["m"], direction=-1, limits={"m": (0.1, 5)})
+    found = contin.curve(line.labelled("HB")[0], "n", limits={"n": (-3, 3)})
+    contin.save(found, tmp_path / "hopf.npz")
+    loaded = contin.load(problem, tmp_path / "hopf.npz")
+    assert [(point.label, point["m"], point["frequency"]) for point in loaded] == [
+        (point.label, point["m"], point["frequency"]) for point in found
+    ]
+    middle = next(point for point in loaded if -0.9 < point["n"] < -0.1)
+    on = contin.curve(middle, direction=-1, limits={"n": (-2, 3)})
+    assert (on.points[-1]["m"], on.points[-1]["n"]) == pytest.approx((4, -2), abs=1e-10)
+    folds = contin.curve(loaded.points[-1], kind="LP", limits={"n": (-1, 1)})
+    assert labels(folds) == ["BT", "EP"] and max(abs(point["m"]) for point in folds) < 1e-10
+    branch = contin.trace(middle, free=["m"], limits={"m": (-1, 5)})
+    assert branch.points[-1]["m"] == pytest.approx(5, abs=1e-12) and branch.points[0]["n"] == middle["n"]
+    assert contin.solve(problem, middle)["m"] == middle["m"]
+    columns = contin.read_columns(tmp_path / "hopf.npz")
+    assert columns.columns["m"] == pytest.approx(columns.columns["n"] ** 2, abs=1e-11)
+    assert columns.profiles[0][1].shape == (1, 2)
+
+
+def test_a_stored_curve_of_cycles_goes_on(tmp_path):
+    """The folds at b**2 + 4 mu = 0 that leave the generalized Hopf point."""
+    found = contin.curve(bautin(), kind="LP", limits={"b": (-1, 0.3)})
+    contin.save(found, tmp_path / "folds.npz")
+    loaded = contin.load(contin.CycleProblem.of(bautin().system.base.problem), tmp_path / "folds.npz")
+    on = contin.curve(loaded.points[-2], limits={"b": (0, 0.6)})
+    assert on.points[-1]["b"] == pytest.approx(0.6, abs=1e-12)
+    assert max(abs(point["b"] ** 2 + 4 * point["mu"]) for point in on) < 1e-10
+    beside = contin.trace(loaded.points[-2], free=["mu"], direction=1, limits={"mu": (-1, 0.2), "max_x": (0, 2)})
+    assert beside.points[-1]["b"] == loaded.points[-2]["b"]
