@@ -3,6 +3,7 @@
 import importlib.util
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib
 import numpy as np
@@ -89,3 +90,10 @@ def test_formulas_become_mathml():
     made = mathematics.on_page_content(page, page=None)
     assert '<mrow><mi>u</mi><mo lspace="0" rspace="0">″</mo></mrow>' in made and "arithmatex" not in made
     assert "</math>.</span>" in made and '<div class="formula"><math display="block"><mfrac>' in made
+
+
+def test_a_formula_that_cannot_be_typeset_stops_the_build():
+    pytest.importorskip("math_core")
+    with pytest.raises(Exception, match="cycles.md: a formula cannot be typeset"):
+        page = SimpleNamespace(file=SimpleNamespace(src_uri="cycles.md"))
+        module("mathematics").on_page_content('<span class="arithmatex">\\(\\nosuch\\)</span>', page=page)

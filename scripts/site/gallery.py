@@ -2,8 +2,9 @@
 
     python scripts/site/gallery.py SCRIPT FOLDER    # run one script as the build of the site does
 
-The docstring of a script is its text: a title, and a paragraph that begins with **Check:** and says where the number comes from that
-the code asserts. The navigation in mkdocs.yml says to which field it belongs. Pictures are kept in .cache/gallery, under a name that depends on the script and on the packages; the rest is made again.
+The docstring of a script is its text: a title, and a paragraph that begins with **Check:** and says where the number comes
+from that the code asserts. The navigation in mkdocs.yml says to which field it belongs. Pictures are kept in .cache/gallery,
+under a name that depends on the script and on the packages; the rest is made again.
 """
 
 from __future__ import annotations
