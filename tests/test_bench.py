@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
 
-from benchmarks import cost, fold, many, report, startup  # noqa: E402
+from benchmarks import cost, defaults, fold, many, report, startup  # noqa: E402
 from peers import auto_07p, scipy_bvp  # noqa: E402
 
 BRANCH_FILE = """\
@@ -107,3 +107,14 @@ def test_the_table_of_many_branches():
     text = many.table(results)
     assert "| one process | 8.0 s | 12.5 |" in text and "| two processes | 5.0 s | 20.0 |" in text and "60 ms a branch" in text
     assert "Dask" not in text and "| Dask cluster of two workers | 4.0 s | 25.0 |" in many.table(results | {"cluster": 4.0})
+
+
+def test_the_best_setting_is_the_fastest_that_is_accurate():
+    runs = {
+        (None, 1e-12): [{"seconds": 3.0, "error": 0.0}],
+        (6, 1e-12): [{"seconds": 2.0, "error": 1e-15}],
+        (7, 1e-8): [{"seconds": 1.0, "error": 1e-10}, {"seconds": 1.4, "error": 1e-10}],
+        (5, 1e-8): [{"seconds": 0.1, "error": 1e-8}],
+    }
+    times, best, equal = defaults._best(runs)
+    assert times[7, 1e-8] == 1.2 and best == (7, 1e-8) and equal == (6, 1e-12)
