@@ -227,8 +227,10 @@ class OpenStrip:
     def _with_multipliers(self, guess: Guess) -> Guess:
         return lambda t: [*guess(t), *[0] * self.conditions_inside]
 
-    def first_point(self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=6, **options) -> Point:
+    def first_point(self, guess=None, values: Mapping[str, float] | None = None, intervals=10, degree=None, **options) -> Point:
         """Return the state near a guess (the natural state without one), as `contin.solve` does.
+
+        The degree is 6 by default, or that of a guess that is a point.
 
         Raises
         ------
@@ -237,6 +239,8 @@ class OpenStrip:
         """
         if guess is None:
             guess = self._natural_guess()
+        if degree is None and not isinstance(guess, Point):
+            degree = 6
         options = {"intervals": intervals, "degree": degree, **options}
         try:
             point = solve(self.problem, guess, values, **options)

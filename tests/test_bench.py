@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
 
-from benchmarks import cost, cycles, fold, many, report, startup  # noqa: E402
+from benchmarks import cost, cycles, defaults, fold, many, report, startup  # noqa: E402
 from peers import auto_07p, scipy_bvp  # noqa: E402
 
 BRANCH_FILE = """\
@@ -117,3 +117,14 @@ def test_ratios_of_cycles():
     assert cycles.ratio(results) == 0.5
     assert cycles.table(results).endswith("Ratio for a branch, AUTO-07p / contin: 2.00 (lorenz).")
     assert cycles.ratio({"results": {"alone": {"contin": row}}}) is None
+
+
+def test_the_best_setting_is_the_fastest_that_is_accurate():
+    runs = {
+        (None, 1e-12): [{"seconds": 3.0, "error": 0.0}],
+        (6, 1e-12): [{"seconds": 2.0, "error": 1e-15}],
+        (7, 1e-8): [{"seconds": 1.0, "error": 1e-10}, {"seconds": 1.4, "error": 1e-10}],
+        (5, 1e-8): [{"seconds": 0.1, "error": 1e-8}],
+    }
+    times, best, equal = defaults._best(runs)
+    assert times[7, 1e-8] == 1.2 and best == (7, 1e-8) and equal == (6, 1e-12)
