@@ -14,7 +14,7 @@ RANDOM = np.random.default_rng(4)
 
 def bordered(n, borders):
     """Return a matrix with few entries, except for some last rows and columns."""
-    matrix = sparse.random_array((n, n), density=4 / n, rng=RANDOM).toarray() + np.diag(RANDOM.standard_normal(n))
+    matrix = np.where(RANDOM.random((n, n)) < 4 / n, RANDOM.random((n, n)), 0.0) + np.diag(RANDOM.standard_normal(n))
     if borders:
         matrix[-borders:] = RANDOM.standard_normal((borders, n))
         matrix[:, -borders:] = RANDOM.standard_normal((n, borders))
