@@ -30,9 +30,12 @@ from contin.stepping.trial import TestFunction, Trial, sign_changed
 
 #: Into how many parts a step is divided to look inside it, on the cubic.
 _PARTS = 4
-#: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens, ...
-_NEAR = 1.0
-#: ... or nearer than so many times its change over the step.
+#: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens: a
+#: little less than the distance pi of 1 from -1. A pair can reach -1 and come back, and be at the ends where it was nearly:
+#: with 0.5, and 1.5 changes, two period doublings of Mathieu's equation in one step are passed. With both ten times larger
+#: nearly all steps are looked at inside, and multipliers are computed up to three times as often.
+_NEAR = 3.0
+#: It is looked at inside, too, where a logarithm is nearer than so many times its change over the step.
 _CHANGES = 3.0
 #: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
 #: to this part. Ten times smaller, two period doublings that nearly meet are passed.
