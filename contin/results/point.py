@@ -61,7 +61,8 @@ class Point:
     ----------
     label : str
         AUTO's two letters: EP end, LP fold (limit point), BP branch point, HB Hopf point, PD period doubling, TR torus
-        bifurcation, UZ user zero, MX failed; "" for a regular point. Those of `contin.curve` are listed there.
+        bifurcation, UZ user zero, MX failed; "" for a regular point. EX, an extremum of a column, has none in AUTO. Those of
+        `contin.curve` are listed there.
     name : str
         The test function's name, "" for a regular point.
     parameters, functionals : mapping of str to float
@@ -78,7 +79,8 @@ class Point:
         Estimated error of the free parameters, where it was asked for: of the discretization or, without a mesh, of the
         location alone. NaN where the point was not found again, and at points of higher codimension.
     details : object
-        What the location found besides: the `BranchPoint` of a BP; a dictionary with frequency and normal form of an HB.
+        What the location found besides: the `BranchPoint` of a BP; a dictionary with frequency and normal form of an HB, with
+        least and largest curvature of an EX.
     index : int or None
         Of a state of a `VariationalProblem`: the number of independent ways to lower its energy; 0 is a minimum. None for other
         problems, and where Legendre's condition fails.

@@ -5,7 +5,6 @@ import pytest
 from scipy import sparse
 
 from contin import AlgebraicProblem, ProblemError, curve, solve, trace
-from contin.errors import InterpretedWarning
 
 SIZE = 30
 
@@ -17,14 +16,14 @@ def bratu(u, p, out):
     out[:-1] += u[1:]
 
 
-CALLS, MIDDLE = [], {"entry": -2.0}
+class Counted:
+    """The same as a method, which is not compiled."""
 
+    calls = 0
 
-def in_python(u, p, out):
-    """The same with a dictionary and a list, which are not compiled."""
-    CALLS.append(1)
-    bratu(u, p, out)
-    out += (2.0 + MIDDLE["entry"]) * u
+    def residual(self, u, p, out):
+        self.calls += 1
+        bratu(u, p, out)
 
 
 def derivatives(u, p):
@@ -64,17 +63,21 @@ def test_the_fold_is_the_same(n):
     assert fold(n, jacobian=derivatives).system.is_sparse == (n == 250)
 
 
+@pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
 def test_a_function_in_python_is_called_once_for_each_colour_or_not_at_all():
-    """Three colours, one parameter; more calls compare the given derivatives and the complex step with differences, once."""
+    """For the values, the three colours of the pattern, and the parameter; the first calls compare with differences."""
     counts = {}
     for name, given in (("pattern", {"pattern": tridiagonal(150)}), ("jacobian", {"jacobian": derivatives})):
-        with pytest.warns(InterpretedWarning):
-            problem = AlgebraicProblem(in_python, 150, {"lam": 1.0}, count=150, dynamics=False, **given)
-            point = solve(problem, [0.0] * 150)
-        CALLS.clear()
-        point.system.linearize(point.x, np.eye(point.system.size)[point.system.equations :])
-        counts[name] = len(CALLS)
-    assert counts == {"pattern": 4, "jacobian": 1}
+        model = Counted()
+        problem = AlgebraicProblem(model.residual, 150, {"lam": 1.0}, count=150, dynamics=False, **given)
+        point = solve(problem, [0.0] * 150)
+        system, x = point.system.with_free(["lam"], point.x)
+        border = np.eye(system.size)[-1:]
+        system.linearize(x, border)
+        model.calls = 0
+        system.linearize(x, border)
+        counts[name] = model.calls
+    assert counts == {"pattern": 1 + 3 + 1, "jacobian": 1 + 1}
 
 
 def test_named_states_scales_and_a_curve_of_folds():

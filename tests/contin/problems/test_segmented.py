@@ -120,6 +120,16 @@ def test_segments_with_different_numbers_of_states_and_begins_of_their_own():
     assert (profile.s[-1], profile["x"][-1], found["area"]) == pytest.approx((2, 1, 1), abs=1e-12)
 
 
+def test_pictures_over_the_coordinates_of_the_segments():
+    pytest.importorskip("matplotlib").use("Agg")
+    start = solve(cut_bratu(), [0, 0, 0, 0], {"lam": 1.0})
+    portrait, series = start.plot()
+    ends = [(line.get_xdata()[0], line.get_xdata()[-1]) for line in series.lines if len(line.get_xdata()) > 2]
+    assert sorted(set(ends)) == [(0.0, 0.3), (0.3, 1.0)]
+    assert [text.get_text() for text in series.get_legend().get_texts()] == ["u", "v"]
+    assert len(portrait.lines) == 2 and start.plot("series", states=["v", "u"]).lines
+
+
 def test_pickling():
     names = ["u", "v"]
     problem = SegmentedProblem(
