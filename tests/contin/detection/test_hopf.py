@@ -139,3 +139,20 @@ def test_hopf_points_of_many_unknowns():
     assert rest.system.is_sparse or branch.points[0].system.is_sparse
     assert np.allclose([point["length"] for point in found], exact, rtol=1e-10)
     assert all(point.normal_form < 0 for point in found)
+
+
+def test_a_large_problem_may_start_at_zero():
+    """u'' + lam (u - u^3) = 0 on 200 places: a branch point at an eigenvalue of the differences."""
+    n = 200
+
+    def heated(u, p, out):
+        for i in range(n):
+            left = u[i - 1] if i > 0 else 0 * u[i]
+            right = u[i + 1] if i < n - 1 else 0 * u[i]
+            out[i] = (left - 2 * u[i] + right) * (n + 1) ** 2 / math.pi**2 + p[0] * (u[i] - u[i] ** 3)
+
+    problem = AlgebraicProblem(heated, n, {"lam": 0.5})
+    branch = trace(solve(problem, np.zeros(n)), free=["lam"], limits={"lam": (0.5, 2)})
+    exact = 4 * (n + 1) ** 2 / math.pi**2 * math.sin(math.pi / 2 / (n + 1)) ** 2
+    assert [point.label for point in branch if point.label] == ["EP", "BP", "EP"]
+    assert abs(branch.labelled("BP")[0]["lam"] - exact) < 1e-10
