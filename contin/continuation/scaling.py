@@ -145,7 +145,10 @@ def _amplitude(system: System, x: Array, sizes: Array) -> float:
 
     One where the functions are linear. ``sizes`` are those of states and free parameters.
     """
-    count, entries = len(sizes) - len(system.free), system.couplings(x)[0] * sizes
+    entries = system.couplings(x)[0]
+    if not entries.size:  # large sparse problems have none
+        return 1.0
+    count, entries = len(sizes) - len(system.free), entries * sizes
     largest = entries.max(axis=1)
     powers = 10.0 ** np.arange(-_DECADES, _DECADES + 1)
     for factor in powers:

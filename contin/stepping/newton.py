@@ -174,32 +174,41 @@ def approached(system: Equations, guess: Sequence[float] | Array) -> Array:
     ConvergenceError
         The damping becomes too strong, or the corrections do not become small.
     """
-    x = np.array(guess, dtype=float)
-    with np.errstate(all="ignore"):
-        for _ in range(_MOST_DAMPED):
-            residual, factors = system.linearize(x)
-            update = factors.solve(residual)
-            size = float(np.max(np.abs(update) / (1 + np.abs(x)), initial=0.0))
-            if size < _NEAR:
-                return x
-            part = 1.0
-            while True:
-                there = x - part * update
-                following = factors.solve(system.residual(there))
-                if np.linalg.norm(following) <= (1 - _ENOUGH * part) * np.linalg.norm(update):
+    for enough in _ENOUGH:
+        x = np.array(guess, dtype=float)
+        with np.errstate(all="ignore"):
+            for _ in range(_MOST_DAMPED):
+                update, factors = _correction(system, x)
+                if np.max(np.abs(update) / (1 + np.abs(x)), initial=0.0) < _NEAR:
+                    return x
+                part = _part_taken(system, x, update, factors, enough)
+                if part < _LEAST_PART:
                     break
-                part /= 2
-                if not (np.isfinite(size) and part > _LEAST_PART):
-                    raise ConvergenceError("damped Newton steps from this guess do not come nearer to a solution")
-            x = there
-    raise ConvergenceError(f"Newton did not converge in {_MOST_DAMPED} damped steps")
+                x -= part * update
+    raise ConvergenceError("damped Newton steps from this guess do not come nearer to a solution")
 
 
-#: A step must make the next correction smaller by this part, times the part of the correction that it takes, as in SciPy's
-#: solve_bvp. Half of a step, which theory suggests, loses the localized pattern of the Swift-Hohenberg equation.
-_ENOUGH = 0.2
+def _correction(system: Equations, x: Array) -> tuple[Array, Factors]:
+    residual, factors = system.linearize(x)
+    return factors.solve(residual), factors
+
+
+def _part_taken(system: Equations, x: Array, update: Array, factors: Factors, enough: float) -> float:
+    """Return the part of a correction that makes the next one smaller; 0 where there is none."""
+    part, size = 1.0, np.linalg.norm(update)
+    while part >= _LEAST_PART and np.isfinite(size):
+        following = factors.solve(system.residual(x - part * update))
+        if np.linalg.norm(following) <= (1 - enough * part) * size:
+            return part
+        part /= 2
+    return 0.0
+
+
+#: A step must make the next correction smaller by this part, times the part of the correction that it takes: first as theory
+#: suggests, then about as SciPy's solve_bvp asks. A hanging cable needs the first, a localized pattern the second.
+_ENOUGH = (0.5, 0.2)
 #: Damped steps end where corrections, relative to 1 + |x|, are so small: Newton's method takes over. They end, too, after so
-#: many steps, and with so small a part of the correction: SciPy's solve_bvp gives up at about the same part.
+#: many steps, and with so small a part of the correction.
 _NEAR, _MOST_DAMPED, _LEAST_PART = 1e-2, 100, 1e-4
 
 

@@ -1,5 +1,7 @@
 """Hopf points of equilibria whose eigenvalues are known as functions of the parameter."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -112,3 +114,45 @@ def test_one_pair_comes_as_another_goes():
     )  # fmt: skip
     points = trace(solve(problem, [0.0] * 4), free=["mu"], limits={"mu": (-1, 1)}).labelled("HB")
     assert [point["mu"] for point in points] == pytest.approx([0, 0.05], abs=1e-12)
+
+
+def brusselator_on_a_line(u, p, out):
+    """X' and Y' at 100 places of a line of length p[0], second differences, the equilibrium held at both ends."""
+    n, a, b = 100, 2.0, 5.45
+    per_length = ((n + 1) / p[0]) ** 2
+    for i in range(n):
+        x, y = u[i], u[n + i]
+        left = (u[i - 1], u[n + i - 1]) if i > 0 else (a + 0 * x, b / a + 0 * y)
+        right = (u[i + 1], u[n + i + 1]) if i < n - 1 else (a + 0 * x, b / a + 0 * y)
+        out[i] = 0.008 * per_length * (left[0] - 2 * x + right[0]) + a - (b + 1) * x + x * x * y
+        out[n + i] = 0.004 * per_length * (left[1] - 2 * y + right[1]) + b * x - x * x * y
+
+
+def test_hopf_points_of_many_unknowns():
+    """AUTO's demo brf on 100 places. Mode k crosses where (Dx + Dy) mu = B - 1 - A^2, mu its eigenvalue of the differences."""
+    n = 100
+    problem = AlgebraicProblem(brusselator_on_a_line, 2 * n, {"length": 0.3})
+    rest = solve(problem, np.append(np.full(n, 2.0), np.full(n, 5.45 / 2)))
+    branch = trace(rest, free=["length"], limits={"length": (0.3, 1.2)})
+    exact = [2 * (n + 1) * math.sin(k * math.pi / 2 / (n + 1)) * math.sqrt(0.012 / 0.45) for k in (1, 2)]
+    found = branch.labelled("HB")
+    assert rest.system.is_sparse or branch.points[0].system.is_sparse
+    assert np.allclose([point["length"] for point in found], exact, rtol=1e-10)
+    assert all(point.normal_form < 0 for point in found)
+
+
+def test_a_large_problem_may_start_at_zero():
+    """u'' + lam (u - u^3) = 0 on 200 places: a branch point at an eigenvalue of the differences."""
+    n = 200
+
+    def heated(u, p, out):
+        for i in range(n):
+            left = u[i - 1] if i > 0 else 0 * u[i]
+            right = u[i + 1] if i < n - 1 else 0 * u[i]
+            out[i] = (left - 2 * u[i] + right) * (n + 1) ** 2 / math.pi**2 + p[0] * (u[i] - u[i] ** 3)
+
+    problem = AlgebraicProblem(heated, n, {"lam": 0.5})
+    branch = trace(solve(problem, np.zeros(n)), free=["lam"], limits={"lam": (0.5, 2)})
+    exact = 4 * (n + 1) ** 2 / math.pi**2 * math.sin(math.pi / 2 / (n + 1)) ** 2
+    assert [point.label for point in branch if point.label] == ["EP", "BP", "EP"]
+    assert abs(branch.labelled("BP")[0]["lam"] - exact) < 1e-10
