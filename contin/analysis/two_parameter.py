@@ -15,7 +15,8 @@ from contin.analysis.fold_curve import FoldCurve
 from contin.analysis.hopf_curve import HopfCurve
 from contin.arrays import Array
 from contin.continuation.cycle_starts import doubled, frequency_of, start_at
-from contin.continuation.run import follow
+from contin.continuation.progress import Progress, follow_until_interrupted
+from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.lyapunov import critical_pair
 from contin.discretization.algebraic import Algebraic
@@ -28,7 +29,7 @@ from contin.stepping.settings import Settings, settings_with
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          **options: Any) -> Branch:  # fmt: skip
+          progress: bool | None = None, **options: Any) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters.
 
     Parameters
@@ -42,6 +43,8 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         Or any of its fields by name. Folds of the curve are with respect to ``primary`` (the second parameter by default).
     free : pair of str, optional
         Both parameters, in place of ``second``: the first takes the place of the one in which the start was found.
+    progress : bool, optional
+        As in `trace`.
 
     Returns
     -------
@@ -76,12 +79,12 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     names = _free_parameters(start, system, second, free)
     options.setdefault("primary", names[-1])
     options.setdefault("branch_points", False)
-    settings = settings_with(settings, options)
+    settings, shown = settings_with(settings, options), Progress(progress)
     base, x = system.with_free(names, start.x)
     for kind in _KINDS:
         found = kind(start, base, x)
         if found is not None:
-            return follow(*found, settings)
+            return follow_until_interrupted(Continuation(*found, settings), shown)
     raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be one of {_STARTS}")
 
 
