@@ -12,6 +12,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.continuation.cycle_starts import switched, switches
+from contin.continuation.progress import Progress
 from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
@@ -165,8 +166,8 @@ def _values(point: Point) -> dict[str, float]:
 class _Explorer:
     """The search of `diagram`: branches and junctions so far."""
 
-    def __init__(self, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float) -> None:
-        self.settings, self.tolerance = settings, tolerance
+    def __init__(self, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float, progress: Progress) -> None:
+        self.settings, self.tolerance, self.progress = settings, tolerance, progress
         self.symmetries = [lambda t, u: u, *symmetries]
         self.result = Diagram()
 
@@ -220,7 +221,7 @@ class _Explorer:
         """Follow one run to its end, or to a known branch. Half-branches that it passes at junctions count as taken."""
         number, branch = len(self.result.branches), Branch()
         self.result.branches.append(branch)
-        for place, point in enumerate(run):
+        for place, point in enumerate(self.progress.watch(run, f"branch {number + 1}, depth {depth}: ")):
             branch.points.append(point)
             if place == 0 and origin is not None:
                 origin.also.append(point)
@@ -339,7 +340,7 @@ def _seen(system: Any, x: Array) -> Array:
 
 def diagram(
     start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
-    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, **options: Any,
+    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, progress: bool | None = None, **options: Any,
 ) -> Diagram:  # fmt: skip
     """Follow every branch that can be reached from a solution, to a given depth.
 
@@ -361,6 +362,8 @@ def diagram(
         Those of a `VariationalProblem` map the states x, without multipliers; the ones that it declares count, too.
     tolerance : float
         Relative distance below which two branch points are one.
+    progress : bool, optional
+        As in `trace`.
 
     Returns
     -------
@@ -387,7 +390,7 @@ def diagram(
         (start.system, start.x) if free is None else system_of(start, "start").with_free(checks.names("free", free), start.x)
     )
     _check_columns(system.problem, settings)
-    return _Explorer(settings, symmetries, tolerance).run(system, x, depth)
+    return _Explorer(settings, symmetries, tolerance, Progress(progress)).run(system, x, depth)
 
 
 def _check_columns(problem: Any, settings: Settings) -> None:

@@ -13,7 +13,8 @@ from contin import checks
 from contin.analysis.codimension_two import leaving
 from contin.arrays import Array
 from contin.continuation.cycle_starts import doubles, frequency_of
-from contin.continuation.run import follow
+from contin.continuation.progress import Progress, follow_until_interrupted
+from contin.continuation.run import Continuation
 from contin.curves.branch_point_curve import BranchPointCurve
 from contin.curves.cycle_curves import DoublingCurve, TorusCurve
 from contin.curves.event_curve import EventCurve
@@ -35,7 +36,8 @@ from contin.stepping.trial import TestFunction
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          event: TestFunction | None = None, kind: str | None = None, branch: int = 0, **options: Any) -> Branch:  # fmt: skip
+          event: TestFunction | None = None, kind: str | None = None, branch: int = 0, progress: bool | None = None,
+          **options: Any) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
     From a point of such a curve, without a further parameter, it goes on; at points of codimension two of equilibria (labels
@@ -64,6 +66,8 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         and of homoclinic orbits lies a little beside.
     branch : int
         With ``kind="TR"`` at a double Hopf point: 0 for the cycles of the pair on whose curve it was found, 1 for the other.
+    progress : bool, optional
+        As in `trace`.
 
     Returns
     -------
@@ -95,9 +99,10 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     checks.instance("kind", kind, (str, type(None)), "a name")
     checks.whole("branch", branch, 0, 1)
     options.setdefault("branch_points", False)
+    shown = Progress(progress)
     if isinstance(start.system, Extended) and second is None and free is None and event is None:
         options.setdefault("primary", start.system.free[-1])
-        return _from_curve(start, kind, branch, settings_with(settings, options))
+        return _from_curve(start, kind, branch, settings_with(settings, options), shown)
     if kind is not None:
         raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
     names = _free_parameters(start, second, free)
@@ -106,16 +111,16 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     found = _event(start, base, x, event) if event is not None else _first_of_curve(start, base, x)
     if found is None:
         raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be {_STARTS}")
-    return follow(*found, settings_with(settings, options))
+    return follow_until_interrupted(Continuation(*found, settings_with(settings, options)), shown)
 
 
-def _from_curve(start: Point, kind: str | None, branch: int, settings: Settings) -> Branch:
+def _from_curve(start: Point, kind: str | None, branch: int, settings: Settings, shown: Progress) -> Branch:
     """Follow the curve of a point further, or another one that leaves there. The first point has the label of the start."""
     if kind is None:
-        return follow(start.system, start.x, settings)
+        return follow_until_interrupted(Continuation(start.system, start.x, settings), shown)
     system, x, tangent = leaving(start, kind, branch)
     beside = tangent is not None and kind != "HB"
-    found = follow(system, x, settings, tangent, singular=False)
+    found = follow_until_interrupted(Continuation(system, x, settings, tangent, singular=False), shown)
     if not beside:
         found.points[0] = dataclasses.replace(found.points[0], label=start.label, name=start.name)
     return found

@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import sys
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from contin import checks, threads
 from contin.arrays import Array
+from contin.continuation.failure import advice
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.extrema import extremum
 from contin.detection.inspection import Inspection, Start
@@ -38,6 +38,7 @@ from contin.detection.test_functions import (
     own_test_functions,
     user_zeros,
     with_normal_form,
+    within_limits,
 )
 from contin.detection.trivial import crossed, jumped
 from contin.discretization.protocol import Discretization, inner
@@ -144,6 +145,7 @@ class Continuation:
         self.state = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
         self._fold = fold(self.primary) if settings.folds else None
         self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
+        self._limits = limits(settings.limits)
         self._at_start: dict[str, float] = {}
         general = self._general_test_functions()
         self._tests = [*general, *self._own]
@@ -172,7 +174,7 @@ class Continuation:
     def _general_test_functions(self) -> list[TestFunction]:
         """Return those of the settings."""
         settings = self.settings
-        found = [*user_zeros(settings.zeros), *limits(settings.limits), *map(extremum, settings.extrema)]
+        found = [*user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema)]
         return [*found, *settings.monitors, *settings.test_functions]
 
     # --- the first point -----------------------------------------------------------------------------------------
@@ -263,6 +265,7 @@ class Continuation:
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
         special = [own_end(segment.trial.system, point) for point in inspection.special_points(self._tests)]
+        special = within_limits(segment, special, self._limits)
         changes = self._index_changes(segment, special)
         for point, change in zip(special, changes):
             if point.stop is not None:
@@ -298,7 +301,7 @@ class Continuation:
             )  # fmt: skip
         return Stop(
             "no convergence", f"the step became smaller than min_step = {exact_text(least)} ({error})",
-            "more intervals, a smaller min_step, scales for unknowns far from one, or a start elsewhere may help",
+            advice(state, self.settings),
         )  # fmt: skip
 
     def _meets_corner(self) -> bool:
@@ -550,29 +553,6 @@ class Continuation:
             state.arclength + found.at, trial.iterations, trial.newton_error, errors, found.details,
             stability.index, stability.nullity, change, stability.breaks,
         )  # fmt: skip
-
-
-def follow_until_interrupted(
-    system: Discretization, x: Array, settings: Settings = Settings(), tangent: Array | None = None
-) -> Branch:
-    """Run to the end, or to the first Ctrl-C, and return the branch.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        Ctrl-C before the first point.
-    """
-    run, branch = Continuation(system, x, settings, tangent), Branch()
-    try:
-        for point in run:
-            branch.points.append(point)
-    except KeyboardInterrupt:
-        if not branch.points:
-            raise
-        run.stop = Stop("interrupted", f"interrupted after {len(branch.points)} points", "trace from the last one goes on")
-        print(f"contin: {run.stop}", file=sys.stderr)
-    branch.stop, branch.notes = run.stop, run.notes
-    return branch
 
 
 def follow(

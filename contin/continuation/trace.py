@@ -7,7 +7,8 @@ from typing import Any
 
 from contin import checks
 from contin.continuation.cycle_starts import switched, switches
-from contin.continuation.run import follow_until_interrupted
+from contin.continuation.progress import Progress, follow_until_interrupted
+from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.system import System
@@ -19,7 +20,7 @@ from contin.stepping.settings import Settings, settings_with
 
 
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
-          **options: Any) -> Branch:  # fmt: skip
+          progress: bool | None = None, **options: Any) -> Branch:  # fmt: skip
     """Follow the branch through a point, or away from a branch point, to its end.
 
     Ctrl-C ends the run: the branch so far is returned.
@@ -36,6 +37,9 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
         the opposite way.
+    progress : bool, optional
+        Show one line on standard error while the run is under way, and clear it at the end: by default where standard error is
+        a terminal.
 
     Raises
     ------
@@ -51,7 +55,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     1.0
     """
     checks.instance("start", start, Point, "a Point")
-    settings = settings_with(settings, options)
+    settings, shown = settings_with(settings, options), Progress(progress)
     start = start if free is None else underlying(start)
     system: Any = start.system
     x = start.x
@@ -60,13 +64,14 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
     if branch is None:
-        return follow_until_interrupted(system, x, settings)
+        return follow_until_interrupted(Continuation(system, x, settings), shown)
     checks.whole("branch", branch, 0, 10)
     if branch == 1 and switches(start):
         cycles, x, tangent = switched(start, settings.mesh)
-        return follow_until_interrupted(cycles, x, settings, settings.direction * tangent)
+        return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
     if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")
     if not 0 <= branch < len(start.details.tangents):
         raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
-    return follow_until_interrupted(system, x, settings, settings.direction * start.details.tangents[branch])
+    tangent = settings.direction * start.details.tangents[branch]
+    return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)

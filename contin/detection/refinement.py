@@ -53,7 +53,8 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
 
     Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
-    is not the coarse one again (far from it, another kernel, or further off than the mesh before) is dropped.
+    is not the coarse one again (far from it, another kernel, or further off than the mesh before) is dropped. On a mesh of more
+    than ``max_intervals`` intervals only the estimate is made: the point stays on the one before.
     """
     trial, details, last = point.trial, point.details, np.inf
     errors = dict.fromkeys(trial.system.free, np.nan)
@@ -74,8 +75,8 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
             break
         sizes = steps[: len(system.free)] * system.free_scales  # a curve of branch points has one unknown more
         errors, last = dict(zip(system.free, map(float, sizes))), np.max(steps / size)
-        if finer is None:
-            break
+        if finer is None or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
+            break  # such a mesh serves the estimate only
         trial, details = better, found
         if np.all(steps <= settings.mesh.tolerance * size):
             break

@@ -16,7 +16,7 @@ from contin.detection.homoclinic_points import homoclinic_points, own_names
 from contin.detection.hopf import hopf
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.second_variation import legendre
-from contin.detection.segment import SpecialPoint
+from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
 from contin.discretization.connections import ConnectionCollocation
@@ -30,6 +30,9 @@ from contin.problems.variational import VariationalProblem
 from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
 
+#: A point lies outside a limit where it is further off than this part of the way from the point before: it was located there to
+#: round-off otherwise.
+_OUTSIDE = 1e-6
 #: Decimal places of a parameter that stands still: it does up to errors of meshes with the tolerance 1e-12.
 _DIGITS = 9
 
@@ -58,6 +61,23 @@ def limits(intervals: Mapping[str, Sequence[float]]) -> list[TestFunction]:
 def _limit(name: str, value: float, text: str, side: int) -> TestFunction:
     """Return the one of the upper (``side`` +1) or lower (-1) end."""
     return TestFunction("EP", f"{name} = {text}", lambda trial: side * (trial[name] - value), terminal=True, limit=True)
+
+
+def within_limits(segment: Segment, points: list[SpecialPoint], ends: Sequence[TestFunction]) -> list[SpecialPoint]:
+    """Return the special points of a step up to where it first leaves the limits, which may have been seen at a point only.
+
+    A quantity that passes its limit and comes back in one step has the same sign at both ends of the step.
+    """
+    last: Place = (segment.low, segment.before)
+    for number, point in enumerate(points):
+        if point.stop is not None:
+            break
+        for test in ends:
+            value, before = test.function(point.trial), last[1].value(test)
+            if before < 0 and value > _OUTSIDE * (abs(before) + value):
+                return [*points[:number], segment.locate(test, last, (point.at, point.trial))]
+        last = (point.at, point.trial)
+    return points
 
 
 def fold(name: str) -> TestFunction:

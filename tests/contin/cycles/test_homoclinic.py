@@ -53,7 +53,7 @@ def test_a_fast_cycle_is_near_nothing():
 
 @pytest.mark.parametrize("longest", [4, 7])
 def test_the_parameter_is_extrapolated(longest):
-    """r = 13.926557407520 where the period is infinite (the value to 14 digits that the project states); the error covers the difference."""
+    """r = 13.926557407520 where the period is infinite, to 14 digits; the error covers the difference."""
     side = math.sqrt(8 / 3 * 19)
     equilibria = AlgebraicProblem(lorenz, ["x", "y", "z"], {"r": 20.0})
     line = contin.trace(contin.solve(equilibria, [side, side, 19.0]), free=["r"], limits={"r": (15, 30)})

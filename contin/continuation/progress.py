@@ -1,0 +1,91 @@
+"""One line on standard error while a run is under way: it is overwritten in place, and cleared at the end."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from typing import TextIO
+
+from contin import checks
+from contin.continuation.run import Continuation
+from contin.results.branch import Branch
+from contin.results.point import Point
+from contin.stepping.state import Stop
+
+#: Seconds before a line is shown, and between two of them: calls that are done at once show none, and the terminal is not
+#: flooded.
+_FIRST, _BETWEEN = 1.0, 0.2
+#: A line is no longer than this: a longer one would not be overwritten on a terminal of 80 columns.
+_WIDTH = 79
+
+
+class Progress:
+    """The line of progress of one call.
+
+    Parameters
+    ----------
+    wanted : bool or None
+        Whether to show it; None shows it where standard error is a terminal.
+
+    Raises
+    ------
+    ProblemError
+        ``wanted`` is none of these.
+    """
+
+    def __init__(self, wanted: bool | None) -> None:
+        if wanted is not None:
+            checks.truth("progress", wanted)
+        self._file: TextIO = sys.stderr
+        self._on = self._file is not None and (self._file.isatty() if wanted is None else wanted)
+        self._next, self._shown = time.monotonic() + _FIRST, False
+
+    def watch(self, run: Continuation, what: str = "") -> Iterator[Point]:
+        """Yield the points of a run, and show how far it is; ``what`` comes first on the line."""
+        labels: list[str] = []
+        count = 0
+        try:
+            for point in run:
+                count += not point.label
+                if point.label:
+                    labels.append(point.label)
+                if self._on and time.monotonic() >= self._next:
+                    place = f"{run.primary} = {point[run.primary]:.6g}"
+                    self._show(f"{what}{count} points, {place}, step {run.state.step:.2g}  {' '.join(labels[-8:])}")
+                yield point
+        finally:
+            self.clear()
+
+    def _show(self, text: str) -> None:
+        self._file.write(f"\r{text[:_WIDTH]:<{_WIDTH}}")
+        self._file.flush()
+        self._next, self._shown = time.monotonic() + _BETWEEN, True
+
+    def clear(self) -> None:
+        """Leave an empty line."""
+        if self._shown:
+            self._file.write(f"\r{'':<{_WIDTH}}\r")
+            self._file.flush()
+            self._shown = False
+
+
+def follow_until_interrupted(run: Continuation, progress: Progress) -> Branch:
+    """Run to the end, or to the first Ctrl-C, and return the branch.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C before the first point.
+    """
+    branch = Branch()
+    try:
+        for point in progress.watch(run):
+            branch.points.append(point)
+    except KeyboardInterrupt:
+        if not branch.points:
+            raise
+        run.stop = Stop("interrupted", f"interrupted after {len(branch.points)} points", "trace from the last one goes on")
+        print(f"contin: {run.stop}", file=sys.stderr)
+    branch.stop, branch.notes = run.stop, run.notes
+    return branch

@@ -1,0 +1,120 @@
+"""For people who wait for a run: a line of progress, labels within the limits, and advice that names what helps."""
+
+import io
+
+import pytest
+
+import contin
+from contin import AlgebraicProblem, BoundaryValueProblem, MeshControl, ProblemError
+from contin.continuation import failure, progress
+
+
+class Terminal(io.StringIO):
+    def __init__(self, terminal):
+        super().__init__()
+        self.terminal = terminal
+
+    def isatty(self):
+        return self.terminal
+
+
+def parabola():
+    return contin.solve(AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0}), [1.0])
+
+
+@pytest.mark.parametrize(
+    ("terminal", "wanted", "shown"), [(True, None, True), (False, None, False), (True, False, False), (False, True, True)]
+)
+def test_a_line_of_progress(monkeypatch, terminal, wanted, shown):
+    """It is shown on a terminal or where it is asked for, overwritten in place, and cleared."""
+    file = Terminal(terminal)
+    monkeypatch.setattr(progress.sys, "stderr", file)
+    monkeypatch.setattr(progress, "_FIRST", 0.0)
+    monkeypatch.setattr(progress, "_BETWEEN", 0.0)
+    branch = contin.trace(parabola(), free=["a"], direction=-1, limits={"a": (-1, 4)}, progress=wanted)
+    assert branch.labelled("LP")
+    lines = file.getvalue().split("\r")
+    assert bool(file.getvalue()) == shown
+    if shown:
+        assert "a = 4, step " in lines[-3] and "EP LP EP" in lines[-3] and lines[-2:] == [" " * 79, ""]
+        assert {len(line) for line in lines[1:-1]} == {79}
+
+
+def test_progress_of_curves_and_diagrams(monkeypatch):
+    file = Terminal(True)
+    monkeypatch.setattr(progress.sys, "stderr", file)
+    monkeypatch.setattr(progress, "_FIRST", 0.0)
+    monkeypatch.setattr(progress, "_BETWEEN", 0.0)
+    fork = AlgebraicProblem(lambda u, p: (p.b + p.a * u.x - u.x**3,), ["x"], {"a": -1.0, "b": 0.0})
+    found = contin.diagram(contin.solve(fork, [0.0]), free=["a"], depth=1, limits={"a": (-1, 1)}, progress=True)
+    assert "branch 1, depth 0: " in file.getvalue()
+    start = contin.solve(fork, found.branches[-1].points[-1])
+    fold = contin.trace(start, free=["b"], limits={"b": (-2, 2)}, progress=False).labelled("LP")[0]
+    contin.curve(fold, "a", limits={"a": (0.5, 2)}, progress=True)
+    assert "a = 2" in file.getvalue()
+    with pytest.raises(ProblemError, match="progress: 'yes' must be True or False"):
+        contin.trace(start, free=["b"], progress="yes")
+
+
+def test_nothing_is_labelled_outside_the_limits():
+    """On the line x = a the functional 1 - 4 a^2 passes .999 and comes back in one step; a = 0 lies between."""
+    line = AlgebraicProblem(lambda u, p: (u.x - p.a,), ["x"], {"a": -0.5}, functionals={"h": lambda u, p: 1 - 4 * u.x**2})
+    start = contin.solve(line, [-0.5])
+    branch = contin.trace(start, free=["a"], limits={"a": (-1, 1), "h": (-5, 0.999)}, zeros={"a": [0.0]}, step=0.8)
+    assert [point.label for point in branch] == ["EP", "EP"] and str(branch.stop) == "reached h = 0.999"
+    assert branch.points[-1]["a"] == pytest.approx(-(0.00025**0.5), abs=1e-9)
+    free = contin.trace(start, free=["a"], limits={"a": (-1, 1)}, zeros={"a": [0.0]}, step=0.8)
+    assert len(free.labelled("UZ")) == 1
+
+
+def bratu():
+    return BoundaryValueProblem(
+        rhs=lambda t, u, p: (u.v, -p.lam * 2.718281828459045**u.u), boundary=lambda a, b, p: (a.u, b.u), states=["u", "v"],
+        parameters={"lam": 1.0},
+    )  # fmt: skip
+
+
+def test_labelled_points_obey_max_intervals():
+    """The error estimate is made on a mesh twice as fine; the point stays on the mesh that is allowed."""
+    control = MeshControl(max_intervals=12)
+    branch = contin.trace(contin.solve(bratu(), [0, 0]), free=["lam"], limits={"lam": (0.1, 5)}, mesh=control)
+    (fold,) = branch.labelled("LP")
+    assert max(point.system.intervals for point in branch) <= 12
+    assert fold["lam"] == pytest.approx(3.513830719125161, abs=10 * fold.errors["lam"]) and fold.errors["lam"] < 1e-8
+
+
+def test_advice_for_a_step_that_is_too_long():
+    """A circle of radius .05 with steps of .2: shorter ones succeed, and the run that follows the advice goes on."""
+    circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 0.0025,), ["x"], {"a": 0.0})
+    start = contin.solve(circle, [0.05])
+    failed = contin.trace(start, free=["a"], min_step=0.2, step=0.2)
+    assert failed.points[-1].label == "MX" and failed.stop.advice == "a step of 0.002 succeeds: set min_step to that or less"
+    assert contin.trace(start, free=["a"], min_step=1e-4, step=0.002).stop.reason == "closed"
+
+
+def test_advice_for_a_mesh(monkeypatch):
+    """Where the step succeeds on the mesh halved only, the advice names the setting that allows that mesh."""
+    start = contin.trace(contin.solve(bratu(), [0, 0]), free=["lam"], limits={"lam": (0.1, 3)}).points[0]
+    run = contin.Continuation(start.system, start.x)
+    count = run.state.system.intervals
+    monkeypatch.setattr(failure, "_succeeds", lambda state, *_: state.system.intervals > count)
+    for control, words in ((MeshControl(max_intervals=count), "max_intervals"), (MeshControl(), "min_intervals")):
+        said = failure.advice(run.state, contin.Settings(mesh=control))
+        assert said.startswith(f"a step succeeds on {2 * count} intervals: mesh=MeshControl({words}={2 * count})")
+    monkeypatch.setattr(failure, "_succeeds", lambda *_: False)
+    assert failure.advice(run.state, contin.Settings()).startswith("more intervals, a smaller min_step, scales")
+
+
+@pytest.mark.full
+def test_advice_for_a_tolerance_below_round_off():
+    """Layers of width e^-k: near k = 8 the corrections are round-off of 5e-9, more than the tolerance."""
+
+    def rhs(t, u, p):
+        return u.v, (u.u * u.v - u.u) * 2.718281828459045**p.k
+
+    layer = BoundaryValueProblem(
+        rhs=rhs, boundary=lambda a, b, p: (a.u + 1, b.u - 1.5), states=["u", "v"], parameters={"k": 0.0}
+    )
+    control = MeshControl(max_intervals=400)
+    branch = contin.trace(contin.solve(layer, lambda t: (-1 + 2.5 * t, 2.5)), free=["k"], limits={"k": (0, 8)}, mesh=control)
+    assert branch.points[-1].label == "MX" and "newton=Newton(tolerance=" in branch.stop.advice
