@@ -75,7 +75,7 @@ def _transformed(matrix: Any, one: Any, pole: float, zero: float, count: int = _
     start = np.random.default_rng(11).standard_normal(n)
     options = {"ncv": min(_SPACE * count, n), "maxiter": _RESTARTS, "tol": _TOLERANCE, "return_eigenvectors": False}
     try:
-        values = eigs(operator, min(count, n - 2), v0=start, **options)
+        values: Any = eigs(operator, min(count, n - 2), v0=start, **options)
     except ArpackNoConvergence as error:
         values = error.eigenvalues
     except ArpackError:
