@@ -55,7 +55,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if isinstance(system, System) and forget_changed(system.problem):
         system = system.with_parameters({})
     if free is not None and checks.names("free", free) != system.free:
-        system, x = system_of(start, "start").with_free(free, x) if system is start.system else system.with_free(free, x)
+        own = system if isinstance(system, System) else system_of(start, "start")
+        system, x = own.with_free(free, x)
     if branch is None:
         return follow_until_interrupted(system, x, settings)
     checks.whole("branch", branch, 0, 10)
