@@ -72,7 +72,8 @@ def _stacker(stack, kind):
     of_arrays = _written(f"{name}_of_arrays", "values", "stack(values)", stack=stack)
 
     def choose(values):
-        if not (isinstance(values, types.BaseTuple) and all(isinstance(each, types.Number) for each in values)):
+        kinds: Any = values if isinstance(values, types.BaseTuple) else ()  # a type of a tuple holds those of its items
+        if not (kinds and all(isinstance(each, types.Number) for each in kinds)):
             return of_arrays
         items = ", ".join(f"values[{i}]" for i in range(len(values)))
         return _written(f"{name}_of_numbers", "values", f"np.array([{items}])")

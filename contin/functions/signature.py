@@ -82,9 +82,9 @@ def named_values(names: tuple[str, ...]) -> Any:
     >>> u.y, u["y"], u[1], u[:1]
     (2.0, 2.0, 2.0, (1.0,))
     """
-    fields: Any = namedtuple("Values", names)  # type: ignore[misc]  # noqa: PYI024
+    fields: Any = namedtuple("Values", list(names))  # type: ignore[misc]  # noqa: PYI024
 
-    class Values(_NoArray, fields):  # type: ignore[misc]
+    class Values(_NoArray, fields):
         __slots__ = ()
 
         def __getitem__(self, key: Any) -> Any:
@@ -106,7 +106,7 @@ class _NoArray(tuple[Any, ...]):
     def _refuse(self, *_: object) -> Any:
         raise TypeError("a tuple is no array")
 
-    __add__ = __radd__ = __mul__ = __rmul__ = _refuse  # type: ignore[assignment]
+    __add__ = __radd__ = __mul__ = __rmul__ = _refuse
 
 
 def result_count(function: Function, arguments: Arguments, what: str) -> int:

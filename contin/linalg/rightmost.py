@@ -82,7 +82,7 @@ def _transformed(matrix: Any, one: Any, pole: float, zero: float, count: int = _
         values = np.empty(0)
     values = np.asarray(values, dtype=complex)
     with np.errstate(all="ignore"):
-        back = (pole * values + zero) / (values - 1) if zero else pole + 1 / values
+        back: Any = (pole * values + zero) / (values - 1) if zero else pole + 1 / values
     kept: ComplexArray = back[np.isfinite(back)]
     return kept
 
