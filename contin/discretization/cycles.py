@@ -176,6 +176,8 @@ class PeriodicCollocation(Collocation):
             if smallest and not self._is_own_error(values, smallest):
                 # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
                 values[smallest] += (total - sum(reals)) / len(smallest)
+            if self.autonomous and self._n == 2 and self.order == 1:
+                values = _in_the_plane(values, total)
             self._known[key] = _on_circle(values)
         return self._known[key]
 
@@ -394,6 +396,12 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 def is_opposite(frequency: float) -> bool:
     """Return whether a multiplier with this angle is -1, up to round-off."""
     return abs(frequency - math.pi) < _OPPOSITE
+
+
+def _in_the_plane(values: ComplexArray, total: float) -> ComplexArray:
+    """Return the logarithms, that of the multiplier that is not 1 by Liouville's formula: it is neither negative nor complex."""
+    one = min(values.tolist(), key=abs)
+    return np.array(sorted([complex(one.real if one.imag == 0 else abs(one)), complex(total)], key=lambda value: -value.real))
 
 
 def _on_circle(values: ComplexArray) -> ComplexArray:
