@@ -399,7 +399,7 @@ def is_opposite(frequency: float) -> bool:
 
 
 def _in_the_plane(values: ComplexArray, total: float) -> ComplexArray:
-    """Return the logarithms, that of the multiplier that is not 1 by Liouville's formula: it is neither negative nor complex."""
+    """Return the logarithms, that of the multiplier that is not 1 by Liouville's formula: neither negative nor complex."""
     one = min(values.tolist(), key=abs)
     return np.array(sorted([complex(one.real if one.imag == 0 else abs(one)), complex(total)], key=lambda value: -value.real))
 
