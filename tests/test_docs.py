@@ -45,6 +45,7 @@ LONG = {
     "strips",
     "tutorial",
     "variational",
+    "secondary",
 }
 
 

@@ -40,30 +40,25 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
           **options: Any) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
-    From a point of such a curve, without a further parameter, it goes on; at points of codimension two of equilibria (labels
-    BT, GH, ZH, HH) ``kind`` takes another curve that leaves there: ``start.curves`` lists them.
+    From a point of such a curve, without a further parameter, it goes on; ``kind`` takes another one that leaves there.
 
     Parameters
     ----------
     start : Point
-        A labelled point of a branch: a fold (LP), branch point (BP), Hopf point of equilibria (HB), period doubling (PD) or
-        torus bifurcation (TR) of cycles, an extremum (EX), or a point where a column reaches a value (UZ, EP). Or a labelled
-        point of a curve, which is then followed with one parameter more: an extremum of the column whose extrema the curve
-        consists of, the fold of a curve of folds with respect to its first parameter (both are again extrema, now in one
-        parameter more), a user zero, or a point of codimension two.
+        A labelled point of a branch: LP, BP, HB (of equilibria), PD, TR, an extremum (EX), or where a column has a value (UZ,
+        EP). Or a labelled point of a curve, followed with one parameter more: an extremum of the curve's own column, the fold
+        of a curve of folds with respect to its first parameter, a user zero, or a point of codimension two.
     second : str, optional
         The parameter that is free beside those of the branch.
     settings : Settings, optional
         Or any of its fields by name. Folds of the curve are with respect to ``primary`` (the second parameter by default).
         ``branch_points`` is False by default.
     free : pair of str, optional
-        Both parameters, in place of ``second``: the first takes the place of the one in which the start was found.
+        Both parameters, in place of ``second``; the first one replaces that in which the start was found.
     event : TestFunction, optional
         The one that labelled the start, where that is one of yours (``test_functions``).
     kind : str, optional
-        From a point of codimension two: ``"LP"``, ``"HB"``, ``"TR"`` or ``"homoclinic"``, as in `Point.curves`. Curves that
-        begin there (of cycles, of homoclinic orbits, and of Hopf points at BT) go one way; the first point of those of cycles
-        and of homoclinic orbits lies a little beside.
+        From BT, GH, ZH, HH: ``"LP"``, ``"HB"``, ``"TR"`` or ``"homoclinic"``, as in `Point.curves`; some begin a little beside.
     branch : int
         With ``kind="TR"`` at a double Hopf point: 0 for the cycles of the pair on whose curve it was found, 1 for the other.
     progress : bool, optional
@@ -72,11 +67,9 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     Returns
     -------
     Branch
-        Points with labels LP (the curve turns) and those of codimension two: CP, BP, BT, GH, ZH and HH of equilibria, CP, GPD,
-        CH, R1 to R4, LPPD and LPTR of cycles; the page on cycles says what they mean. On curves of extrema: EX, an extremum in
-        one parameter more. Columns: ``frequency`` and ``lyapunov`` on curves of Hopf points, ``normal_form`` on those of period
-        doublings and torus bifurcations, ``angle`` on the latter. Points of a curve of branch points carry their imperfection
-        beta as the last entry of x.
+        Labels: LP (the curve turns); CP, BP, BT, GH, ZH and HH of equilibria; CP, GPD, CH, R1 to R4, LPPD and LPTR of cycles;
+        EX, an extremum in one parameter more. Columns: ``frequency`` and ``lyapunov`` of Hopf points, ``normal_form`` of period
+        doublings and torus bifurcations, ``angle`` of the latter. The last entry of x on curves of BP is their imperfection.
 
     Raises
     ------
@@ -85,8 +78,6 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
 
     Examples
     --------
-    The folds of x^3 - b x + a = 0 lie on 27 a^2 = 4 b^3, with a cusp at the origin:
-
     >>> from contin import AlgebraicProblem, solve, trace
     >>> cusp = AlgebraicProblem(lambda u, p: (u.x**3 - p.b * u.x + p.a,), ["x"], {"a": 2.0, "b": 1.0})
     >>> fold = trace(solve(cusp, [-1.5]), free=["a"], direction=-1, limits={"a": (-2, 3)}).labelled("LP")[0]
@@ -94,24 +85,24 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     >>> [(point.label, abs(point["b"]) < 1e-9) for point in folds.labelled("CP")]
     [('CP', True)]
     """
+    _check(start, event, kind, branch)
+    shown, goes_on = Progress(progress), isinstance(start.system, Extended) and (second, free, event) == (None, None, None)
+    if kind is not None and not goes_on:
+        raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
+    names = start.system.free if goes_on else _free_parameters(start, second, free)
+    options = {"branch_points": False, "primary": names[-1], **options}
+    if goes_on:
+        return _from_curve(start, kind, branch, settings_with(settings, options), shown)
+    base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
+    found = _first_of_curve(start, base, x, event)
+    return follow_until_interrupted(Continuation(*found, settings_with(settings, options)), shown)
+
+
+def _check(start: object, event: object, kind: object, branch: object) -> None:
     checks.instance("start", start, Point, "a Point")
     checks.instance("event", event, (TestFunction, type(None)), "a TestFunction")
     checks.instance("kind", kind, (str, type(None)), "a name")
     checks.whole("branch", branch, 0, 1)
-    options.setdefault("branch_points", False)
-    shown = Progress(progress)
-    if isinstance(start.system, Extended) and second is None and free is None and event is None:
-        options.setdefault("primary", start.system.free[-1])
-        return _from_curve(start, kind, branch, settings_with(settings, options), shown)
-    if kind is not None:
-        raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
-    names = _free_parameters(start, second, free)
-    options.setdefault("primary", names[-1])
-    base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
-    found = _event(start, base, x, event) if event is not None else _first_of_curve(start, base, x)
-    if found is None:
-        raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be {_STARTS}")
-    return follow_until_interrupted(Continuation(*found, settings_with(settings, options)), shown)
 
 
 def _from_curve(start: Point, kind: str | None, branch: int, settings: Settings, shown: Progress) -> Branch:
@@ -155,10 +146,21 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
 _First = tuple[Extended, Array]
 
 
-def _first_of_curve(start: Point, base: Any, x: Array) -> _First | None:
-    """Return the extended system of the kind of a point."""
-    kinds = _KINDS if isinstance(start.system, System) else _KINDS_ON_CURVES
-    return next((found for kind in kinds if (found := kind(start, base, x)) is not None), None)
+def _first_of_curve(start: Point, base: Any, x: Array, event: TestFunction | None) -> _First:
+    """Return the extended system of the kind of a point.
+
+    Raises
+    ------
+    ProblemError
+        It is of no kind that can be followed.
+    """
+    if event is not None:
+        return _event(start, base, x, event)
+    for kind in _KINDS if isinstance(start.system, System) else _KINDS_ON_CURVES:
+        found = kind(start, base, x)
+        if found is not None:
+            return found
+    raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be {_STARTS}")
 
 
 def _branch_points(start: Point, base: System, x: Array) -> _First | None:

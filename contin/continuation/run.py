@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -27,7 +28,7 @@ from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint, with_details
-from contin.detection.significance import free_values, sense
+from contin.detection.significance import STANDS, free_values, sense
 from contin.detection.test_functions import (
     fold,
     limits,
@@ -342,16 +343,21 @@ class Continuation:
     def _up_to_limits(self, state: State) -> float:
         """Return the state's step, shortened where it leads far beyond the limit of a free parameter.
 
-        The equations may have no meaning there, and what lies between the limit and the end of the step is not looked for.
+        The equations may have no meaning there, and what lies between the limit and the end of the step is not looked for. The
+        parameter is extrapolated by its rates here and at the point before: a fold may come before the limit, and then no
+        step is shortened.
         """
         system, step = state.system, state.step
         for name in set(system.free) & set(self.settings.limits):
             at = system.parameter_index(name)
             size = system.free_scales[at - system.state_size]
             rate, value = state.tangent[at] * size, state.x[at] * size
+            earlier = state.previous_tangent
+            bend = 0.0 if earlier is None else (rate - earlier[at] * size) / (2 * state.previous_step)
             room = self.settings.limits[name][int(rate > 0)] - value
-            if rate * room > 0:
-                step = min(step, _BEYOND * room / rate)
+            square = rate * rate + 4 * bend * room
+            if rate * room > 0 and square >= 0:
+                step = min(step, _BEYOND * 2 * room / (rate + math.copysign(math.sqrt(square), rate)))
         return max(step, self.settings.min_step)
 
     def _attempt(self, state: State, step: float) -> tuple[Segment, float]:
@@ -437,6 +443,11 @@ class Continuation:
         jumped = missed > _MISSED * change and missed > _NOISE * (1 + abs(trial.x[at]))
         return bool(jumped and self._sense(trial))
 
+    def _has_moved(self, gone: Array, trial: Trial) -> bool:
+        """Return whether a step has moved the primary parameter by more than round-off: tangents are blurred at Hopf points."""
+        at = trial.system.parameter_index(self.primary)
+        return bool(abs(gone[at]) > STANDS * (1 + abs(trial.x[at])))
+
     def _sense(self, trial: Trial) -> float:
         """Return the sense in which the primary parameter goes; zero where that cannot be told, or is not wanted."""
         return 0.0 if self._fold is None else sense(trial, self._fold, self.settings.newton)
@@ -457,7 +468,8 @@ class Continuation:
         longest = min(settings.max_step, settings.change * float(np.min((1 + np.abs(p)) / (np.abs(rate) + _NO_RATE))))
         longer = step * np.clip(factor, _SHORTER, _LONGER)
         following = float(np.clip(longer, settings.min_step, max(longest, settings.min_step)))
-        gone, way = trial.x - state.x, self._sense(trial)
+        gone = trial.x - state.x
+        way = self._sense(trial) if self._has_moved(gone, trial) else 0.0
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,

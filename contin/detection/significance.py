@@ -22,7 +22,7 @@ from contin.stepping.trial import TestFunction, Trial, linearization
 #: Rates above this are significant without a look at a finer mesh. Ten times larger, more steps take twice as long.
 _CLEAR = 1e-6
 #: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
-_STANDS = 1e-13
+STANDS = 1e-13
 #: Rates below this are round-off of tangents; it is 1e-16 to 1e-15 in the canard explosions of the tests.
 _ROUND_OFF = 1e-14
 #: A rate is significant where that on the finer mesh differs by less than this part of it.
@@ -74,7 +74,7 @@ def senses(segment: Segment, fold: TestFunction) -> tuple[float, float]:
     first, last = sense(before, fold, segment.newton), sense(segment.trial, fold, segment.newton)
     at = before.system.parameter_index(fold.name)
     gone = before.x[at] - state.x[at] if state.singular else 0.0
-    return (0.0 if gone * first < -_STANDS * (1 + abs(before.x[at])) else first), last
+    return (0.0 if gone * first < -STANDS * (1 + abs(before.x[at])) else first), last
 
 
 def on_plateau(segment: Segment, fold: TestFunction) -> list[SpecialPoint]:

@@ -30,6 +30,8 @@ class MapSystem(Algebraic):
     """
 
     problem: MapProblem
+    #: As of cycles: no symmetry is declared, and the multipliers are those of all rounds.
+    order = 1
 
     def __init__(
         self, problem: MapProblem, free: Sequence[str], parameters: Mapping[str, float] | None = None,
@@ -41,6 +43,14 @@ class MapSystem(Algebraic):
     @property
     def is_sparse(self) -> bool:
         """Never: products of sparse matrices are not."""
+        return False
+
+    def whole_round(self, values: ComplexArray) -> ComplexArray:
+        """Return the logarithms of the multipliers as they are."""
+        return values
+
+    def is_drifted(self, x: Array) -> bool:
+        """Return whether the multipliers are in doubt: they never are."""
         return False
 
     def residual(self, x: Array) -> Array:

@@ -40,7 +40,7 @@ def rightmost(matrix: Any) -> ComplexArray:
     --------
     >>> from scipy.sparse import diags_array
     >>> turning = np.append(3.0, np.zeros(60))
-    >>> values = rightmost(diags_array([np.append([0.5, 0.5], -np.arange(60)), turning, -turning], offsets=[0, 1, -1]))
+    >>> values = rightmost(diags_array([np.append([0.5, 0.5], -1.0 - np.arange(60)), turning, -turning], offsets=[0, 1, -1]))
     >>> [complex(z) for z in np.round(values[values.real > 0], 9)]
     [(0.5+3j), (0.5-3j)]
     """

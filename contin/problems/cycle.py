@@ -143,6 +143,12 @@ class CycleProblem(BoundaryValueProblem):
         """Return the problem of cycles that close after twice the part computed here: with the symmetry S^2.
 
         Of cycles without a symmetry, and with one of odd order, those are cycles of twice the period.
+
+        Examples
+        --------
+        >>> oscillator = CycleProblem(lambda u, p: (u.v, -(u.x**3)), ["x", "v"], {}, symmetry=[-1, -1])
+        >>> oscillator.order, oscillator.doubled().order
+        (2, 1)
         """
         if self.order == 1:
             return self

@@ -42,6 +42,14 @@ class Segment:
         The coordinate s at which it begins, likewise; where the segment before ends by default, 0 for the first one.
     functionals : mapping of str to callable, optional
         ``f(s, u, p)``: integrands over s. A column is the sum over all segments that have one of its name.
+
+    Examples
+    --------
+    Heat that flows through a wall, whose thickness is the parameter ``d``:
+
+    >>> wall = Segment(lambda s, u, p: (-u.flux, 0.0), ["heat", "flux"], length="d")
+    >>> wall.states
+    ['heat', 'flux']
     """
 
     rhs: Function

@@ -208,6 +208,19 @@ class Point:
         ------
         ProblemError
             The problem has no segments, or fewer.
+
+        Examples
+        --------
+        Heat flows through two walls of thickness 1; the second one conducts three times as well:
+
+        >>> from contin import Segment, SegmentedProblem, solve
+        >>> walls = [Segment(lambda s, u, p: (-u.flux / p.k, 0.0), ["heat", "flux"]),
+        ...          Segment(lambda s, u, p: (-u.flux / 3, 0.0), ["heat", "flux"])]
+        >>> problem = SegmentedProblem(walls, lambda a, b, p: (
+        ...     a[0].heat - 1, b[0].heat - a[1].heat, b[0].flux - a[1].flux, b[1].heat), {"k": 1.0})
+        >>> point = solve(problem, [0, 0, 0, 0])
+        >>> round(float(point.segment(1)(1.0)[0, 0]), 9)
+        0.25
         """
         return Profile(self, index)
 

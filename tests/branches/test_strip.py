@@ -102,6 +102,7 @@ def test_barriers_are_those_of_the_quadrature():
         assert barrier(BLADE, state.m) == pytest.approx(ways[state.name].height, rel=1e-10)
 
 
+@pytest.mark.full
 def test_a_barrier_vanishes_where_stability_ends():
     """Of the 3-fold circle at both ends of its stable interval, where its way out, (1, 2) or (3, 4), bifurcates."""
     ends = [3 * end for end in energy_interval(FINITE_WIDTH, 3, 0.3, 0.1)]

@@ -117,6 +117,7 @@ def test_both_methods_agree(m, n, law):
         assert one.index == other.index
 
 
+@pytest.mark.full
 def test_a_hard_state():
     """(1, 4) with max(eta^2) near 10, where the strip is curved on a small part of its length only."""
     found = [equilibrium(point) for point in between_ends(branch(1, 4))]

@@ -98,6 +98,7 @@ def crossing(m, n, way):
     return solve_ivp(field, (0, 200), start, method="DOP853", rtol=1e-13, atol=1e-15, events=home).y_events[0][0][0]
 
 
+@pytest.mark.full
 def test_homoclinic_orbits_leave_a_bogdanov_takens_point():
     """m = 49 / 25 n**2 near the point (by Melnikov's integral); elsewhere both manifolds by SciPy's integrator."""
     from scipy.optimize import brentq

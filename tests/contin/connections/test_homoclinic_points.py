@@ -58,6 +58,7 @@ def four_dimensional():
     return contin.trace(orbit, free=["a", "nu"], direction=-1, limits={"a": (-0.2, 1)}).points[-1]
 
 
+@pytest.mark.full
 def test_a_saddle_focus():
     """The pair -r -+ i leads: 2 r = .8 is neutrally divergent, r = .8 neutral."""
     branch = contin.trace(four_dimensional(), free=["r", "nu"], limits={"r": (0.1, 1)})

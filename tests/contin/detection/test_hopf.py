@@ -128,6 +128,7 @@ def brusselator_on_a_line(u, p, out):
         out[n + i] = 0.004 * per_length * (left[1] - 2 * y + right[1]) + b * x - x * x * y
 
 
+@pytest.mark.full
 def test_hopf_points_of_many_unknowns():
     """AUTO's demo brf on 100 places. Mode k crosses where (Dx + Dy) mu = B - 1 - A^2, mu its eigenvalue of the differences."""
     n = 100
