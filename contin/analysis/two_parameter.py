@@ -93,8 +93,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     options = {"branch_points": False, "primary": names[-1], **options}
     if goes_on:
         return _from_curve(start, kind, branch, settings_with(settings, options), shown)
-    base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
-    found = _first_of_curve(start, base, x, event)
+    found = _first_of_curve(start, names, event)
     return follow_until_interrupted(Continuation(*found, settings_with(settings, options)), shown)
 
 
@@ -146,7 +145,7 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
 _First = tuple[Extended, Array]
 
 
-def _first_of_curve(start: Point, base: Any, x: Array, event: TestFunction | None) -> _First:
+def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | None) -> _First:
     """Return the extended system of the kind of a point.
 
     Raises
@@ -154,6 +153,7 @@ def _first_of_curve(start: Point, base: Any, x: Array, event: TestFunction | Non
     ProblemError
         It is of no kind that can be followed.
     """
+    base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
     if event is not None:
         return _event(start, base, x, event)
     for kind in _KINDS if isinstance(start.system, System) else _KINDS_ON_CURVES:
