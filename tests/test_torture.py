@@ -13,7 +13,10 @@ pytest.importorskip("fcntl", reason="needs POSIX")
 SCRIPT = Path(__file__).parent.parent / "scripts" / "torture.py"
 
 
-@pytest.mark.parametrize(("scene", "some", "all_kinds"), [("branch", 4, 14), ("diagram", 1, 4)])
+DIAGRAM = pytest.param("diagram", 4, 4, marks=pytest.mark.full)
+
+
+@pytest.mark.parametrize(("scene", "some", "all_kinds"), [("branch", 4, 14), DIAGRAM])
 def test_faults_of_every_kind(scene, some, all_kinds, tmp_path, request):
     faults = all_kinds if request.config.getoption("--full") else some
     words = [sys.executable, SCRIPT, "--scenes", scene, "--trials", str(faults), "--seed", "3", "--keep", tmp_path]

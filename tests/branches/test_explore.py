@@ -172,6 +172,7 @@ def test_columns_are_packed_without_loss():
     assert packed_column(np.full(3, 0.3)) == 0.3 and packed_column(np.full(3, 7, "<i4")) == 7
 
 
+@pytest.mark.full
 def test_a_page_that_would_be_too_large_leaves_out_shapes_and_says_so(results, monkeypatch, capsys, tmp_path):
     """Of six materials four keep their shapes, if the limit is two thirds of the size of all; the first is among them."""
     whole = gather_module.gather([str(results / "laws")])

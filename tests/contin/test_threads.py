@@ -90,7 +90,7 @@ def chain(n):
     return contin.BoundaryValueProblem(rhs, boundary, n, {"a": 1.0, "b": 0.5}, boundary_count=n, integrals=integrals)
 
 
-@pytest.mark.parametrize(("n", "intervals", "degree"), [(2, 3, 4), (3, 17, 2), (4, 40, 5)])
+@pytest.mark.parametrize(("n", "intervals", "degree"), [(2, 3, 4), (3, 17, 2), pytest.param(4, 40, 5, marks=pytest.mark.full)])
 def test_a_linearization_has_the_same_bits(n, intervals, degree, use):
     """With parameters, an integral condition, extra rows and columns, and more right-hand sides than are solved together."""
     random, known = np.random.default_rng(1), None

@@ -177,10 +177,8 @@ def test_covering_indices_and_names():
 # --- branches ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("m", "n", "Gamma"),
-    [pytest.param(1, 2, 10.0, marks=pytest.mark.full), (1, 2, 100.0), pytest.param(3, 4, 10.0, marks=pytest.mark.full)],
-)
+@pytest.mark.full
+@pytest.mark.parametrize(("m", "n", "Gamma"), [(1, 2, 10.0), (1, 2, 100.0), (3, 4, 10.0)])
 def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
     found = branch(m, n, Gamma)
     points = exact_finite_width.curve(m, n, NU, Gamma)

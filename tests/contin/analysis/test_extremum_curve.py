@@ -45,6 +45,7 @@ def obv_branch():
     return trace(solve(problem, [0, 0]), free=["l1"], limits={"l1": (-1, 5), "objective": (0, 10)}, extrema=["objective"])
 
 
+@pytest.mark.full
 def test_demo_obv():
     """AUTO-07p 0.9.2, ``obv`` with NTST = 60 and tolerances of 1e-10, NMX = 600 and 200 in the last two runs: b.1, b.2, b.3."""
     first = obv_branch().labelled("EX")[0]

@@ -113,10 +113,14 @@ def run_until(start: Point, free: Sequence[str], labels: int, **settings) -> Bra
     return Branch(points, run.stop)
 
 
+#: Cases that take two seconds or more, most of it compiling.
+LONG = {"grid of 3 x 3", "Hodgkin-Huxley", "kar", "Cahn-Hilliard", "beam on a foundation, double"}
+
+
 def bank(*names: str) -> list:
     """The cases of these problems as pytest's parameters."""
     cases = [case for name in names for case in importlib.import_module(f"bank.{name}").CASES]
-    return [pytest.param(case, id=case.name) for case in cases]
+    return [pytest.param(case, id=case.name, marks=[pytest.mark.full] if case.name in LONG else []) for case in cases]
 
 
 def check(case: Case) -> list[Estimate]:

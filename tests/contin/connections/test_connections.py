@@ -131,6 +131,7 @@ def lorenz_cycle():
     return trace(hopf, branch=1, limits={"r": (13, 30), "period": (0, 3.5)}).points[-1]
 
 
+@pytest.mark.full
 def test_a_long_cycle_becomes_the_homoclinic_orbit_of_lorenz():
     """r = 13.926557 (Sparrow 1982); the same orbit with a longer time has the next digits."""
     orbit = homoclinic(lorenz_cycle(), free=["r"])

@@ -89,6 +89,7 @@ def flipping(u, p):
     return x + 0.3 * u.z * u.x, y, -u.z / 2 + p.mu * u.x
 
 
+@pytest.mark.full
 def test_an_orbit_flip():
     problem = ConnectionProblem(flipping, ["x", "y", "z"], {"a": 0.0, "nu": 0.0, "mu": 0.0}, unstable=1)
     orbit = contin.solve(problem, lambda t: (*leaf(40)(t), 0.0), {"time": 40}, free=["nu"], intervals=40)

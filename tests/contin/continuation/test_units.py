@@ -5,7 +5,7 @@ from bank import units
 
 #: A boundary value problem that starts from rest, and equilibria with folds, Hopf points and branch switching: those that
 #: compile in a second or two.
-QUICK = "exp", "dd2", "lrz", "pp2"
+QUICK = "dd2", "lrz"
 SEEDS = 3
 #: Restated cases that fail: the cusp test function of this fold curve is of no one scale.
 KNOWN = ("opt: folds",)

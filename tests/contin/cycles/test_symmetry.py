@@ -66,9 +66,8 @@ def test_solutions_are_guesses_for_each_other():
     assert other["period"] == pytest.approx(whole["period"], abs=1e-11)
 
 
-@pytest.mark.parametrize(
-    ("matrix", "later", "order"), [(SHIFT, 1 / 3, 3), pytest.param(-SHIFT.T, 1 / 3, 6, marks=pytest.mark.full)]
-)
+@pytest.mark.full
+@pytest.mark.parametrize(("matrix", "later", "order"), [(SHIFT, 1 / 3, 3), (-SHIFT.T, 1 / 3, 6)])
 def test_a_ring_of_three_oscillators(matrix, later, order):
     """A third, and a sixth of the rotating wave: period, columns, means and multipliers are those of the whole one."""
     means = {"first": lambda u, p: u.x1**2}

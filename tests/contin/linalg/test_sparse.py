@@ -64,6 +64,7 @@ def fold(n):
     return branch.labelled("LP")[0]
 
 
+@pytest.mark.full
 def test_a_large_problem_is_kept_sparse_and_has_the_fold_of_the_dense_one(monkeypatch):
     """Finite differences of Bratu's problem: an error of second order in its fold, 3.513830719125161."""
     found = fold(250)
