@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import SimpleNamespace
@@ -333,7 +334,7 @@ class OpenStrip:
         loaded = self._end_energy()
         if loaded is None:
             return point["energy"]
-        last = SimpleNamespace(**dict(zip((*FRAME, *CENTRELINE), point.system.states(point.x)[-1])))
+        last = _LastEnd(*point.system.states(point.x)[-1, :7])
         return point["energy"] + float(loaded(None, last, SimpleNamespace(**point.parameters)))
 
     def strains(self, system: Collocation, x: np.ndarray) -> np.ndarray:
@@ -366,6 +367,8 @@ NOT_FOUND = (
     "no equilibrium was found near the first guess; begin with smaller loads, or nearer to the natural state, and follow these "
     "numbers in a stage, or begin with another first state"
 )
+#: States of the last end, as the potential of its loads takes them.
+_LastEnd = namedtuple("_LastEnd", (*FRAME, *CENTRELINE))
 #: Place of the last end from the first one, as integrals over the strip.
 _PLACES = dict(zip(PLACE, (lambda t, x, w, p: w.x1, lambda t, x, w, p: w.x2, lambda t, x, w, p: w.x3)))
 

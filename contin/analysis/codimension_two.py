@@ -26,8 +26,7 @@ from contin.curves.fold_curve import FoldCurve
 from contin.curves.hopf_curve import HopfCurve
 from contin.detection.lyapunov import critical_pair
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.degree import usual_degree
-from contin.discretization.mesh import MeshControl
+from contin.discretization.degree import CYCLE_DEGREE
 from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError, ProblemError
 from contin.results.point import Point
@@ -113,10 +112,9 @@ def _tori(base: Algebraic, x: Array, frequencies: list[float], branch: int) -> F
 def _corrected_cycle(base: Algebraic, x: Array, frequency: float, other: float | None) -> First:
     """Return a small cycle on the curve of torus bifurcations at which another pair is critical; of folds without one."""
     pair = critical_pair(base.jacobian(x), frequency)
-    degree = usual_degree(len(base.problem.state_names), MeshControl().tolerance)
     for amplitude in _AMPLITUDES:
         size = amplitude * (1 + float(np.abs(base.states(x)).max()))
-        cycles, y, tangent = small_cycle(base, x, pair, size, degree)
+        cycles, y, tangent = small_cycle(base, x, pair, size, CYCLE_DEGREE)
         curve: Extended = FoldCurve(cycles)
         if other is not None:
             angle = _angle(cycles.eigenvalues(y), 2 * math.pi * other / frequency)

@@ -14,7 +14,7 @@ from contin.arrays import Array
 from contin.detection.second_variation import degeneracy
 from contin.discretization.basis import DEGREES
 from contin.discretization.collocation import Collocation
-from contin.discretization.degree import usual_degree
+from contin.discretization.degree import CYCLE_DEGREE, usual_degree
 from contin.discretization.mesh import MOST_INTERVALS, MeshControl
 from contin.discretization.system import System
 from contin.errors import ConvergenceError, ProblemError
@@ -53,7 +53,7 @@ def solve(
         Of the first mesh, which is uniform unless the guess has one.
     degree : int, optional
         Of the collocation, 2 to 8. By default that of the guess, if it has one; otherwise it follows from the number of states
-        and the tolerance of the mesh: 7 for up to 5 states, down to 4 for more states and larger tolerances.
+        and the tolerance of the mesh: 7 for up to 5 states, down to 4 for more states and larger tolerances; 4 for cycles.
     mesh : MeshControl, optional
         How the mesh adapts; ``MeshControl(every=0)`` keeps the first one.
     others : sequence of Point
@@ -95,6 +95,8 @@ def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, cont
     """Return the degree where none is given."""
     if isinstance(guess, Point):
         return guess.system.degree
+    if isinstance(problem, CycleProblem):
+        return CYCLE_DEGREE
     return usual_degree(len(problem.state_names), control.tolerance)
 
 

@@ -12,7 +12,7 @@ from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.detection.lyapunov import CriticalPair, critical_pair
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
-from contin.discretization.degree import usual_degree
+from contin.discretization.degree import CYCLE_DEGREE
 from contin.discretization.kinds import discretized
 from contin.discretization.maps import MapSystem
 from contin.discretization.mesh import MeshControl
@@ -34,7 +34,7 @@ def switches(point: Point) -> bool:
     return point.label == "HB" or doubles(point)
 
 
-def switched(point: Point, control: MeshControl) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
+def switched(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
     """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
 
     Raises
@@ -46,8 +46,7 @@ def switched(point: Point, control: MeshControl) -> tuple[PeriodicCollocation | 
     """
     if doubles(point):
         return doubled(point)
-    system: Any = point.system
-    return from_hopf(point, usual_degree(len(system.problem.state_names), control.tolerance))
+    return from_hopf(point, CYCLE_DEGREE)
 
 
 def from_hopf(point: Point, degree: int) -> tuple[CycleCollocation, Array, Array]:

@@ -97,11 +97,14 @@ def _with_faint(system: System, x: Array, size: Array, free: Array) -> tuple[Arr
     if not faint.any() and free.all():
         return size, free
     states, values = x[: system.state_size].reshape(-1, len(size)) * ~faint, x[system.state_size :]
-    aside = np.where(values == 0, free, values)  # a load that enters as its square shows nothing where it is zero
-    z, known = np.concatenate([states.ravel(), aside]), np.concatenate([np.where(faint, 0.0, size), free])
+    known = np.concatenate([np.where(faint, 0.0, size), free])
+    at_rest = not np.any(known[: len(size)])
+    if at_rest:
+        values = np.where(values == 0, free, values)  # a load that enters as its square shows nothing where it is zero
+    z = np.concatenate([states.ravel(), values])
     found = _balanced(system, z, known)
     balanced = found[: len(size)]
-    if not np.any(known[: len(size)]):
+    if at_rest:
         balanced = balanced * _amplitude(system, z, found)
     return np.where(faint & (size <= _FAINT * balanced), balanced, size), found[len(size) :]
 

@@ -67,7 +67,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         return follow_until_interrupted(Continuation(system, x, settings), shown)
     checks.whole("branch", branch, 0, 10)
     if branch == 1 and switches(start):
-        cycles, x, tangent = switched(start, settings.mesh)
+        cycles, x, tangent = switched(start)
         return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
     if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")

@@ -13,6 +13,9 @@ from contin.discretization.mesh import share
 #: whose round-off often gives them as many intervals as degree 7 has. Degrees below 4 need many intervals wherever they are not
 #: the cheapest.
 _CHOSEN, _COMPARED = range(4, 8), range(4, 9)
+#: That of cycles. At degree 7 the mesh has fewer intervals, which suit the cycle but not its multipliers: in AUTO's demos their
+#: errors are 1e-8 to 1e-6 in place of 1e-9.
+CYCLE_DEGREE = 4
 #: Microseconds that a Newton iteration takes for its Python code, for an interval, and for each of (n d)^2 entries of an
 #: interval's block (docs/performance.md, cost laws). If the first were ten times larger, the degree at 1e-12
 #: would be 7 for more than 30 states instead of up to 12; if the last were, for up to 3.
