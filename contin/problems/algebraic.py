@@ -183,7 +183,7 @@ class AlgebraicProblem(Restated):
         else:
             try:
                 matrix = np.asarray(found, dtype=float)
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 raise ProblemError(f"jacobian: {checks.shown(found)} must be a matrix of numbers") from None
         if matrix.shape != shape:
             raise ProblemError(f"jacobian: its shape {matrix.shape} must be {shape}, equations by states")
@@ -202,14 +202,18 @@ def _entries(pattern: Any, shape: tuple[int, int]) -> tuple[Indices, Indices]:
     allowed = f"a matrix of shape {shape}, equations by states, or two arrays of their numbers from 0"
     try:
         if isinstance(pattern, tuple) and len(pattern) == 2:
-            equations, states = (np.asarray(part, dtype=np.int64).ravel() for part in pattern)
-            fits = equations.size == states.size and bool(
-                np.all((equations >= 0) & (equations < shape[0]) & (states >= 0) & (states < shape[1]))
+            given = [np.asarray(part).ravel() for part in pattern]
+            with np.errstate(invalid="ignore"):  # numbers that are not whole differ
+                equations, states = (part.astype(np.int64) for part in given)
+            fits = (
+                all(np.array_equal(*pair) for pair in zip(given, (equations, states)))
+                and equations.size == states.size
+                and bool(np.all((equations >= 0) & (equations < shape[0]) & (states >= 0) & (states < shape[1])))
             )
         else:
             matrix = pattern if hasattr(pattern, "tocoo") else np.asarray(pattern, dtype=bool)
             fits, (equations, states) = matrix.shape == shape, matrix.nonzero()
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         fits = False
     if not fits:
         raise ProblemError(f"pattern: {checks.shown(pattern)} must be {allowed}")

@@ -32,7 +32,7 @@ def symmetry_matrix(symmetry: Any, count: int) -> Array:
     """
     try:
         given = np.array(symmetry, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         given = np.empty(0)
     if given.shape not in ((count,), (count, count)) or not np.all(np.isfinite(given)):
         raise ProblemError(f"symmetry: {checks.shown(symmetry)} must be {count} signs, or a matrix of {count} rows and columns")
