@@ -26,7 +26,6 @@ from contin.curves.fold_curve import FoldCurve
 from contin.curves.hopf_curve import HopfCurve
 from contin.detection.lyapunov import critical_pair
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.degree import CYCLE_DEGREE
 from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError, ProblemError
 from contin.results.point import Point
@@ -114,7 +113,7 @@ def _corrected_cycle(base: Algebraic, x: Array, frequency: float, other: float |
     pair = critical_pair(base.jacobian(x), frequency)
     for amplitude in _AMPLITUDES:
         size = amplitude * (1 + float(np.abs(base.states(x)).max()))
-        cycles, y, tangent = small_cycle(base, x, pair, size, CYCLE_DEGREE)
+        cycles, y, tangent = small_cycle(base, x, pair, size)
         curve: Extended = FoldCurve(cycles)
         if other is not None:
             angle = _angle(cycles.eigenvalues(y), 2 * math.pi * other / frequency)

@@ -44,12 +44,10 @@ def switched(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Arra
     ConvergenceError
         The branch point of doubled orbits is not found.
     """
-    if doubles(point):
-        return doubled(point)
-    return from_hopf(point, CYCLE_DEGREE)
+    return doubled(point) if doubles(point) else from_hopf(point)
 
 
-def from_hopf(point: Point, degree: int) -> tuple[CycleCollocation, Array, Array]:
+def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
     """Return the system of the cycles that leave a Hopf point, the point as an orbit of no size, and the tangent there.
 
     The tangent is the ellipse of the critical eigenvector v, Re(v exp(2 pi i t)), with the period 2 pi over the frequency.
@@ -63,13 +61,11 @@ def from_hopf(point: Point, degree: int) -> tuple[CycleCollocation, Array, Array
     if point.label != "HB" or not isinstance(system, Algebraic):
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
-    cycles, x, tangent = small_cycle(system, point.x, pair, 0.0, degree)
+    cycles, x, tangent = small_cycle(system, point.x, pair, 0.0)
     return cycles.with_reference(x + tangent), x, tangent
 
 
-def small_cycle(
-    system: Algebraic, x: Array, pair: CriticalPair, size: float, degree: int
-) -> tuple[CycleCollocation, Array, Array]:
+def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) -> tuple[CycleCollocation, Array, Array]:
     """Return the system of cycles beside a Hopf point x, the ellipse of this size as one, and the direction in which it grows.
 
     The free parameters are those of ``system`` and, after the first, the period.
@@ -78,7 +74,7 @@ def small_cycle(
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     parameters[PERIOD] = 2 * math.pi / pair.frequency
     mesh = np.linspace(0, 1, _INTERVALS + 1)
-    cycles = CycleCollocation(CycleProblem.of(system.problem), mesh, degree, (first, PERIOD, *others), parameters)
+    cycles = CycleCollocation(CycleProblem.of(system.problem), mesh, CYCLE_DEGREE, (first, PERIOD, *others), parameters)
     wave = np.exp(2j * math.pi * cycles.nodes)[:, None]
     rest = cycles.pack(np.tile(system.states(x), (cycles.nodes.size, 1)), parameters)
     tangent = cycles.pack((wave * pair.right).real, dict.fromkeys(cycles.free, 0.0))

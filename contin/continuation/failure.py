@@ -1,4 +1,4 @@
-"""What to change where no step succeeds: each setting that may help is tried on the step that failed last."""
+"""Why no step succeeds, and what to change: each setting that may help is tried on the step that failed last."""
 
 from __future__ import annotations
 
@@ -9,15 +9,46 @@ import numpy as np
 
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
+from contin.names import exact_text
 from contin.stepping.newton import Newton
 from contin.stepping.settings import Settings
-from contin.stepping.state import State
+from contin.stepping.state import State, Stop
 from contin.stepping.step import corrected, predict, turn
 
 #: A shorter step is this part of ``min_step``, and a looser tolerance so many times the one that failed. With larger factors
 #: the advice would be good for more, and say less.
 _SHORTER, _LOOSER = 1e-2, 1e3
+#: The way along the tangent on which a corner is looked for, and the part that its bend has of the usual change of the residual
+#: on such a way: for a smooth function, it is about as large as the way.
+_CORNER, _JUMP = 1e-4, 0.1
 _OTHERWISE = "more intervals, a smaller min_step, scales for unknowns far from one, or a start elsewhere may help"
+
+
+def no_convergence(state: State, settings: Settings, error: ConvergenceError) -> Stop:
+    """Return the reason why no step from a state succeeds, the last of which failed with an error."""
+    least = exact_text(settings.min_step)
+    if not np.all(np.isfinite(state.system.residual(predict(state, settings.min_step)))):
+        return Stop(
+            "no convergence", f"the equations have no finite value a step of min_step = {least} further on",
+            "look for what they divide by, or take a root or logarithm of: their domain ends there",
+        )  # fmt: skip
+    if _meets_corner(state):
+        return Stop(
+            "no convergence", f"the derivatives of the equations jump a step of min_step = {least} further on",
+            "abs, max, min, if and tables have corners; a smooth form such as sqrt(x**2 + d**2) for abs(x) can be followed",
+        )  # fmt: skip
+    return Stop("no convergence", f"the step became smaller than min_step = {least} ({error})", advice(state, settings))
+
+
+def _meets_corner(state: State) -> bool:
+    """Return whether the residual bends within a short way along the tangent as only a corner does."""
+    system, x, way = state.system, state.x, _CORNER * state.tangent
+    here = system.residual(x)
+    forth, back = (system.residual(x + sign * way) - here for sign in (1, -1))
+    across = np.random.default_rng(17).standard_normal(system.size)
+    across *= _CORNER / np.sqrt(inner(system, across, across))
+    usual = np.max(np.abs(system.residual(x + across) - here), initial=0.0)
+    return bool(np.max(np.abs(forth + back), initial=0.0) > _JUMP * usual)
 
 
 def advice(state: State, settings: Settings) -> str:

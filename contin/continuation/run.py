@@ -14,14 +14,13 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from contin import checks, threads
 from contin.arrays import Array
-from contin.continuation.failure import advice
+from contin.continuation.failure import no_convergence
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.extrema import extremum
 from contin.detection.inspection import Inspection, Start
@@ -44,20 +43,27 @@ from contin.detection.test_functions import (
 from contin.detection.trivial import crossed, jumped
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
-from contin.names import exact_text, value_names
+from contin.names import value_names
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.newton import correct
 from contin.stepping.settings import Settings
 from contin.stepping.state import State, Stop, standing_at
-from contin.stepping.step import corrected, hidden_turn, located, predict, sharpened, tangent_error, trial_of, turn
+from contin.stepping.step import (
+    corrected,
+    hidden_turn,
+    located,
+    predict,
+    sharpened,
+    tangent_error,
+    trial_of,
+    turn,
+    up_to_limits,
+)
 from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
 
 #: A step is cut down to this fraction of itself to take several branch points one by one.
 _FINEST = 1e-3
-#: A step ends at this many times the distance to a limit, along the tangent, at most: beyond it, and not much. Ten times
-#: larger, a parameter that the equations divide by went through zero, and three branch points before it were lost.
-_BEYOND = 1.25
 #: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
 _ASTRAY = 2.5
 #: A tangent's component with a larger estimated error than this, relative to itself, may have the wrong sign.
@@ -83,9 +89,6 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
-#: The way along the tangent on which a corner is looked for, and the part that its bend has of the usual change of the residual
-#: on such a way: for a smooth function, it is about as large as the way.
-_CORNER, _JUMP = 1e-4, 0.1
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
@@ -286,34 +289,10 @@ class Continuation:
 
     def _failure(self, error: ConvergenceError) -> Stop:
         """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
-        state, least = self.state, self.settings.min_step
         for test in self._own:
             if test.terminal and abs(test.function(self._state_trial())) < _NEARLY * abs(self._at_start.get(test.name, 0.0)):
                 return Stop("event", f"met {test.name}")
-        if not np.all(np.isfinite(state.system.residual(predict(state, least)))):
-            return Stop(
-                "no convergence", f"the equations have no finite value a step of min_step = {exact_text(least)} further on",
-                "look for what they divide by, or take a root or logarithm of: their domain ends there",
-            )  # fmt: skip
-        if self._meets_corner():
-            return Stop(
-                "no convergence", f"the derivatives of the equations jump a step of min_step = {exact_text(least)} further on",
-                "abs, max, min, if and tables have corners; a smooth form such as sqrt(x**2 + d**2) for abs(x) can be followed",
-            )  # fmt: skip
-        return Stop(
-            "no convergence", f"the step became smaller than min_step = {exact_text(least)} ({error})",
-            advice(state, self.settings),
-        )  # fmt: skip
-
-    def _meets_corner(self) -> bool:
-        """Return whether the residual bends within a short way along the tangent as only a corner does."""
-        system, x, way = self.state.system, self.state.x, _CORNER * self.state.tangent
-        here = system.residual(x)
-        forth, back = (system.residual(x + sign * way) - here for sign in (1, -1))
-        across = np.random.default_rng(17).standard_normal(system.size)
-        across *= _CORNER / np.sqrt(inner(system, across, across))
-        usual = np.max(np.abs(system.residual(x + across) - here), initial=0.0)
-        return bool(np.max(np.abs(forth + back), initial=0.0) > _JUMP * usual)
+        return no_convergence(self.state, self.settings, error)
 
     # --- one step ------------------------------------------------------------------------------------------------
 
@@ -323,7 +302,7 @@ class Continuation:
         Returns the step and the distance from prediction to corrected point. At the first failure the state's tangent is taken
         anew, right at its point.
         """
-        step, settings, exact = self._up_to_limits(state), self.settings, False
+        step, settings, exact = up_to_limits(state, self.settings.limits, self.settings.min_step), self.settings, False
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
@@ -339,26 +318,6 @@ class Continuation:
             step /= 2
             if step < settings.min_step:
                 raise problem
-
-    def _up_to_limits(self, state: State) -> float:
-        """Return the state's step, shortened where it leads far beyond the limit of a free parameter.
-
-        The equations may have no meaning there, and what lies between the limit and the end of the step is not looked for. The
-        parameter is extrapolated by its rates here and at the point before: a fold may come before the limit, and then no
-        step is shortened.
-        """
-        system, step = state.system, state.step
-        for name in set(system.free) & set(self.settings.limits):
-            at = system.parameter_index(name)
-            size = system.free_scales[at - system.state_size]
-            rate, value = state.tangent[at] * size, state.x[at] * size
-            earlier = state.previous_tangent
-            bend = 0.0 if earlier is None else (rate - earlier[at] * size) / (2 * state.previous_step)
-            room = self.settings.limits[name][int(rate > 0)] - value
-            square = rate * rate + 4 * bend * room
-            if rate * room > 0 and square >= 0:
-                step = min(step, _BEYOND * 2 * room / (rate + math.copysign(math.sqrt(square), rate)))
-        return max(step, self.settings.min_step)
 
     def _attempt(self, state: State, step: float) -> tuple[Segment, float]:
         """Make one step of a given length, as far as it can be believed by itself.

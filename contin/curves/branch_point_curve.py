@@ -74,9 +74,7 @@ class BranchPointCurve(Extended):
             h = _DIFFERENCE / np.abs(v).max()
             change = base.transposed_product(y + h * wide, w) - base.transposed_product(y - h * wide, w)
             gradients.append(np.append(-change / (2 * h), 0.0))
-        extra = len(columns)
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + extra)
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        rows, columns = self.shaped(rows, columns)
         top = np.hstack([np.array(gradients), columns[:, -2:].T])
         psi = self.borders[1]
         residual, factors = base.linearize(y, np.vstack([top, rows]), np.vstack([psi, columns[:, :-2]]))

@@ -184,9 +184,8 @@ class CriticalCurve(Extended):
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
         """Return F and g, and the factored bordered matrix; the gradients of g come first among the border rows."""
-        extra, copies = len(columns), self.copies
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + extra)
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
+        copies = self.copies
+        rows, columns = self.shaped(rows, columns)
         top = np.hstack([self.gradients(x), columns[:, -copies:].T])
         of_kappa = np.zeros((copies - 1, self.base.equations))  # F does not depend on it
         inside = np.vstack([of_kappa, columns[:, :-copies]])

@@ -73,8 +73,4 @@ class EventCurve(Extended):
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
         """Return F and e, and the factored bordered matrix; the row of e comes first among the border rows."""
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        top = np.append(self.gradient(x), columns[:, -1])
-        residual, factors = self.base.linearize(x, np.vstack([top, rows]), columns[:, :-1])
-        return np.append(residual, self.value(x)), factors
+        return self.with_own_rows(x, (self.gradient(x)[None], np.array([self.value(x)])), rows, columns)

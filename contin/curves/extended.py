@@ -18,6 +18,7 @@ from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
+from contin.linalg.factors import Factors
 from contin.problems.statement import Statement, multipliers_of
 from contin.problems.vector_field import found_elsewhere
 
@@ -68,6 +69,25 @@ class Extended(Discretization):
     @abstractmethod
     def on(self, base: System) -> Extended:
         """Return the extended system of another underlying one, with borders of its own."""
+
+    def with_own_rows(
+        self, x: Array, own: tuple[Array, Array], rows: Sequence[Array] | Array, columns: Sequence[Array] | Array
+    ) -> tuple[Array, Factors]:
+        """Return F and the curve's own values, and the factored bordered matrix: their gradients come first among its rows.
+
+        ``own`` holds the gradients (k, size) and the values (k,), x the unknowns of ``base``.
+        """
+        gradients, values = own
+        rows, columns = self.shaped(rows, columns)
+        count = len(gradients)
+        top = np.hstack([gradients, columns[:, -count:].T])
+        residual, factors = self.base.linearize(x, np.vstack([top, rows]), columns[:, :-count])
+        return np.append(residual, values), factors
+
+    def shaped(self, rows: Sequence[Array] | Array, columns: Sequence[Array] | Array) -> tuple[Array, Array]:
+        """Return the rows (k, size + m) and columns (m, equations) of a border as arrays, of which there may be none."""
+        wide = self.size + len(columns)
+        return np.array(rows, dtype=float).reshape(-1, wide), np.array(columns, dtype=float).reshape(-1, self.equations)
 
     @property
     def nodes(self) -> Array:

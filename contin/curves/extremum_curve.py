@@ -73,12 +73,8 @@ class ExtremumCurve(Extended):
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
         """Return F and g, and the factored bordered matrix; the rows of g come first among the border rows."""
-        found, count = self.stationarity(x), self.count
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        top = np.hstack([found.gradients(), columns[:, -count:].T])
-        residual, factors = self.base.linearize(x, np.vstack([top, rows]), columns[:, :-count])
-        return np.append(residual, found.g), factors
+        found = self.stationarity(x)
+        return self.with_own_rows(x, (found.gradients(), found.g), rows, columns)
 
 
 @own_test_functions.register

@@ -114,12 +114,7 @@ class FoldCurve(Extended):
     ) -> tuple[Array, Factors]:
         """Return F and g, and the factored bordered matrix; the row of g comes first among the border rows."""
         v, w, g = self.null_vectors(x)
-        extra = len(columns)
-        rows = np.array(rows, dtype=float).reshape(-1, self.size + extra)
-        columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        row = np.concatenate([self.gradient(x, v, w), columns[:, -1]])
-        residual, factors = self.base.linearize(x, np.vstack([row, rows]), columns[:, :-1])
-        return np.append(residual, g), factors
+        return self.with_own_rows(x, (self.gradient(x, v, w)[None], np.array([g])), rows, columns)
 
 
 @own_test_functions.register

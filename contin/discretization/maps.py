@@ -45,10 +45,6 @@ class MapSystem(Algebraic):
         """Never: products of sparse matrices are not."""
         return False
 
-    def whole_round(self, values: ComplexArray) -> ComplexArray:
-        """Return the logarithms of the multipliers as they are."""
-        return values
-
     def is_drifted(self, x: Array) -> bool:
         """Return whether the multipliers are in doubt: they never are."""
         return False

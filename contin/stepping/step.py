@@ -7,6 +7,7 @@ product. The bordered matrix [F_x; row], row.v = t.v, is regular along the curve
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -23,6 +24,10 @@ _STILL = 0.01
 #: times a hundred for large states. The curvature over it adds an error as large.
 _NEAR = 1e-6
 
+#: A step ends at this many times the distance to a limit, along the tangent, at most: beyond it, and not much. Ten times
+#: larger, a parameter that the equations divide by went through zero, and three branch points before it were lost.
+_BEYOND = 1.25
+
 
 def predict(state: State, step: float) -> Array:
     """Return the guess at a distance ``step``: along the tangent, with the curvature known from the last step."""
@@ -30,6 +35,26 @@ def predict(state: State, step: float) -> Array:
     if state.previous_tangent is not None:
         guess += (step**2 / (2 * state.previous_step)) * (state.tangent - state.previous_tangent)
     return guess
+
+
+def up_to_limits(state: State, limits: Mapping[str, Sequence[float]], least: float) -> float:
+    """Return the state's step, shortened where it leads far beyond the limit of a free parameter, but not below ``least``.
+
+    The equations may have no meaning there, and what lies between the limit and the end of the step is not looked for. The
+    parameter is extrapolated as in `predict`: a fold may come before the limit, and then no step is shortened.
+    """
+    system, step = state.system, state.step
+    for name in set(system.free) & set(limits):
+        at = system.parameter_index(name)
+        size = system.free_scales[at - system.state_size]
+        rate, value = state.tangent[at] * size, state.x[at] * size
+        earlier = state.previous_tangent
+        bend = 0.0 if earlier is None else (rate - earlier[at] * size) / (2 * state.previous_step)
+        room = limits[name][int(rate > 0)] - value
+        square = rate * rate + 4 * bend * room
+        if rate * room > 0 and square >= 0:
+            step = min(step, _BEYOND * 2 * room / (rate + math.copysign(math.sqrt(square), rate)))
+    return max(step, least)
 
 
 def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
