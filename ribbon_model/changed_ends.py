@@ -120,7 +120,7 @@ def _fitted(strip: OpenStrip, states: np.ndarray, values: dict[str, float], unkn
     p = np.array([values.get(name, problem.parameters[name]) for name in order])
     places = np.array([order.index(name) for name in unknown], dtype=np.int64)
     batch = problem.batch("boundary")
-    missed, slopes = batch.jacobian(np.zeros(1), states[:1], states[-1:], p, batch.colouring(places))
+    missed, slopes = batch.jacobian(np.zeros(1), states[:1], states[-1:], p, batch.columns(places))
     missed, by_unknown = missed[0], slopes[0][:, 2 * states.shape[1] :]
     change = np.linalg.lstsq(by_unknown, -missed, rcond=None)[0]
     return values | dict(zip(unknown, (p[places] + change).tolist())), np.abs(missed + by_unknown @ change)

@@ -294,7 +294,7 @@ class OpenStrip:
         problem, states = self.problem, point.system.states(point.x)
         n, batch = problem.dimension, problem.batch("boundary")
         jacobian = batch.jacobian(
-            np.zeros(1), states[:1], states[-1:], point.system.all_parameters(point.x), batch.colouring([])
+            np.zeros(1), states[:1], states[-1:], point.system.all_parameters(point.x), batch.columns([])
         )[1][0]
         count = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
         by_ends = np.concatenate([jacobian[:count, :n], jacobian[:count, 2 * n : 3 * n]], axis=1)

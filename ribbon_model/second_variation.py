@@ -113,7 +113,7 @@ class Equilibrium:
 
 @functools.cache
 def _compiled(law: Law) -> tuple:
-    """Return the strains of a law as compiled functions of M1, M2, M3, and the colouring of their Jacobian."""
+    """Return the strains of a law as compiled functions of M1, M2, M3, and the columns of their Jacobian."""
 
     def strains(u, p, M, response):
         H, w1, w2, w3, conjugate = response
@@ -123,7 +123,7 @@ def _compiled(law: Law) -> tuple:
         return u.M1, u.M2, u.M3
 
     batch = Batch([law.at_points(moment, strains)], [3], ("M1", "M2", "M3"), ("kappa_n", *law.parameters))
-    return batch, batch.colouring([])
+    return batch, batch.columns([])
 
 
 def coupling(moment, force) -> np.ndarray:

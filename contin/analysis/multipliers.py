@@ -109,7 +109,7 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
     points = np.einsum("ij,ejk->eik", basis.value, local)
     rates = np.einsum("ij,ejk->eik", basis.slope, local) / h[:, None, None]
     batch = problem.batch("field")
-    field, by = batch.jacobian(system.gauss_times, points.reshape(-1, 2 * n), u[:0], p, batch.colouring(places))
+    field, by = batch.jacobian(system.gauss_times, points.reshape(-1, 2 * n), u[:0], p, batch.columns(places))
     field, by = field.reshape(count, d, -1), by.reshape(count, d, field.shape[-1], -1)
     weights = np.sqrt(h[:, None] * basis.weights)
     size = lam.size
@@ -125,7 +125,7 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
     residual[:, :, n:] *= share if np.all(np.isfinite(residual)) else 1.0
     rows[:, :, n:] *= share
     ends = problem.batch("boundary")
-    value, by_ends = ends.jacobian(np.zeros(1), u[:1], u[-1:], p, ends.colouring(places))
+    value, by_ends = ends.jacobian(np.zeros(1), u[:1], u[-1:], p, ends.columns(places))
     last = np.zeros((len(by_ends[0]), size + len(places)))
     last[:, :n] += by_ends[0][:, n : 2 * n]
     last[:, size - n : size] += by_ends[0][:, 3 * n : 4 * n]

@@ -318,7 +318,7 @@ def _jacobian(system: Collocation, x: Array) -> Array:
     """Return the derivatives of rhs and integrands by (x, lambda) at the Gauss points, in the user's units."""
     batch = system.problem.batch("field")
     points = system.states_at_gauss_points(x)
-    return batch.jacobian(system.gauss_times, points, points[:0], system.all_parameters(x), batch.colouring([]))[1]
+    return batch.jacobian(system.gauss_times, points, points[:0], system.all_parameters(x), batch.columns([]))[1]
 
 
 def _roots(hll: Array) -> tuple[Array, Array] | None:
@@ -445,8 +445,8 @@ def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:
     problem = system.problem
     assert isinstance(problem, VariationalProblem)
     n, batch, states = problem.dimension, problem.batch("boundary"), system.states(x)
-    colours = batch.colouring([])
-    jacobian = batch.jacobian(np.zeros(1), states[:1], states[-1:], system.all_parameters(x), colours)[1][0]
+    columns = batch.columns([])
+    jacobian = batch.jacobian(np.zeros(1), states[:1], states[-1:], system.all_parameters(x), columns)[1][0]
     by_ends = np.concatenate([jacobian[:, :n], jacobian[:, 2 * n : 3 * n]], axis=1)
     fixed = problem.canonical.fixed
     free = [[i for i in range(n) if i not in places] for places in fixed]

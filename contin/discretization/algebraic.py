@@ -86,11 +86,11 @@ class Algebraic(System):
 
     @functools.cached_property
     def is_sparse(self) -> bool:
-        """The matrix is kept sparse: it is large, and few colours suffice for its entries, or it is given as a sparse one."""
+        """The matrix is kept sparse: it is large, and few of its entries may differ from zero, or it is given as a sparse one."""
         if self.problem.jacobian is not None:
             return self.state_size >= _MANY and self.problem.gives_sparse_matrix
-        colours = len(self._residual.colouring(self._free).owner)
-        return self.state_size >= _MANY and colours <= _FEW * self.size
+        entries = self._residual.columns(self._free).rows.size
+        return self.state_size >= _MANY and entries <= _FEW * self.size * self.equations
 
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
@@ -98,19 +98,18 @@ class Algebraic(System):
         given = _NO_TIME, x[: self.state_size].reshape(1, -1), _none(self.state_size), self._scaled_parameters(x)
         if self.problem.jacobian is not None:
             return self._given_jacobian(x, given)
-        colours = self._residual.colouring(self._free)
+        columns = self._residual.columns(self._free)
         if not self.is_sparse:
-            values, jacobian = self._residual.jacobian(*given, colours)
+            values, jacobian = self._residual.jacobian(*given, columns)
             return values[0], jacobian[0]
         from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s; only large problems need it
 
-        residual, entries = self._residual.entries(*given, colours)
-        rows, columns, _ = colours.entries
-        return residual, csr_array((entries, (rows, columns)), shape=(self.equations, self.size))
+        residual, entries = self._residual.entries(*given, columns)
+        return residual, csr_array((entries, (columns.rows, columns.places)), shape=(self.equations, self.size))
 
     def _given_jacobian(self, x: Array, given: Any) -> tuple[Array, Any]:
         """Return the same with the derivatives by states from the user's function."""
-        values, by_parameters = self._residual.jacobian(*given, self._residual.colouring(self._free, ()))
+        values, by_parameters = self._residual.jacobian(*given, self._residual.columns(self._free, ()))
         matrix: Any = self._own_jacobian(self.states(x)[0], self.all_parameters(x))
         if self.scales is not None:
             rows, columns = 1 / self.scales.rows["residual"], self.scales.states
@@ -148,16 +147,16 @@ class Algebraic(System):
         u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
         batch = self._residual
         if self.problem.jacobian is not None:
-            found: Array = batch.jacobian(_NO_TIME, u, _none(n), p, batch.colouring(which, ()))[1][0]
+            found: Array = batch.jacobian(_NO_TIME, u, _none(n), p, batch.columns(which, ()))[1][0]
             return found
-        colours = batch.colouring(which)
+        columns_of = batch.columns(which)
         if self.is_sparse:
-            rows, places, _ = colours.entries
-            entries = batch.entries(_NO_TIME, u, _none(n), p, colours)[1]
+            rows, places = columns_of.rows, columns_of.places
+            entries = batch.entries(_NO_TIME, u, _none(n), p, columns_of)[1]
             columns = np.zeros((self.equations, len(which)))
             columns[rows[places >= n], places[places >= n] - n] = entries[places >= n]
             return columns
-        dense: Array = batch.jacobian(_NO_TIME, u, _none(n), p, colours)[1][0, :, n:]
+        dense: Array = batch.jacobian(_NO_TIME, u, _none(n), p, columns_of)[1][0, :, n:]
         return dense
 
     def transposed_product(self, x: Array, w: Array) -> Array:
@@ -176,7 +175,7 @@ class Algebraic(System):
         if self.problem.jacobian is not None:
             return np.array([np.asarray(self._own_jacobian(u, p)) for u in states])
         batch, times = self.problem.batch("residual"), np.zeros(len(states))
-        jacobians: Array = batch.jacobian(times, states, _none(self.state_size), p, batch.colouring([]))[1]
+        jacobians: Array = batch.jacobian(times, states, _none(self.state_size), p, batch.columns([]))[1]
         return jacobians
 
     def field_jacobian(self, x: Array) -> Array:
@@ -221,7 +220,7 @@ class Algebraic(System):
             return super().column_gradient(x, name)
         batch = self._batch("functionals")
         u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
-        gradient: Array = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.colouring(self._free))[1][
+        gradient: Array = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.columns(self._free))[1][
             0, names.index(name)
         ]
         return gradient
@@ -274,9 +273,10 @@ class Algebraic(System):
         return other, other.pack(self.states(x), values)
 
 
-#: From so many states on the matrix is kept sparse where no more colours than this part of the columns suffice for it. Below, a
-#: dense factorization takes no longer.
-_MANY, _FEW = 200, 0.1
+#: Smallest number of states for which a sparse matrix is considered. Below, a dense factorization takes no longer.
+_MANY = 200
+#: Largest part of its entries that may differ from zero.
+_FEW = 0.1
 #: Sets of eigenvalues that are kept: more than a search for Hopf points compares.
 _KEPT = 16
 #: The t of functions that do not take it.

@@ -21,7 +21,7 @@ from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
 from contin.errors import ProblemError
-from contin.functions.colouring import Colouring
+from contin.functions.batch import Columns
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks, Layout, layout
@@ -103,8 +103,8 @@ class Collocation(System):
         return layout(self.problem.batch("field").depends[:n, :n], self.degree)
 
     @functools.cached_property
-    def _colourings(self) -> tuple[Colouring, Colouring]:
-        return self._colourings_for(self._free)
+    def _columns(self) -> tuple[Columns, Columns]:
+        return self._columns_for(self._free)
 
     @functools.cached_property
     def _field(self) -> Any:
@@ -116,10 +116,10 @@ class Collocation(System):
         """Boundary conditions, compiled."""
         return self._batch("boundary", ("boundary",))
 
-    def _colourings_for(self, parameters: Indices) -> tuple[Colouring, Colouring]:
-        """Colourings of field, by states in the layout's order, and of boundary; each by these parameters, too."""
+    def _columns_for(self, parameters: Indices) -> tuple[Columns, Columns]:
+        """Columns of field, by states in the layout's order, and of boundary; each by these parameters, too."""
         problem = self.problem
-        return problem.batch("field").colouring(parameters, self._layout.order), problem.batch("boundary").colouring(parameters)
+        return problem.batch("field").columns(parameters, self._layout.order), problem.batch("boundary").columns(parameters)
 
     # --- vectors of unknowns -------------------------------------------------------------------------------------
 
@@ -198,7 +198,7 @@ class Collocation(System):
         problem, n, d, k = self.problem, self._n, self._d, len(self.free)
         p, u = self._scaled_parameters(x), self._scaled_states(x)
         points = self.at_gauss_points(x)
-        of_field, of_boundary = self._colourings
+        of_field, of_boundary = self._columns
         field, jacobian = self._field.jacobian(self._times, points, _NONE(n), p, of_field)
         boundary, ends = self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
         c, r = len(columns), len(rows) + problem.integral_size
@@ -228,7 +228,7 @@ class Collocation(System):
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of the residual by any parameters, free or not, shape (equations, len(names))."""
         n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
-        of_field, of_boundary = self._colourings_for(self._indices(names))
+        of_field, of_boundary = self._columns_for(self._indices(names))
         field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, :, n:]
         ends = self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0, :, 2 * n :]
         collocation = -(self._h_points[:, :, None] * field[:, :n]).reshape(-1, len(names))
@@ -274,7 +274,7 @@ class Collocation(System):
             return super().column_gradient(x, name)
         batch, at = self._functional_derivatives, self._integrated.index(name)
         given = self._times, self.at_gauss_points(x), _NONE(self._n), self._scaled_parameters(x)
-        slopes = self._quadrature[:, None] * batch.jacobian(*given, batch.colouring(self._free))[1][:, at]
+        slopes = self._quadrature[:, None] * batch.jacobian(*given, batch.columns(self._free))[1][:, at]
         by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
         by_node = np.zeros((self.nodes.size, self._n))
         np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
@@ -282,8 +282,8 @@ class Collocation(System):
 
     @functools.cached_property
     def _functional_derivatives(self) -> Any:
-        """Functionals with their derivatives, compiled."""
-        return self._batch("functional derivatives")
+        """Functionals, with scaled inputs."""
+        return self._batch("functionals")
 
     # --- meshes --------------------------------------------------------------------------------------------------
 
@@ -306,7 +306,7 @@ class Collocation(System):
     def _row_sizes(self, x: Array) -> tuple[Array, Array]:
         """Return the largest entries of the rows of boundary and integral conditions, as powers of two."""
         n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
-        of_field, of_boundary = self._colourings
+        of_field, of_boundary = self._columns
         ends = self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0]
         field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1][:, n:]
         return usual(np.abs(ends).max(axis=1, initial=0.0)), usual(np.abs(field).max(axis=(0, 2), initial=0.0))
@@ -323,7 +323,7 @@ class Collocation(System):
         derivative of both ends.
         """
         n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
-        of_field, of_boundary = self._colourings
+        of_field, of_boundary = self._columns
         field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1]
         ends = np.abs(self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0])
         field = np.abs(field).max(axis=0)

@@ -82,7 +82,7 @@ class ConnectionCollocation(Conditioned):
     def _jacobian_at(self, place: Array, p: Array) -> Array:
         """Return the derivatives of the field by the states at one place, scaled, for values of all parameters."""
         batch, n, sizes = self.problem.batch("vector field"), self._n, self._sizes
-        jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.colouring([]))[1][0, :, :n]
+        jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.columns([]))[1][0, :, :n]
         return jacobian * sizes / sizes[:, None]
 
     def _left_vectors(self, p: Array, bases: Any) -> list[list[Array]]:

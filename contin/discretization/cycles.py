@@ -142,9 +142,9 @@ class PeriodicCollocation(Collocation):
         Of an autonomous field the states may be any, of a forced one they are those at the Gauss points.
         """
         n, times = self._n, np.zeros(len(points)) if self.autonomous else self._times
-        colours = self.problem.batch("field").colouring([])
+        columns = self.problem.batch("field").columns([])
         none, p = np.empty((0, n)), self._scaled_parameters(x)
-        derivatives: Array = self._field.jacobian(times, points, none, p, colours)[1][:, :n, :n]
+        derivatives: Array = self._field.jacobian(times, points, none, p, columns)[1][:, :n, :n]
         return derivatives
 
     def _jacobian_of_field(self, x: Array) -> Array:

@@ -55,10 +55,10 @@ def _matrix(problem: AlgebraicProblem, u: Array, p: Array) -> Any:
     from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s; few problems need it
 
     batch = problem.batch("residual")
-    colours = batch.colouring([])
-    entries = batch.entries(np.zeros(1), u[None], np.empty((0, u.size)), p, colours)[1]
-    rows, columns, _ = colours.entries
-    return csr_array((entries, (rows, columns)), shape=(problem.equation_size, u.size))
+    columns = batch.columns([])
+    entries = batch.entries(np.zeros(1), u[None], np.empty((0, u.size)), p, columns)[1]
+    rows, places = columns.rows, columns.places
+    return csr_array((entries, (rows, places)), shape=(problem.equation_size, u.size))
 
 
 def _slope(problem: AlgebraicProblem, u: Array, p: Array, direction: Array) -> tuple[Array, Array]:

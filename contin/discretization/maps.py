@@ -68,10 +68,10 @@ class MapSystem(Algebraic):
     def differentiated(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
         """Return the residual, and its derivatives by the states and by these parameters."""
         batch, p, n = self.problem.batch("map"), self.all_parameters(x), self.state_size
-        colours, none = batch.colouring(self._indices(names)), np.empty((0, n))
+        columns, none = batch.columns(self._indices(names)), np.empty((0, n))
         states, total = x[None, :n], np.eye(n, n + len(names))
         for _ in range(self.rounds):
-            states, (jacobian,) = batch.jacobian(np.zeros(1), states, none, p, colours)
+            states, (jacobian,) = batch.jacobian(np.zeros(1), states, none, p, columns)
             total = jacobian[:, :n] @ total
             total[:, n:] += jacobian[:, n:]
         total[:, :n] -= np.eye(n)

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin.arrays import Array, Indices, Pattern
-from contin.functions.batch import Batch
-from contin.functions.colouring import Colouring
+from contin.functions.batch import Batch, Columns
 
 #: Sizes between these bounds count as one: problems of everyday sizes are not scaled. Tolerances relative to 1 + |x| suit large
 #: numbers, and small ones less.
@@ -71,25 +70,45 @@ class ScaledBatch:
         """Sparsity pattern."""
         return self._batch.depends
 
-    def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:
-        """Return the colouring of the batch."""
-        return self._batch.colouring(free, order)
+    def columns(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Columns:
+        """Return the columns of derivatives, as `Batch.columns`."""
+        return self._batch.columns(free, order)
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (points, count)."""
-        return self._batch.values(t, u * self._states, v * self._states, p * self._parameters) / self._values
+        return self._batch.values(*self._given(t, u, v, p)) / self._values
 
-    def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
-        """Return values and derivatives, shape (points, count, colours.width)."""
-        arguments = u * self._states, v * self._states, p * self._parameters
-        values, jacobian = self._batch.jacobian(t, *arguments, colours)
-        return values / self._values, jacobian * self._inputs[colours.columns] / self._values[:, None]
+    def jacobian(self, t: Array, u: Array, v: Array, p: Array, columns: Columns) -> tuple[Array, Array]:
+        """Return values and derivatives, shape (points, count, columns.width)."""
+        values, jacobian = self._batch.jacobian(*self._given(t, u, v, p), columns)
+        return values / self._values, jacobian * self._inputs[columns.inputs] / self._values[:, None]
 
-    def entries(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
+    def entries(self, t: Array, u: Array, v: Array, p: Array, columns: Columns) -> tuple[Array, Array]:
         """Return the values at one place and the entries of the Jacobian, as `Batch.entries`."""
-        values, entries = self._batch.entries(t, u * self._states, v * self._states, p * self._parameters, colours)
-        rows, columns, _ = colours.entries
-        return values / self._values, entries * self._inputs[colours.columns[columns]] / self._values[rows]
+        values, entries = self._batch.entries(*self._given(t, u, v, p), columns)
+        return values / self._values, entries * self._inputs[columns.inputs[columns.places]] / self._values[columns.rows]
+
+    def along(self, t: Array, u: Array, v: Array, p: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of the values along directions, as `Batch.along`."""
+        along = [direction * self._inputs for direction in directions]
+        return self._batch.along(*self._given(t, u, v, p), along) / self._values
+
+    def jacobian_along(
+        self, t: Array, u: Array, v: Array, p: Array, columns: Columns, directions: Sequence[Array]
+    ) -> Array:
+        """Return the derivative of the Jacobian along directions, as `Batch.jacobian_along`."""
+        along = [direction * self._inputs for direction in directions]
+        jacobian = self._batch.jacobian_along(*self._given(t, u, v, p), columns, along)
+        return jacobian * self._inputs[columns.inputs] / self._values[:, None]
+
+    def bent(self, t: Array, u: Array, v: Array, p: Array, weights: Array, direction: Array, columns: Columns) -> Array:
+        """Return the gradient of w.(J d), as `Batch.bent`."""
+        found = self._batch.bent(*self._given(t, u, v, p), weights / self._values, direction * self._inputs, columns)
+        return found * self._inputs[columns.inputs]
+
+    def _given(self, t: Array, u: Array, v: Array, p: Array) -> tuple[Array, Array, Array, Array]:
+        """Return the arguments of the batch in the user's units."""
+        return t, u * self._states, v * self._states, p * self._parameters
 
     @property
     def _inputs(self) -> Array:

@@ -1,66 +1,54 @@
-"""A user's functions evaluated at many points in one call, with their exact Jacobian.
+"""A user's functions evaluated at many points in one call, with exact derivatives.
 
-Functions of a point, ``f(t, u, p)``, are called in a compiled loop over the points, and differentiated there by the complex
-step: with h = 2^-300 the imaginary part of ``f(u + i h e_j)`` divided by h is the derivative to round-off. The loop is a
-generated kernel. Its key is a fingerprint of everything that the functions read, so a second process compiles nothing, and an
-edit of a constant or of a helper in another file compiles anew.
+The functions are recorded (`contin.functions.recording`), differentiated on the recording, and run by the interpreter. What cannot
+be recorded is evaluated in Python (`contin.functions.interpreted`); a warning says so once.
 """
 
 from __future__ import annotations
 
-import contextlib
-import functools
 import time
-from collections import namedtuple
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from contin import threads
 from contin.arrays import Array, Function, Indices, Pattern
-from contin.errors import CompilationError, ProblemError
-from contin.functions.cache import keep_text, kept_text
-from contin.functions.colouring import Colouring, SparsePattern, colouring
-from contin.functions.complex_step import ComplexStep
+from contin.errors import ProblemError
+from contin.functions import derivatives
 from contin.functions.interpreted import Interpreted
-from contin.functions.kernel import Kernel
-from contin.functions.kernel_parts import IndexMatrix, IndexVector, Matrix, Stack, Vector
-from contin.functions.machine_code import Raised
-from contin.functions.pointwise import Pointwise, parts, searches
+from contin.functions.interpreter import LANES, evaluate
+from contin.functions.program import TIME, Inputs, Program, Slope, program
+from contin.functions.recording import Recording, checked, record
 from contin.functions.signature import Signature, named_values, takes_arrays
-from contin.functions.sparsity import sparsity_pattern
+from contin.functions.tape import Number, Unrecordable
 
-#: The generated kernel. What it says is part of the fingerprint: an edit compiles every problem anew.
-_TEMPLATE = """
-def evaluate(
-    t: Vector, u: Matrix, v: Matrix, p: Vector, inputs: IndexVector, owner: IndexMatrix, work: Vector, out: Matrix, jac: Stack
-) -> None:
-    for i in range(u.shape[0]):
-{real}
-"""
-#: The rest of it, for derivatives.
-_DERIVATIVES = """
-{between}
-        for colour in range(owner.shape[0]):
-            for s in range(inputs[colour], inputs[colour + 1]):
-                work[inputs[s]] = STEP
-{complex}
-            for row in range(owner.shape[1]):
-                if owner[colour, row] >= 0:
-                    jac[i, row, owner[colour, row]] = work[{inputs} + row] / STEP
-            for s in range(inputs[colour], inputs[colour + 1]):
-                work[inputs[s]] = 0.0
-"""
-#: Between values and derivatives: a loop for each, or one for both, with what was found for the values.
-_OTHER_LOOP = "    if jac.size == 0:\n        return\n    for i in range(u.shape[0]):"
-_SAME_LOOP = "        if jac.size == 0:\n            continue"
-#: The complex step: no sum of it and a number of the problem is rounded to another number.
-_STEP = 2.0**-300
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The inputs to differentiate by, in order, and the entries of that Jacobian that may differ from zero.
+
+    Attributes
+    ----------
+    inputs : ndarray of int, shape (columns,)
+        Their numbers among u, v and p.
+    rows, places : ndarray of int
+        Values and columns of the entries.
+    """
+
+    inputs: Indices
+    rows: Indices
+    places: Indices
+
+    @property
+    def width(self) -> int:
+        """Number of columns of the Jacobian."""
+        return self.inputs.size
 
 
 class Batch:
-    """Functions of a point, compiled together: values and exact Jacobian at many points in one call.
+    """Functions of a point, prepared together: values and exact Jacobian at many points in one call.
 
     Parameters
     ----------
@@ -74,17 +62,13 @@ class Batch:
         Names, in order.
     times : bool
         The functions take t; ``f(u, p)`` without.
-    derivatives : bool
-        There is a Jacobian. Without, half as much is compiled.
-    pattern : SparsePattern, optional
-        Which values depend on which inputs, where that is known; traced by default.
-    reads : sequence of str, optional
-        The parameters that the functions read, if it is known: the compiled code then serves problems with others, too.
+    pattern : pair of ndarray of int, optional
+        Values and inputs of the entries of the Jacobian, where they are known and the functions cannot be recorded.
 
     Warns
     -----
     InterpretedWarning
-        A function that cannot be compiled, when derivatives are first asked for; the message says which and why.
+        A function that cannot be recorded, when derivatives are first asked for; the message says which and why.
 
     Raises
     ------
@@ -97,7 +81,7 @@ class Batch:
     >>> none = np.empty((0, 2))
     >>> batch.values(np.zeros(1), np.array([[2.0, 3.0]]), none, np.array([5.0]))
     array([[ 6., 10.]])
-    >>> batch.jacobian(np.zeros(1), np.array([[2.0, 3.0]]), none, np.array([5.0]), batch.colouring([0]))[1]
+    >>> batch.jacobian(np.zeros(1), np.array([[2.0, 3.0]]), none, np.array([5.0]), batch.columns([0]))[1]
     array([[[3., 2., 0.],
             [5., 0., 2.]]])
     """
@@ -111,289 +95,306 @@ class Batch:
         *,
         ends: bool = False,
         times: bool = True,
-        derivatives: bool = True,
-        reads: Sequence[str] | None = None,
-        pattern: SparsePattern | None = None,
+        pattern: tuple[Indices, Indices] | None = None,
     ) -> None:
-        read = parameters if reads is None else sorted(set(reads) & set(parameters))
-        self.signature = Signature(tuple(states), tuple(read), times and not ends, ends)
-        self._reads: Indices = np.array([list(parameters).index(name) for name in read], dtype=np.int64)
-        self._parameters, self._derivatives = len(parameters), derivatives
+        self.signature = Signature(tuple(states), tuple(parameters), times and not ends, ends)
         self.count = sum(max(count, 1) for count in counts)
         self._functions = tuple(_filling(function, count, self.signature) for function, count in zip(functions, counts))
         self._counts = tuple(counts)
         if not self._functions or len(functions) != len(counts):
             raise ProblemError("functions: there must be at least one, with a count for each")
-        self._pattern = pattern
-        self._colourings: dict[tuple[int, ...], Colouring] = {}
-        self._seconds: dict[int, float] = {}  # a place takes, by the number of colours
+        self._programs: dict[Hashable, Any] = {}
+        self._seconds: dict[int, float] = {}  # a point takes, by the number of instructions
+        self.interpreted: Interpreted | None = None
+        self.recording: Recording | None = None
         try:
-            self._evaluate: Any = self._compiled(derivatives)
-        except CompilationError as error:
-            self._evaluate = Interpreted(self._functions, self._counts, self.signature, str(error))
-
-    def _compiled(self, derivatives: bool) -> Any:
-        """Return the generated kernel.
-
-        Raises
-        ------
-        CompilationError
-        """
-        source = _source(self.signature, self._functions, self._counts, derivatives)
-        self._key = self._fingerprint(source)
-        return _evaluate(self._key, source, self.signature, self._functions)
+            self.recording = checked(self._functions, self._counts, self.signature)
+        except Unrecordable as reason:
+            self.interpreted = Interpreted(self._functions, self._counts, self.signature, str(reason), pattern)
 
     def is_current(self) -> bool:
-        """Return whether all constants that the functions read still have the values that were compiled."""
-        if isinstance(self._evaluate, Interpreted):
-            return True  # it reads them at each call
-        source = _source(self.signature, self._functions, self._counts, self._derivatives)
+        """Return whether all constants that the functions read still have the values that were recorded."""
+        if self.recording is None:
+            return True  # functions evaluated in Python read them at each call
         try:
-            return self._fingerprint(source) == self._key
-        except CompilationError:
+            return self.recording.same(record(self._functions, self._counts, self.signature))
+        except Unrecordable:
             return False
 
-    def _fingerprint(self, source: str) -> str:
-        """Return the fingerprint of the functions, and of everything that they read.
+    def describe(self) -> str:
+        """Return one line: how the functions are evaluated, and how many operations they have."""
+        names = ", ".join(getattr(function, "__name__", "function") for function in self._functions)
+        if self.interpreted is not None:
+            return f"{names}: evaluated in Python, because {self.interpreted.reason}"
+        every = self.columns(range(len(self.signature.parameters)))
+        both = self._slopes(tuple(every.inputs.tolist()))[0].operations
+        return f"{names}: recorded, {self._values_program().operations} operations, {both} with all first derivatives"
 
-        Raises
-        ------
-        CompilationError
-        """
-        rewriter = ComplexStep()
-        for function in self._functions:
-            rewriter.function(parts(function)[0])
-        for solve in searches(self._functions):
-            rewriter.function(solve)
-        rewriter.note(source, self.signature.states, self.signature.parameters)
-        return rewriter.fingerprint()
+    # --- values and first derivatives --------------------------------------------------------------------------------
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (points, count), at ``t`` (points,), ``u`` (points, n), ``v`` likewise or (0, n), ``p``."""
-        out, p = np.empty((len(u), self.count)), p[self._reads]
-        try:
-            if len(u) < _MANY:
-                self._evaluate(t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN)
-            else:
-                self._evaluate_many((t, u, v, p, _NO_INPUTS, _NO_OWNER, _NO_WORK, out, _NO_JACOBIAN))
-        except Raised as error:
-            raise error.exception() from None
+        if self.interpreted is not None:
+            return self.interpreted.values(t, u, v, p)
+        out = np.empty((len(u), self.count))
+        self._run(self._values_program(), t, u, v, p, out, _NO_JACOBIAN)
         return out
 
-    def jacobian(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
-        """Return values and derivatives, shape (points, count, colours.width), in the columns that ``colours`` is for."""
-        out, new = np.empty((len(u), self.count)), np.zeros if len(u) < _MANY else np.empty
-        jac, p = new((len(u), self.count, colours.width)), p[self._reads]
-        work = np.zeros(self.signature.inputs + self.count)
-        try:
-            if len(u) < _MANY:
-                self._evaluate(t, u, v, p, colours.inputs, colours.owner, work, out, jac)
-            else:
-                self._evaluate_many((t, u, v, p, colours.inputs, colours.owner, work, out, jac))
-        except Raised as error:
-            exception = error.exception()
-            if not isinstance(exception, ZeroDivisionError):
-                raise exception from None
-            out.fill(np.nan)  # the quotient of real numbers is infinite there, that of complex ones an error
-            jac.fill(np.nan)
+    def jacobian(self, t: Array, u: Array, v: Array, p: Array, columns: Columns) -> tuple[Array, Array]:
+        """Return values and derivatives, shape (points, count, columns.width)."""
+        if self.interpreted is not None:
+            return self.interpreted.jacobian(t, u, v, p, columns.inputs)
+        out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, columns.width))
+        self._run(self._slopes(tuple(columns.inputs.tolist()))[0], t, u, v, p, out, jac)
         return out, jac
 
-    def entries(self, t: Array, u: Array, v: Array, p: Array, colours: Colouring) -> tuple[Array, Array]:
-        """Return the values at one place, shape (count,), and entries of the Jacobian in the order of `Colouring.entries`."""
-        values, compressed = self.jacobian(t, u, v, p, colours.compressed())
-        rows, _, colour = colours.entries
-        return values[0], compressed[0, rows, colour]
+    def entries(self, t: Array, u: Array, v: Array, p: Array, columns: Columns) -> tuple[Array, Array]:
+        """Return the values at one point, shape (count,), and the entries of the Jacobian in the order of `Columns`."""
+        if self.interpreted is not None:
+            return self.interpreted.entries(t, u, v, p, columns.inputs, columns.rows, columns.places)
+        out, jac = np.empty((1, self.count)), np.empty((1, 1, columns.rows.size))
+        self._run(self._slopes(tuple(columns.inputs.tolist()), packed=True)[0], t, u, v, p, out, jac)
+        return out[0], jac[0, 0]
 
-    def _evaluate_many(self, given: _Arguments) -> None:
-        """Call the kernel for many places, in several threads where one took long before.
+    def columns(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Columns:
+        """Return the columns of derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters."""
+        states = len(self.signature.states) * (1 + self.signature.ends)
+        inputs = (*(range(states) if order is None else map(int, order)), *(states + int(slot) for slot in free))
+        if ("columns", inputs) not in self._programs:
+            self._programs["columns", inputs] = self._columns(inputs)
+        found: Columns = self._programs["columns", inputs]
+        return found
 
-        Raises
-        ------
-        Raised
-            What one call for all places raises: the same for any number of threads.
-        """
-        count, kind = len(given[1]), len(given[5])
-        long = count * self._seconds.get(kind, 0.0) > _LONG and not isinstance(self._evaluate, Interpreted)
-        if long and threads.count() > 1:
-            with contextlib.suppress(Raised):  # parts are not in the order of one call
-                threads.each(self._evaluate_part, _divided(given))
-                return
-        began = time.perf_counter()
-        self._evaluate_part(given)
-        self._seconds[kind] = (time.perf_counter() - began) / count
-
-    def _evaluate_part(self, given: _Arguments) -> None:
-        """Call the kernel, which leaves zeros of the Jacobian as they are."""
-        given[-1].fill(0.0)
-        self._evaluate(*given)
-
-    def colouring(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Colouring:
-        """Return the colouring for derivatives by u, in this ``order``, by v (with ``ends``), and by ``free`` parameters.
-
-        Raises
-        ------
-        ProblemError
-            A batch without derivatives.
-        """
-        if not self._derivatives:
-            raise ProblemError("derivatives: this batch was made without them")
-        inputs = len(self.signature.states) * (1 + self.signature.ends)
-        columns = (*(range(inputs) if order is None else map(int, order)), *(inputs + int(slot) for slot in free))
-        if columns not in self._colourings:
-            found = colouring(self.depends if self._pattern is None else self._pattern, columns)
-            starts, places = len(found.owner) + 1, {int(slot): place for place, slot in enumerate(self._inputs)}
-            perturbed = [places[slot] for slot in found.inputs[starts:].tolist()]  # as the compiled code numbers them
-            self._colourings[columns] = found._replace(inputs=np.array([*found.inputs[:starts], *perturbed], dtype=np.int64))
-        return self._colourings[columns]
+    def _columns(self, inputs: tuple[int, ...]) -> Columns:
+        if self.interpreted is not None:
+            rows, places = self.interpreted.entries_of(inputs)
+        else:
+            entries = self._slopes(inputs)[1]
+            rows, places = (np.array([entry[side] for entry in entries], dtype=np.int64) for side in (0, 1))
+        return Columns(np.array(inputs, dtype=np.int64), rows, places)
 
     @property
-    def _inputs(self) -> Indices:
-        """The numbers, among u, v and all of p, of the inputs that the compiled code has."""
-        before = self.signature.inputs - len(self._reads)
-        return np.concatenate([np.arange(before), before + self._reads])
-
-    @functools.cached_property
     def depends(self) -> Pattern:
         """Sparsity pattern: which values depend on which of u, v (with ``ends``), p; shape (count, inputs)."""
-        pattern = np.zeros((self.count, self.signature.inputs - len(self._reads) + self._parameters), dtype=bool)
-        pattern[:, self._inputs] = sparsity_pattern(self._functions, self._counts, self.signature)
+        pattern = np.zeros((self.count, self.signature.inputs), dtype=bool)
+        every = self.columns(range(len(self.signature.parameters)))
+        pattern[every.rows, every.places] = True
         return pattern
+
+    # --- higher derivatives ------------------------------------------------------------------------------------------
+
+    def along(self, t: Array, u: Array, v: Array, p: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of the values along directions, D^k f [d_1, ..., d_k], shape (points, count).
+
+        Parameters
+        ----------
+        directions : sequence of ndarray, shape (points, inputs)
+            Directions in the space of u, v (with ``ends``) and p.
+        """
+        if self.interpreted is not None:
+            return self.interpreted.along(t, u, v, p, directions)
+        out = np.empty((len(u), self.count))
+        self._run(self._along(len(directions)), t, u, np.hstack([v[: len(u)] if self.signature.ends else u[:, :0], *directions]),
+                  p, out, _NO_JACOBIAN)  # fmt: skip
+        return out
+
+    def jacobian_along(
+        self, t: Array, u: Array, v: Array, p: Array, columns: Columns, directions: Sequence[Array]
+    ) -> Array:
+        """Return the derivative of the Jacobian along directions (as in `along`), shape (points, count, columns.width)."""
+        inputs = tuple(columns.inputs.tolist())
+        if self.interpreted is not None:
+            return self.interpreted.jacobian_along(t, u, v, p, columns.inputs, directions)
+        jac = np.zeros((len(u), self.count, columns.width))
+        given = np.hstack([v[: len(u)] if self.signature.ends else u[:, :0], *directions])
+        self._run(self._jacobian_along(inputs, len(directions)), t, u, given, p, np.empty((len(u), 0)), jac)
+        return jac
+
+    def bent(self, t: Array, u: Array, v: Array, p: Array, weights: Array, direction: Array, columns: Columns) -> Array:
+        """Return the gradient of w.(J d), the Hessian of w.f times d, for weights w and a direction d.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (points, count)
+        direction : ndarray, shape (points, inputs)
+
+        Returns
+        -------
+        ndarray, shape (points, columns.width)
+        """
+        if self.interpreted is not None:
+            along = self.interpreted.jacobian_along(t, u, v, p, columns.inputs, [direction])
+            contracted: Array = np.einsum("ka,kaj->kj", weights, along)
+            return contracted
+        inputs = tuple(columns.inputs.tolist())
+        given = np.hstack([v[: len(u)] if self.signature.ends else u[:, :0], direction, weights])
+        jac = np.zeros((len(u), 1, columns.width))
+        self._run(self._bent(inputs), t, u, given, p, np.empty((len(u), 0)), jac)
+        return jac[:, 0]
+
+    # --- programs ----------------------------------------------------------------------------------------------------
+
+    def _kept(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        if key not in self._programs:
+            self._programs[key] = make()
+        return self._programs[key]
+
+    def _known(self) -> Recording:
+        assert self.recording is not None
+        return self.recording
+
+    def _values_program(self) -> Program:
+        found: Program = self._kept(
+            "values", lambda: program(self._known().tape, list(zip(self._known().results, range(self.count))), self._inputs())
+        )
+        return found
+
+    def _slopes(self, inputs: tuple[int, ...], packed: bool = False) -> tuple[Program, list[tuple[int, int]]]:
+        """Return the program of values and derivatives by these inputs, and the entries that it fills, by value and column."""
+        found: tuple[Program, list[tuple[int, int]]] = self._kept(
+            ("slopes", inputs, packed), lambda: self._slopes_program(inputs, packed)
+        )
+        return found
+
+    def _slopes_program(self, inputs: tuple[int, ...], packed: bool) -> tuple[Program, list[tuple[int, int]]]:
+        recording, entries = self._known(), self._jacobian_entries(inputs)
+        at = {entry: number if packed else entry[0] * len(inputs) + entry[1] for number, entry in enumerate(entries)}
+        stores: list[tuple[int, int | Slope]] = list(zip(recording.results, range(self.count)))
+        stores += [(place, Slope(at[entry])) for entry, place in entries.items()]
+        return program(recording.tape, stores, self._inputs()), list(entries)
+
+    def _jacobian_entries(self, inputs: tuple[int, ...]) -> dict[tuple[int, int], int]:
+        """Return the places of the derivatives that are not zero everywhere."""
+        recording = self._known()
+        distinct = sorted(set(inputs))
+        found: dict[tuple[int, int], int] = self._kept(
+            ("entries", tuple(distinct)),
+            lambda: derivatives.jacobian(recording.tape, recording.results, [recording.inputs[slot] for slot in distinct]),
+        )
+        columns: dict[int, list[int]] = {}
+        for column, slot in enumerate(inputs):
+            columns.setdefault(distinct.index(slot), []).append(column)
+        entries = {(row, column): place for (row, slot), place in found.items() for column in columns[slot]}
+        return dict(sorted(entries.items()))
+
+    def _tangents(self, places: Sequence[int], number: int) -> list[int]:
+        """Return the derivatives of operations along the direction of a number."""
+        recording = self._known()
+        along = {
+            place: recording.tape.input(("direction", number, slot)).place for slot, place in enumerate(recording.inputs)
+        }
+        return derivatives.tangents(recording.tape, places, along)
+
+    def _along(self, order: int) -> Program:
+        def make() -> Program:
+            places = list(self._known().results)
+            for number in range(order):
+                places = self._tangents(places, number)
+            return program(self._known().tape, list(zip(places, range(self.count))), self._inputs(order))
+
+        found: Program = self._kept(("along", order), make)
+        return found
+
+    def _jacobian_along(self, inputs: tuple[int, ...], order: int) -> Program:
+        def make() -> Program:
+            entries = self._jacobian_entries(inputs)
+            places = list(entries.values())
+            for number in range(order):
+                places = self._tangents(places, number)
+            stores = [(place, Slope(row * len(inputs) + column)) for (row, column), place in zip(entries, places)]
+            return program(self._known().tape, stores, self._inputs(order))
+
+        found: Program = self._kept(("jacobian along", inputs, order), make)
+        return found
+
+    def _bent(self, inputs: tuple[int, ...]) -> Program:
+        def make() -> Program:
+            recording = self._known()
+            tape = recording.tape
+            first = self._tangents(recording.results, 0)
+            weights = [tape.input(("weight", row)) for row in range(self.count)]
+            total = tape.number(0.0)
+            for weight, place in zip(weights, first):
+                total = total + weight * Number(tape, place)
+            entries = derivatives.jacobian(tape, [total.place], [recording.inputs[slot] for slot in inputs])
+            stores = [(place, Slope(column)) for (_, column), place in entries.items()]
+            return program(tape, stores, self._inputs(1, weights=True))
+
+        found: Program = self._kept(("bent", inputs), make)
+        return found
+
+    def _inputs(self, directions: int = 0, weights: bool = False) -> Inputs:
+        """Return where inputs are found: directions and weights stand behind v."""
+        states, signature = len(self.signature.states), self.signature
+        ends = states if signature.ends else 0
+        v: dict[Hashable, int] = {states + column: column for column in range(ends)}
+        for number in range(directions):
+            for slot in range(signature.inputs):
+                v["direction", number, slot] = len(v)
+        if weights:
+            v |= {("weight", row): len(v) + row for row in range(self.count)}
+        p: Mapping[Hashable, int] = {states + ends + slot: slot for slot in range(len(signature.parameters))}
+        return Inputs({column: column for column in range(states)}, v, p)
+
+    # --- the interpreter ---------------------------------------------------------------------------------------------
+
+    def _run(self, found: Program, t: Array, u: Array, v: Array, p: Array, out: Array, jac: Array) -> None:
+        """Run a program for all points, in several threads where one took long before."""
+        count, kind = len(u), len(found.code)
+        if count < _MANY:
+            _evaluate(found, t, u, v, p, out, jac)
+            return
+        if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
+            threads.each(_evaluate, _divided(found, t, u, v, p, out, jac))
+            return
+        began = time.perf_counter()
+        _evaluate(found, t, u, v, p, out, jac)
+        self._seconds[kind] = (time.perf_counter() - began) / count
+
+
+def _evaluate(found: Program, t: Array, u: Array, v: Array, p: Array, out: Array, jac: Array) -> None:
+    """Run a program for some points."""
+    scalars = found.scalars.copy()
+    scalars[found.parameters : found.parameters + len(p)] = p
+    work, scratch = np.empty(found.registers * LANES), np.empty((max(found.unknowns, 1), found.unknowns + 1))
+    evaluate(found.code, found.first, found.last, found.lists, scalars, found.tables, t, u, v, work, scratch, out, jac)
+
+
+def _divided(found: Program, t: Array, u: Array, v: Array, p: Array, out: Array, jac: Array) -> list[tuple[Any, ...]]:
+    """Return the arguments of `_evaluate` for all points, in parts that begin with a block."""
+    blocks = -(-len(u) // LANES)
+    ends = [min(len(u), LANES * (blocks * part // _PARTS)) for part in range(_PARTS)] + [len(u)]
+    return [(found, t[a:b], u[a:b], v[a:b], p, out[a:b], jac[a:b]) for a, b in zip(ends, ends[1:])]
 
 
 def _filling(function: Function, count: int, signature: Signature) -> Function:
     """Return a function that takes states as arrays only as one that fills an array; any other one as it is."""
-    if isinstance(function, Pointwise) or signature.fills(function) or not takes_arrays(function, signature.arguments):
+    if signature.fills(function) or not takes_arrays(function, signature.arguments):
         return function
-    before = ["t"] * signature.times + ["u", "v"][: 1 + signature.ends]
-    named = f"P({''.join(f'p[{i}], ' for i in range(len(signature.parameters)))})"
-    lines = [f"def filling({', '.join([*before, 'p', 'out'])}):", f"    r = function({', '.join([*before, named])})"]
-    if count <= _WRITTEN_OUT:
-        lines += [f"    out[{i}] = r[{i}]" for i in range(count)] or ["    out[0] = r"]
-    else:
-        lines += [f"    for i in range({count}):", "        out[i] = r[i]"]
-    scope: dict[str, Any] = {"function": function, "P": named_values(signature.parameters), "__name__": __name__}
-    exec("\n".join(lines), scope)
-    scope["filling"].__name__ = getattr(function, "__name__", "function")
-    found: Function = scope["filling"]
-    return found
+    named, arity = named_values(signature.parameters), len(signature.arguments)
+
+    def fill(given: Sequence[Any], out: Any) -> None:
+        result = function(*given[:-1], named(*given[-1]))
+        if count:
+            out[:] = result
+        else:
+            out[0] = result
+
+    if arity == 3:
+        return _named(lambda t, u, p, out: fill((t, u, p), out), function)
+    return _named(lambda u, p, out: fill((u, p), out), function)
 
 
-#: So many values are written one by one, as a tuple of different types needs it.
-_WRITTEN_OUT = 16
-#: Stand for a colouring and a Jacobian that are not asked for.
-_NO_INPUTS, _NO_OWNER, _NO_WORK = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0)
+def _named(function: Any, like: Function) -> Function:
+    function.__name__ = getattr(like, "__name__", "function")
+    return function  # type: ignore[no-any-return]
+
+
+#: Stands for a Jacobian that is not asked for.
 _NO_JACOBIAN = np.empty((0, 0, 0))
-#: Fewer places are evaluated by one thread, and not timed. Ten times fewer would hardly ever take long.
+#: Fewer points are evaluated by one thread, and not timed. Ten times fewer would hardly ever take long.
 _MANY = 256
 #: So are those that take fewer seconds. Ten times fewer would be the time that it takes to wake another thread.
 _LONG = 0.5e-3
 #: Parts that several threads share: more than cores usually, so that a core that is busy with something else gets fewer.
 _PARTS = 16
-#: The arguments of the generated kernel.
-_Arguments = tuple[Array, Array, Array, Array, Indices, Indices, Array, Array, Array]
-
-
-def _divided(given: _Arguments) -> list[_Arguments]:
-    """Return the kernel's arguments for all places in `_PARTS` parts, each with work space of its own."""
-    t, u, v, p, inputs, owner, work, out, jac = given
-    ends = [len(u) * i // _PARTS for i in range(_PARTS + 1)]
-    return [(t[a:b], u[a:b], v[a:b], p, inputs, owner, work.copy(), out[a:b], jac[a:b]) for a, b in zip(ends, ends[1:])]
-
-
-def _source(signature: Signature, functions: Sequence[Function], counts: Sequence[int], derivatives: bool) -> str:
-    """Return the generated kernel: every function called at point i, with real and with complex numbers."""
-    solves = searches(functions)
-    once = [f"w{k} = solve{k}({', '.join(_arguments(signature, 'float64'))})" for k in range(len(solves))]
-    real: list[str] = []
-    step: list[str] = []
-    row = 0
-    for index, (function, count) in enumerate(zip(functions, counts)):
-        solve = parts(function)[1]
-        found = [] if solve is None else [f"w{solves.index(solve)}"]
-        size = max(count, 1)
-        if signature.fills(function):
-            real += _filled(signature, index, count, found, "float64")
-            step += _filled(signature, index, count, found, "complex128")
-            real.append(f"out[i, {row} : {row + size}] = r")
-            step += [f"for j in range({size}):", f"    work[{signature.inputs + row} + j] = r[j].imag"]
-        else:
-            for lines, name, kind in ((real, "function", "float64"), (step, "step", "complex128")):
-                lines.append(f"r = {name}{index}({', '.join(_arguments(signature, kind) + found)})")
-            values = [f"r[{j}]" for j in range(count)] or ["r"]
-            real += [f"out[i, {row + j}] = {value}" for j, value in enumerate(values)]
-            step += [f"work[{signature.inputs + row + j}] = complex({value}).imag" for j, value in enumerate(values)]
-        row += size
-    template = _TEMPLATE + _DERIVATIVES if derivatives else _TEMPLATE
-    return template.format(
-        real="\n".join(" " * 8 + line for line in [*once, *real]), complex="\n".join(" " * 12 + line for line in step),
-        inputs=signature.inputs, between=_SAME_LOOP if once else _OTHER_LOOP,
-    )  # fmt: skip
-
-
-def _groups(signature: Signature) -> list[tuple[str, str, int]]:
-    """Return the groups of inputs: the name of its named tuple, where it stands, and its size."""
-    count = len(signature.states)
-    ends = [("V", "v[i]", count)] if signature.ends else []
-    return [("U", "u[i]", count), *ends, ("P", "p", len(signature.parameters))]
-
-
-def _arguments(signature: Signature, kind: str) -> list[str]:
-    """Return the arguments of functions at point i: t, and named tuples."""
-    arguments, slot = ["t[i]"] if signature.times else [], 0
-    for name, place, size in _groups(signature):
-        numbers = [f"{place}[{j}]" for j in range(size)]
-        if kind == "complex128":
-            numbers = [f"complex({number}, work[{slot + j}])" for j, number in enumerate(numbers)]
-        slot += size
-        arguments.append(f"{name}({''.join(number + ', ' for number in numbers)})")
-    return arguments
-
-
-def _filled(signature: Signature, index: int, count: int, found: list[str], kind: str) -> list[str]:
-    """Return the lines that call a function with arrays, and let it fill r; they do not grow with the number of states."""
-    lines, arguments, slot = [], ["t[i]"] if signature.times else [], 0
-    for name, place, size in _groups(signature):
-        given = f"{name.lower()}{index}"
-        lines += [f"{given} = np.empty({size}, np.{kind})", f"for j in range({size}):"]
-        number = f"{place}[j]" if kind == "float64" else f"complex({place}[j], work[{slot} + j])"
-        lines.append(f"    {given}[j] = {number}")
-        slot += size
-        arguments.append(given)
-    called = "step" if kind == "complex128" else "function"
-    return [*lines, f"r = np.zeros({count}, np.{kind})", f"{called}{index}({', '.join([*arguments, *found, 'r'])})"]
-
-
-#: Compiled kernels of this process, by their keys.
-_KNOWN: dict[str, Any] = {}
-
-
-def _evaluate(key: str, source: str, signature: Signature, functions: Sequence[Function]) -> Any:
-    """Return the generated kernel of this key (machine code comes from the cache where it is there).
-
-    Raises
-    ------
-    CompilationError
-    """
-    if key in _KNOWN:
-        return _KNOWN[key]
-    named = {"U": signature.states, "V": signature.states, "P": signature.parameters}
-    scope: dict[str, Any] = {name: namedtuple(name, fields) for name, fields in named.items()}
-    scope |= {"np": np, "STEP": _STEP, "__name__": __name__, "__builtins__": __builtins__}
-    scope |= {"Vector": Vector, "Matrix": Matrix, "Stack": Stack, "IndexVector": IndexVector, "IndexMatrix": IndexMatrix}
-    exec(compile(source, f"<contin {key[:32]}>", "exec"), scope)
-    kernel = Kernel(scope["evaluate"], reorder=False, key=key)
-    found = kernel.stored()
-    if found is None:
-        refusal = f"u{kernel.key}.txt"
-        reason = kept_text(refusal)
-        if reason:  # it could not be compiled before
-            raise CompilationError(reason)
-        from contin.functions.analytic import compile_batch  # numba takes .3 s, and is needed the first time only
-
-        try:
-            found = compile_batch(kernel, functions)
-        except CompilationError as error:
-            keep_text(refusal, str(error))
-            raise
-    _KNOWN[key] = found
-    return found

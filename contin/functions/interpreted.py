@@ -1,7 +1,7 @@
-"""Users' functions that cannot be compiled, evaluated in Python: values and derivatives in the place of a compiled kernel.
+"""Users' functions that cannot be recorded, evaluated in Python: values and derivatives in the place of a recording.
 
 A function that takes arrays of places instead of numbers is called once for all of them. Derivatives are taken with the complex
-step where that agrees with differences at a few places, else with differences of fourth order.
+step where that agrees with differences at a few places, else with differences whose error is estimated.
 """
 
 from __future__ import annotations
@@ -9,86 +9,197 @@ from __future__ import annotations
 import contextlib
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array, Function
+from contin.arrays import Array, Function, Indices
 from contin.errors import InterpretedWarning, ProblemError
+from contin.functions.colouring import Colouring, SparsePattern, colouring
 from contin.functions.signature import Signature, named_values
 
 #: What names of this package's modules begin with.
 _PACKAGE = __name__.partition(".")[0] + "."
 #: The complex step: small enough that its square is nothing.
 _STEP = 1e-30
-#: Length of differences relative to the largest value of an input so far, and the least of these values that counts: at a zero
-#: of an input its size is not known. Errors of fourth order and of round-off are below 1e-11.
-_DIFFERENCE, _LEAST = 2e-4, 1e-4
+#: First length of differences, relative to the size of an input. Errors of fourth order and of round-off are below 1e-11 where a
+#: function changes over lengths of its input's size.
+_DIFFERENCE = 2e-4
+#: Least size of an input that counts: at a zero of an input its size is not known.
+_LEAST = 1e-4
+#: Differences of second and of fourth order that differ by a larger part of the derivative are taken again over a shorter length.
+#: Ten times larger, the error of fourth order may be 1e-8.
+_ROUGH = 1e-5
+#: Factor of that length, and how often. Five times an eighth reach features 1e-5 times as wide as their input.
+_SHORTER = 1 / 8
+_TIMES = 5
 #: Weights of f(x + k h), k = 1, 2, less those of f(x - k h), in the derivative of fourth order.
 _WEIGHTS = (8 / 12, -1 / 12)
-#: Places beside the first one where the ways to evaluate a function are compared, their distance, and how well they must agree.
-_PLACES, _ASIDE, _AGREES = 3, 0.1, 1e-6
+#: Places beside the first one where the ways to evaluate a function are compared.
+_PLACES = 3
+#: Their distance, relative to 1 + |x|.
+_ASIDE = 0.1
+#: Relative difference up to which the complex step agrees with differences.
+_AGREES = 1e-6
 #: With more inputs than this the ways are compared along as many random directions, not for each input.
 _MANY = 100
 
 
 class Interpreted:
-    """What is called in place of the kernel of a `Batch`, with the same arguments."""
+    """Functions evaluated in Python, for `contin.functions.batch.Batch`.
 
-    def __init__(self, functions: Sequence[Function], counts: Sequence[int], signature: Signature, reason: str) -> None:
-        self._functions, self._counts, self._signature, self._reason = tuple(functions), tuple(counts), signature, reason
+    Attributes
+    ----------
+    reason : str
+        Why the functions are not recorded.
+    error : float
+        Largest estimated error of a derivative so far, relative to the largest derivative at its place; 0 with complex steps.
+    """
+
+    def __init__(
+        self,
+        functions: Sequence[Function],
+        counts: Sequence[int],
+        signature: Signature,
+        reason: str,
+        pattern: tuple[Indices, Indices] | None = None,
+    ) -> None:
+        self._functions, self._counts, self._signature, self.reason = tuple(functions), tuple(counts), signature, reason
         self._tuples = [None if names is None else named_values(tuple(names)) for names in signature.arguments]
         self._for_arrays: dict[int, bool] = {}
         self._complex: bool | None = None
-        self._sizes = np.zeros(signature.inputs)
+        self._pattern = pattern
+        self._colourings: dict[tuple[int, ...], Colouring] = {}
+        self.error = 0.0
 
-    def __call__(self, *given: Any) -> None:
-        """Fill the last two of (t, u, v, p, inputs, owner, work, out, jac): values and, where it has room, the Jacobian."""
-        t, u, v, p, inputs, owner, _, out, jac = given
-        groups = [u, v] if self._signature.ends else [u]
-        x = np.hstack([*groups, np.tile(p, (len(u), 1))])
-        self._sizes = np.maximum(self._sizes, np.where(np.isfinite(x), np.abs(x), 0.0).max(axis=0, initial=0.0))
-        out[:] = self._values(t, x)
-        if not jac.size:
-            return
-        if self._complex is None:
-            self._complex = self._takes_complex(t[:1], x[:1])
-            self._say()
-        jac[:] = 0.0
-        rows = np.arange(out.shape[1])
-        for colour in range(len(owner)):
-            mine = owner[colour] >= 0
-            slots = inputs[inputs[colour] : inputs[colour + 1]]
-            together = self._complex or x.shape[1] > _MANY  # a difference of each input alone has the right length for it
-            for group in [slots] if together else slots[:, None]:
-                direction = np.zeros(x.shape[1])
-                direction[group] = 1.0
-                change = self._derivative(t, x, direction, self._complex)
-                jac[:, rows[mine], owner[colour][mine]] += change[:, mine]
+    def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
+        """Return the values, shape (places, count)."""
+        return self._values(t, self._joined(u, v, p))
+
+    def jacobian(self, t: Array, u: Array, v: Array, p: Array, inputs: Indices) -> tuple[Array, Array]:
+        """Return values and derivatives by ``inputs``, shape (places, count, inputs)."""
+        x = self._joined(u, v, p)
+        jac, found = np.zeros((len(x), self._count, len(inputs))), self._coloured(inputs)
+        for group, rows, columns in self._groups(inputs, found):
+            jac[:, rows, columns] += self._slopes(t, x, group)[:, rows]
+        return self._values(t, x), jac
+
+    def entries(
+        self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, rows: Indices, places: Indices
+    ) -> tuple[Array, Array]:
+        """Return the values at one place, and the derivatives of the values ``rows`` by the inputs in the columns ``places``."""
+        x, starts = self._joined(u, v, p), np.zeros(len(rows))
+        at = {entry: number for number, entry in enumerate(zip(rows.tolist(), places.tolist()))}
+        for group, mine, columns in self._groups(inputs, self._coloured(inputs)):
+            slopes = self._slopes(t, x, group)[0, mine]
+            starts[[at[entry] for entry in zip(mine.tolist(), columns.tolist())]] = slopes
+        return self._values(t, x)[0], starts
+
+    def entries_of(self, inputs: Sequence[int]) -> tuple[Indices, Indices]:
+        """Return values and columns of the entries of the Jacobian that may differ from zero."""
+        found = self._coloured(np.array(inputs, dtype=np.int64))
+        rows, columns, _ = found.entries
+        order = np.lexsort((columns, rows))
+        return rows[order], columns[order]
+
+    def along(self, t: Array, u: Array, v: Array, p: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of the values along directions, shape (places, count)."""
+        x = self._joined(u, v, p)
+        return self._along(t, x, [np.broadcast_to(direction, x.shape) for direction in directions])
+
+    def jacobian_along(
+        self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, directions: Sequence[Array]
+    ) -> Array:
+        """Return the derivative of the Jacobian along directions, shape (places, count, inputs)."""
+        x = self._joined(u, v, p)
+        given = [np.broadcast_to(direction, x.shape) for direction in directions]
+        found = [self._along(t, x, [np.broadcast_to(unit, x.shape), *given]) for unit in np.eye(x.shape[1])[inputs]]
+        return np.stack(found, axis=2) if found else np.zeros((len(x), self._count, 0))
+
+    def _joined(self, u: Array, v: Array, p: Array) -> Array:
+        return np.hstack([*([u, v] if self._signature.ends else [u]), np.tile(p, (len(u), 1))])
 
     def _say(self) -> None:
         names = " and ".join(self._name(index) for index in range(len(self._functions)))
-        how = "the complex step" if self._complex else "differences (an error of about 1e-11)"
+        how = "the complex step" if self._complex else f"differences (an estimated error of {self.error:.0e})"
         text = (
-            f"{names} is evaluated in Python, 10 to 1000 times as slow as compiled, with derivatives by {how}: {self._reason}"
+            f"{names} is evaluated in Python, 10 to 1000 times as slow as recorded, with derivatives by {how}: {self.reason}"
         )
         warnings.warn(text, InterpretedWarning, stacklevel=_users_level())
 
     # --- derivatives ---------------------------------------------------------------------------------------------
 
-    def _derivative(self, t: Array, x: Array, direction: Array, by_complex_step: bool) -> Array:
-        """Return the derivatives of all values along a direction (inputs,), shape (places, count)."""
-        if by_complex_step:
-            return self._values(t, x + 1j * _STEP * direction).imag / _STEP
+    def _coloured(self, inputs: Indices) -> Colouring:
+        key = tuple(np.asarray(inputs).tolist())
+        if key not in self._colourings:
+            shape = self._count, self._signature.inputs
+            if self._pattern is not None:
+                depends: Any = SparsePattern.of_entries(*self._pattern, shape)
+            else:
+                depends = np.ones(shape, dtype=bool)
+            self._colourings[key] = colouring(depends, key)
+        return self._colourings[key]
+
+    def _groups(self, inputs: Indices, found: Colouring) -> list[tuple[Indices, Indices, Indices]]:
+        """Return inputs that are changed together, the values that depend on one of them, and its column."""
+        groups = []
+        for colour in range(len(found.owner)):
+            mine = np.flatnonzero(found.owner[colour] >= 0)
+            groups.append((found.inputs[found.inputs[colour] : found.inputs[colour + 1]], mine, found.owner[colour, mine]))
+        return groups
+
+    def _slopes(self, t: Array, x: Array, group: Indices) -> Array:
+        """Return the derivatives of all values by inputs that are changed together."""
+        first = self._complex is None
+        if first:
+            self._complex = self._takes_complex(t[:1], x[:1])
+        direction = np.zeros(x.shape)
+        direction[:, group] = 1.0
+        found = self._along(t, x, [direction])
+        if first:
+            self._say()
+        return found
+
+    def _along(self, t: Array, x: Array, directions: Sequence[Array]) -> Array:
+        """Return derivatives along directions: complex steps for the first one where they are right, differences for others."""
+        if not directions:
+            return self._values(t, x)
+        *others, last = directions
+        if not others and self._complex:
+            return self._values(t, x + 1j * _STEP * last).imag / _STEP
+        return self._difference(lambda t, x: self._along(t, x, others), t, x, last)
+
+    def _difference(self, function: Callable[[Array, Array], Array], t: Array, x: Array, direction: Array) -> Array:
+        """Return the derivative of a function along a direction, by differences as long as its error estimate allows."""
         moving = direction != 0
-        h = _DIFFERENCE * max(float((self._sizes[moving] / np.abs(direction[moving])).min()), _LEAST)
-        change = np.zeros((len(x), self._count))
-        for k, weight in enumerate(_WEIGHTS, start=1):
-            for sign in (1, -1):
-                change += sign * weight * self._values(t, x + sign * k * h * direction)
-        return change / h
+        sizes = np.maximum(np.abs(np.where(np.isfinite(x), x, 0.0)), _LEAST) / np.where(moving, np.abs(direction), 1.0)
+        length = _DIFFERENCE * np.where(moving, sizes, np.inf).min(axis=1)
+        length = np.where(np.isfinite(length), length, _DIFFERENCE)
+        best, least = np.zeros((len(x), self._count)), np.full(len(x), np.inf)
+        left = np.arange(len(x))
+        for _ in range(_TIMES + 1):
+            h = length[left, None]
+            sides = [
+                function(t[left], x[left] + k * h * direction[left]) - function(t[left], x[left] - k * h * direction[left])
+                for k in (1, 2)
+            ]
+            with np.errstate(all="ignore"):
+                fourth = sum(weight * side for weight, side in zip(_WEIGHTS, sides)) / h
+                scale = np.abs(fourth).max(axis=1, initial=0.0) + 1e-300
+                rough = np.abs(fourth - sides[0] / (2 * h)).max(axis=1, initial=0.0) / scale
+            better = rough < least[left]
+            best[left[better]], least[left[better]] = fourth[better], rough[better]
+            best[left[~np.isfinite(rough) & ~np.isfinite(least[left])]] = np.nan
+            left = left[~(rough <= _ROUGH)]
+            if not left.size:
+                break
+            length = length * _SHORTER
+        if len(x):
+            known = least[np.isfinite(least)]
+            self.error = max(self.error, float(np.minimum(known, known**2 / _ROUGH).max(initial=0.0)))
+        return best
 
     @property
     def _count(self) -> int:
@@ -99,16 +210,20 @@ class Interpreted:
         places, agreed = _beside(x), 0
         times = np.repeat(t, len(places))
         try:
-            for direction in _directions(x.shape[1]):
-                difference = self._derivative(times, places, direction, False)
+            for unit in _directions(x.shape[1]):
+                direction = np.broadcast_to(unit, places.shape)
+                difference = self._difference(self._values, times, places, direction)
                 known = np.all(np.isfinite(difference), axis=1)
-                step = self._derivative(times[known], places[known], direction, True)
+                step = self._values(times[known], places[known] + 1j * _STEP * direction[known]).imag / _STEP
                 scale = 1 + np.abs(difference[known])
                 if not np.all(np.abs(step - difference[known]) <= _AGREES * scale):
+                    self.error = 0.0
                     return False
                 agreed += int(known.sum())
         except Exception:  # a function for real numbers may raise anything
+            self.error = 0.0
             return False
+        self.error = 0.0
         return agreed > 0
 
     # --- values --------------------------------------------------------------------------------------------------

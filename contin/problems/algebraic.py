@@ -15,7 +15,6 @@ from contin import checks
 from contin.arrays import Array, Function, Indices
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.colouring import SparsePattern
 from contin.functions.signature import Signature, argument_count, result_count
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
@@ -131,7 +130,7 @@ class AlgebraicProblem(Restated):
         return Batch(functions, [0] * len(functions), u, p, times=False)
 
     @functools.cached_property
-    def _sparsity(self) -> SparsePattern | None:
+    def _sparsity(self) -> tuple[Indices, Indices] | None:
         """The pattern of states and parameters, of which all equations may depend; None where none was given.
 
         With a Jacobian only the derivatives by parameters are asked for.
@@ -147,7 +146,7 @@ class AlgebraicProblem(Restated):
         equations, inputs = _entries(self.pattern, (count, states))
         by_parameters = np.repeat(states + np.arange(parameters), count)
         equations = np.concatenate([equations, np.tile(np.arange(count), parameters)])
-        return SparsePattern.of_entries(equations, np.concatenate([inputs, by_parameters]), (count, states + parameters))
+        return equations, np.concatenate([inputs, by_parameters])
 
     @functools.cached_property
     def compared(self) -> list[bool]:

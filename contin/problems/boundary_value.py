@@ -107,10 +107,7 @@ class BoundaryValueProblem(Restated):
         return self.boundary_size + self.integral_size - len(self.state_names) + 1
 
     def batch(self, name: str) -> Batch:
-        """Return the compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked.
-
-        ``"functional derivatives"`` are the functionals, compiled with derivatives: few runs need them.
-        """
+        """Return the compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked."""
         if name not in self._batches:
             self._batches[name] = self._compiled(name)
         return self._batches[name]
@@ -142,21 +139,16 @@ class BoundaryValueProblem(Restated):
         u, p = self.state_names, tuple(self.parameters)
         if name == "boundary":
             shape = _shape(self.boundary, self._of_ends, self.boundary_size)
-            return Batch([self.boundary], [shape], u, p, ends=True, reads=self._reads([self.boundary]))
-        if name in ("functionals", "functional derivatives"):
+            return Batch([self.boundary], [shape], u, p, ends=True)
+        if name == "functionals":
             functions = list(self.functionals.values())
             if any(argument_count(f) != 3 or result_count(f, self._of_point.arguments, "a functional") for f in functions):
                 raise ProblemError("functionals: each must be f(t, u, p) and return one number")
-            slopes = name != "functionals"
-            return Batch(functions, [0] * len(functions), u, p, derivatives=slopes, reads=self._reads(functions))
+            return Batch(functions, [0] * len(functions), u, p)
         functions = [f for f in (self.rhs, self.integrals) if f is not None]
         sizes = (len(u), self.integral_size)
         shapes = [_shape(f, self._of_point, size) for f, size in zip(functions, sizes)]
-        return Batch(functions, shapes, u, p, reads=self._reads(functions))
-
-    def _reads(self, functions: Sequence[Function]) -> tuple[str, ...] | None:
-        """Return the parameters that functions read; None where that is not known."""
-        return None
+        return Batch(functions, shapes, u, p)
 
 
 def _value_count(name: str, function: Function | None, signature: Signature, given: int | None) -> int:

@@ -192,7 +192,7 @@ class CycleProblem(BoundaryValueProblem):
         return float(value * parameters[ROUNDS])
 
     def _compiled(self, name: str) -> Batch:
-        if name not in ("functionals", "functional derivatives"):
+        if name != "functionals":
             return super()._compiled(name)
         functions = [self._mean(function) for function in self.means.values()]
         return Batch(functions, [0] * len(functions), self.state_names, tuple(self.parameters))

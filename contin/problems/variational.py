@@ -12,7 +12,6 @@ from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.canonical import Canonical, Variation, canonical
-from contin.functions.pointwise import parts
 from contin.functions.signature import argument_count
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
@@ -149,10 +148,6 @@ class VariationalProblem(BoundaryValueProblem):
     def dimension(self) -> int:
         """n, the number of states x."""
         return len(self.variation.states)
-
-    def _reads(self, functions: Sequence[Function]) -> tuple[str, ...]:
-        """Return the parameters that derived functions read: those that their code names."""
-        return tuple({name for f in functions for part in parts(f) if part is not None for name in part.__code__.co_names})
 
     @functools.cached_property
     def legendre(self) -> Batch | None:

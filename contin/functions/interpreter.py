@@ -1,0 +1,528 @@
+"""The interpreter: one kernel runs the programs of all users' functions over blocks of points.
+
+Registers hold one number for each of the `LANES` points of a block::
+
+    registers   | r0: x x x ... x | r1: x x x ... x | ...        32 numbers each, in groups of 8
+    scalars     | constants | parameters | what the first stretch computes |
+
+An instruction is a row of a program (`contin.functions.program`). `_interpret` is written in LLVM's language as one function
+with a jump by the instruction's code. Arithmetic takes eight numbers at a time; the C library's functions take one. A product
+and a sum are rounded one after the other, so results do not depend on the width of the machine's vectors. Three operations are
+left to compiled Python: piecewise polynomials, polygamma functions, and unknowns that are found by iteration.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from llvmlite import ir
+
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import (
+    IndexMatrix,
+    IndexVector,
+    Matrix,
+    Stack,
+    Vector,
+    for_range,
+    helper,
+    instruction,
+    variable,
+)
+from contin.functions.primitives import TABLE
+from contin.functions.program import CODES
+
+#: Points of a block. With 64 registers of many functions no longer fit into the first cache; with 16 instructions are read
+#: twice as often.
+LANES = 32
+#: Numbers that arithmetic takes together: a vector register of AVX-512.
+_GROUP = 8
+
+_DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
+_VECTOR = ir.VectorType(_DOUBLE, _GROUP)
+#: Bytes of a register, of a group, of an instruction.
+_REGISTER, _BYTES, _ROW = 8 * LANES, 8 * _GROUP, 40
+
+
+class Memory(NamedTuple):
+    """Addresses of what instructions read and write, the last five at the first point of a block."""
+
+    code: int
+    registers: int
+    scalars: int
+    lists: int
+    t: int
+    u: int
+    v: int
+    out: int
+    jac: int
+
+
+class Widths(NamedTuple):
+    """Bytes from one point to the next."""
+
+    u: int
+    v: int
+    out: int
+    jac: int
+
+
+# --- one instruction in LLVM's language -----------------------------------------------------------------------------------------
+
+
+class _Writer:
+    """Writes the body of one case: ``d``, ``a``, ``b``, ``c`` are the numbers in the instruction's row."""
+
+    def __init__(self, builder: Any, memory: Any, widths: Any, lanes: Any) -> None:
+        self.builder, self.memory, self.widths, self.lanes = builder, memory, widths, lanes
+        self.groups = builder.udiv(builder.add(lanes, _number(_GROUP - 1)), _number(_GROUP))
+        self.d = self.a = self.b = self.c = None
+
+    def register(self, number: Any) -> Any:
+        return self.builder.add(self.memory.registers, self.builder.mul(number, _number(_REGISTER)))
+
+    def entry(self, base: Any, number: Any) -> Any:
+        return self.builder.add(base, self.builder.mul(number, _number(8)))
+
+    def load(self, address: Any, kind: Any = _DOUBLE) -> Any:
+        value = self.builder.load(self.builder.inttoptr(address, kind.as_pointer()))
+        value.align = 8
+        return value
+
+    def store(self, value: Any, address: Any) -> None:
+        self.builder.store(value, self.builder.inttoptr(address, value.type.as_pointer())).align = 8
+
+    def scalar(self, number: Any) -> Any:
+        return self.load(self.entry(self.memory.scalars, number))
+
+    def splat(self, value: Any) -> Any:
+        none = ir.Constant(_VECTOR, ir.Undefined)
+        first = self.builder.insert_element(none, value, ir.Constant(ir.IntType(32), 0))
+        return self.builder.shuffle_vector(first, none, ir.Constant(ir.VectorType(ir.IntType(32), _GROUP), [0] * _GROUP))
+
+    def vector(self, value: Callable[..., Any], operands: list[Any], scalars: list[Any]) -> None:
+        """d = value(operands, scalars), eight lanes at a time; scalars are the same in all."""
+        builder = self.builder
+        target, sources = self.register(self.d), [self.register(operand) for operand in operands]
+        wide = [self.splat(self.scalar(number)) for number in scalars]
+        with for_range(builder, self.groups) as loop:
+            offset = builder.mul(loop.index, _number(_BYTES))
+            values = [self.load(builder.add(source, offset), _VECTOR) for source in sources]
+            self.store(value(*values, *wide), builder.add(target, offset))
+
+    def each(self, value: Callable[..., Any], operands: list[Any]) -> None:
+        """d = value(operands), lane by lane."""
+        builder = self.builder
+        target, sources = self.register(self.d), [self.register(operand) for operand in operands]
+        with for_range(builder, self.lanes) as loop:
+            values = [self.load(self.entry(source, loop.index)) for source in sources]
+            self.store(value(*values), self.entry(target, loop.index))
+
+    def gather(self, base: Any, width: Any) -> None:
+        """d = a column of an array, point by point."""
+        builder = self.builder
+        target = self.register(self.d)
+        with for_range(builder, self.lanes) as loop:
+            self.store(self.load(builder.add(base, builder.mul(loop.index, width))), self.entry(target, loop.index))
+
+    def scatter(self, base: Any, width: Any, scalar: bool) -> None:
+        """Store register or scalar a in column d of an array."""
+        builder = self.builder
+        base = self.entry(base, self.d)
+        value = self.scalar(self.a) if scalar else None
+        source = None if scalar else self.register(self.a)
+        with for_range(builder, self.lanes) as loop:
+            found = value if scalar else self.load(self.entry(source, loop.index))
+            self.store(found, builder.add(base, builder.mul(loop.index, width)))
+
+    def many(self, term: Callable[[Any, Any], Any]) -> None:
+        """d = sum of b terms; ``term(number, offset)`` returns one of them, for eight lanes."""
+        builder = self.builder
+        target = self.register(self.d)
+        with for_range(builder, self.groups) as outer:
+            offset = builder.mul(outer.index, _number(_BYTES))
+            total = variable(builder, term(_number(0), offset))
+            with for_range(builder, builder.sub(self.b, _number(1))) as inner:
+                following = term(builder.add(inner.index, _number(1)), offset)
+                builder.store(builder.fadd(builder.load(total), following), total)
+            self.store(builder.load(total), builder.add(target, offset))
+
+    def listed(self, number: Any) -> Any:
+        """Return a number of the list that begins at a."""
+        return self.load(self.entry(self.memory.lists, self.builder.add(self.a, number)), _WORD)
+
+    def lane(self, register: Any, offset: Any) -> Any:
+        """Return eight lanes of a register."""
+        return self.load(self.builder.add(self.register(register), offset), _VECTOR)
+
+
+def _number(value: int) -> Any:
+    return ir.Constant(_WORD, value)
+
+
+def _intrinsic(builder: Any, name: str) -> Callable[[Any], Any]:
+    full = f"llvm.{name}.v{_GROUP}f64"
+    function = builder.module.globals.get(full) or ir.Function(builder.module, ir.FunctionType(_VECTOR, [_VECTOR]), full)
+    return lambda x: builder.call(function, [x])
+
+
+def _truth(builder: Any, condition: Any) -> Any:
+    return builder.uitofp(condition, _VECTOR)
+
+
+def _zeros() -> Any:
+    return ir.Constant(_VECTOR, [0.0] * _GROUP)
+
+
+def _sign(builder: Any, x: Any) -> Any:
+    one, minus = (ir.Constant(_VECTOR, [value] * _GROUP) for value in (1.0, -1.0))
+    below = builder.select(builder.fcmp_ordered("<", x, _zeros()), minus, x)
+    return builder.select(builder.fcmp_ordered(">", x, _zeros()), one, below)
+
+
+def _chosen(builder: Any, condition: Any, a: Any, b: Any) -> Any:
+    return builder.select(builder.fcmp_unordered("!=", condition, _zeros()), a, b)
+
+
+def _product(builder: Any, x: Any, y: Any) -> Any:
+    zero = builder.or_(builder.fcmp_ordered("==", x, _zeros()), builder.fcmp_ordered("==", y, _zeros()))
+    return builder.select(zero, _zeros(), builder.fmul(x, y))
+
+
+def _arithmetic(builder: Any) -> dict[str, tuple[Callable[..., Any], int, int]]:
+    """Return by name: the value for eight lanes, and how many operands are registers and how many scalars."""
+    add, sub, mul, div = builder.fadd, builder.fsub, builder.fmul, builder.fdiv
+    found = {
+        "add": (add, 2, 0), "sub": (sub, 2, 0), "mul": (mul, 2, 0), "div": (div, 2, 0), "add s": (add, 1, 1),
+        "sub s": (sub, 1, 1), "s sub": (lambda x, s: sub(s, x), 1, 1), "mul s": (mul, 1, 1), "div s": (div, 1, 1),
+        "s div": (lambda x, s: div(s, x), 1, 1), "mul add": (lambda x, y, z: add(mul(x, y), z), 3, 0),
+        "mul sub": (lambda x, y, z: sub(mul(x, y), z), 3, 0), "sub mul": (lambda x, y, z: sub(z, mul(x, y)), 3, 0),
+        "neg": (builder.fneg, 1, 0), "sign": (lambda x: _sign(builder, x), 1, 0),
+        "product": (lambda x, y: _product(builder, x, y), 2, 0),
+        "select": (lambda c, x, y: _chosen(builder, c, x, y), 3, 0),
+        "lt": (lambda x, y: _truth(builder, builder.fcmp_ordered("<", x, y)), 2, 0),
+        "le": (lambda x, y: _truth(builder, builder.fcmp_ordered("<=", x, y)), 2, 0),
+        "eq": (lambda x, y: _truth(builder, builder.fcmp_ordered("==", x, y)), 2, 0),
+    }  # fmt: skip
+    intrinsics = {"abs": "fabs", **{name: name for name in ("sqrt", "floor", "ceil", "trunc", "rint")}}
+    return {**found, **{name: (_intrinsic(builder, intrinsic), 1, 0) for name, intrinsic in intrinsics.items()}}
+
+
+def _library(builder: Any, name: str) -> tuple[Callable[..., Any], int]:
+    """Return the value of a function of the C library for one lane, and the number of its operands."""
+    primitive = TABLE[name]
+    count = 2 if "y" in primitive.scalar.split("(", 1)[1] else 1
+    kind = ir.FunctionType(_DOUBLE, [_DOUBLE] * count)
+    function = builder.module.globals.get(primitive.external) or ir.Function(builder.module, kind, primitive.external)
+
+    def value(*given: Any) -> Any:
+        found = builder.call(function, given)
+        if name != "mod":
+            return found
+        x, y = found, given[1]  # C's remainder has the sign of the dividend, Python's that of the divisor
+        zero = ir.Constant(_DOUBLE, 0.0)
+        other = builder.fcmp_ordered("<", builder.fmul(x, y), zero)
+        return builder.select(other, builder.fadd(x, y), x)
+
+    return value, count
+
+
+def _cases(write: _Writer) -> dict[str, Callable[[], None]]:
+    """Return what writes each case, by name."""
+    builder, memory, widths = write.builder, write.memory, write.widths
+
+    def registers(value: Any, count: int, scalars: int) -> None:
+        if count == 1 and scalars:
+            write.vector(value, [write.a], [write.b])
+        else:
+            write.vector(value, [write.a, write.b, write.c][:count], [])
+
+    def fused_scalar() -> None:
+        write.vector(lambda x, z, s: builder.fadd(builder.fmul(x, s), z), [write.a, write.c], [write.b])
+
+    def linear(number: Any, offset: Any) -> Any:
+        factor = write.splat(write.scalar(write.listed(builder.add(number, write.b))))
+        return builder.fmul(factor, write.lane(write.listed(number), offset))
+
+    def dot(number: Any, offset: Any) -> Any:
+        other = write.lane(write.listed(builder.add(number, write.b)), offset)
+        return builder.fmul(write.lane(write.listed(number), offset), other)
+
+    found: dict[str, Callable[[], None]] = {
+        "load u": lambda: write.gather(write.entry(memory.u, write.a), widths.u),
+        "load v": lambda: write.gather(write.entry(memory.v, write.a), widths.v),
+        "load t": lambda: write.gather(memory.t, _number(8)),
+        "copy": lambda: write.vector(lambda x: x, [write.a], []),
+        "fill": lambda: write.vector(lambda s: s, [], [write.a]),
+        "keep": lambda: write.store(write.load(write.register(write.a)), write.entry(memory.scalars, write.d)),
+        "store": lambda: write.scatter(memory.out, widths.out, False),
+        "store scalar": lambda: write.scatter(memory.out, widths.out, True),
+        "store slope": lambda: write.scatter(memory.jac, widths.jac, False),
+        "store scalar slope": lambda: write.scatter(memory.jac, widths.jac, True),
+        "mul s add": fused_scalar,
+        "sum": lambda: write.many(lambda number, offset: write.lane(write.listed(number), offset)),
+        "linear": lambda: write.many(linear),
+        "dot": lambda: write.many(dot),
+    }
+    for name, (value, count, scalars) in _arithmetic(builder).items():
+        found[name] = lambda value=value, count=count, scalars=scalars: registers(value, count, scalars)  # type: ignore[misc]
+    for name, primitive in TABLE.items():
+        if primitive.external:
+            value, count = _library(builder, name)
+            found[name] = lambda value=value, count=count: write.each(value, [write.a, write.b][:count])  # type: ignore[misc]
+    return found
+
+
+@instruction
+def interpret(builder: Any, memory: Memory, widths: Widths, lanes: int, first: int, last: int) -> int:
+    """Run the instructions from ``first`` to ``last``; return the number of one that is none of these, or ``last``."""
+    write = _Writer(builder, memory, widths, lanes)
+    place = variable(builder, first)
+    head, body, end = (builder.append_basic_block() for _ in range(3))
+    builder.branch(head)
+    builder.position_at_end(head)
+    now = builder.load(place)
+    builder.cbranch(builder.icmp_signed("<", now, last), body, end)
+    builder.position_at_end(body)
+    row = builder.add(memory.code, builder.mul(now, _number(_ROW)))
+    code, write.d, write.a, write.b, write.c = (
+        write.load(builder.add(row, _number(8 * column)), _WORD) for column in range(5)
+    )
+    following = builder.append_basic_block()
+    choice = builder.switch(code, end)
+    for name, case in _cases(write).items():
+        block = builder.append_basic_block()
+        choice.add_case(_number(CODES[name]), block)
+        builder.position_at_end(block)
+        case()
+        builder.branch(following)
+    builder.position_at_end(following)
+    builder.store(builder.add(now, _number(1)), place)
+    builder.branch(head)
+    builder.position_at_end(end)
+    stopped: int = builder.load(place)
+    return stopped
+
+
+# --- the rest of the kernel, and the kernel -------------------------------------------------------------------------------------
+
+
+@helper
+def _polygamma(order, x):
+    """Return what `contin.functions.primitives.polygamma` returns."""
+    if (x <= 0 and x == math.floor(x)) or not math.isfinite(x):
+        return math.nan
+    sign = -1.0 if order % 2 == 0 else 1.0
+    total, factorial = 0.0, 1.0
+    for j in range(2, order + 1):
+        factorial *= j
+    while x < 15:
+        total += sign * factorial / x ** (order + 1)
+        x += 1
+    tail, power = 0.0, 1.0
+    for k in range(1, 8):
+        power /= x * x
+        rising = 1.0 / (2 * k) if order == 0 else 1.0
+        for j in range(1, order):
+            rising *= 2.0 * k + j
+        tail += BERNOULLI[k - 1] * rising * power
+    if order == 0:
+        return total + math.log(x) - 0.5 / x - tail
+    return total + sign * (factorial / order + factorial / (2 * x) + tail) / x**order
+
+
+@helper
+def _table(tables, at, x):
+    """Return a piecewise polynomial: (breaks, order, the breaks, the origin of each piece, coefficients, highest first)."""
+    breaks, order = int(tables[at]), int(tables[at + 1])
+    low, high = 0, breaks  # the piece is the number of breaks that are not above x
+    while low < high:
+        middle = (low + high) // 2
+        if tables[at + 2 + middle] <= x:
+            low = middle + 1
+        else:
+            high = middle
+    origins = at + 2 + breaks
+    inside, place = x - tables[origins + low], origins + breaks + 1 + low * order
+    total = tables[place]
+    for k in range(1, order):
+        total = total * inside + tables[place + k]
+    return total
+
+
+@helper
+def _direction(work, at, k, minimum, lane, scratch):
+    """Solve for Newton's step in one lane, and return its slope: of the potential, or of half the squared residual.
+
+    ``at`` is the register of [unknowns (k) | value | G (k) | A | before (k) | step (k) | ...]: A is the lower triangle of the
+    Hessian by rows, or the Jacobian. Pivots of a Hessian are made positive, so that the step leads downhill.
+    """
+    first, matrix = at + k + 1, at + 2 * k + 1
+    for i in range(k):
+        for j in range(k):
+            if not minimum:
+                entry = matrix + i * k + j
+            elif j <= i:
+                entry = matrix + i * (i + 1) // 2 + j
+            else:
+                entry = matrix + j * (j + 1) // 2 + i
+            scratch[i, j] = work[entry * LANES + lane]
+        scratch[i, k] = -work[(first + i) * LANES + lane]
+    for i in range(k):
+        if minimum:
+            scratch[i, i] = max(abs(scratch[i, i]), LEAST_PIVOT * (1.0 + abs(work[(matrix + i * (i + 3) // 2) * LANES + lane])))
+        else:
+            largest = i
+            for j in range(i + 1, k):
+                if abs(scratch[j, i]) > abs(scratch[largest, i]):
+                    largest = j
+            for j in range(k + 1):
+                scratch[i, j], scratch[largest, j] = scratch[largest, j], scratch[i, j]
+        for j in range(i + 1, k):
+            factor = scratch[j, i] / scratch[i, i]
+            for m in range(i, k + 1):
+                scratch[j, m] -= factor * scratch[i, m]
+    for i in range(k - 1, -1, -1):
+        for j in range(i + 1, k):
+            scratch[i, k] -= scratch[i, j] * scratch[j, k]
+        scratch[i, k] /= scratch[i, i]
+    slope = 0.0
+    for i in range(k):
+        G = work[(first + i) * LANES + lane]
+        slope += G * scratch[i, k] if minimum else -G * G
+    return slope
+
+
+@helper
+def _value(work, at, k, minimum, lane):
+    """Return the potential, or half the squared residual."""
+    if minimum:
+        return work[(at + k) * LANES + lane]
+    total = 0.0
+    for i in range(k):
+        total += work[(at + k + 1 + i) * LANES + lane] ** 2 / 2
+    return total
+
+
+@helper
+def _iterate(memory, widths, lanes, work, lists, scratch, row):
+    """Find unknowns in all lanes by Newton's method with halved steps; nan where it does not arrive.
+
+    ``lists`` has from ``row`` on: k, 1 for a minimum and 0 for a root, the first instruction of the program for value, gradient
+    and matrix, its end, the register described in `_direction` (behind the step: value before, slope, part of the step; these
+    are kept from one iteration to the next), and the registers of the starts.
+    """
+    k, minimum, begin, end, at = lists[row], lists[row + 1], lists[row + 2], lists[row + 3], lists[row + 4]
+    size = k * (k + 1) // 2 if minimum else k * k
+    before = at + 2 * k + 1 + size
+    step = before + k
+    value, slope, part = step + k, step + k + 1, step + k + 2
+    for lane in range(lanes):
+        work[part * LANES + lane] = 1.0  # 0 where it has arrived
+        for i in range(k):
+            work[(at + i) * LANES + lane] = work[lists[row + 5 + i] * LANES + lane]
+    interpret(memory, widths, lanes, begin, end)
+    for _ in range(NEWTON):
+        moving = False
+        for lane in range(lanes):
+            if work[part * LANES + lane] == 0.0:
+                continue
+            work[slope * LANES + lane] = _direction(work, at, k, minimum, lane, scratch)
+            work[value * LANES + lane] = _value(work, at, k, minimum, lane)
+            arrived = True
+            for i in range(k):
+                x, change = work[(at + i) * LANES + lane], scratch[i, k]
+                work[(before + i) * LANES + lane], work[(step + i) * LANES + lane] = x, change
+                work[(at + i) * LANES + lane] = x + change
+                arrived = arrived and change * change <= SETTLED * SETTLED * (SMALLEST + x * x)
+            work[part * LANES + lane] = 0.0 if arrived else 1.0
+            moving = moving or not arrived
+        if not moving:
+            return
+        for _ in range(HALVINGS):
+            interpret(memory, widths, lanes, begin, end)
+            again = False
+            for lane in range(lanes):
+                length = work[part * LANES + lane]
+                if length == 0.0:
+                    continue
+                old = work[value * LANES + lane]
+                allowed = old + 1e-4 * length * work[slope * LANES + lane] + ROUNDING * (abs(old) if not minimum else math.hypot(1.0, old))
+                if _value(work, at, k, minimum, lane) <= allowed:
+                    continue
+                again = True
+                work[part * LANES + lane] = length / 2
+                for i in range(k):
+                    change = work[(step + i) * LANES + lane] * length / 2
+                    work[(at + i) * LANES + lane] = work[(before + i) * LANES + lane] + change
+            if not again:
+                break
+        for lane in range(lanes):  # the next step begins from here
+            if work[part * LANES + lane] != 0.0:
+                work[part * LANES + lane] = 1.0
+    for lane in range(lanes):
+        if work[part * LANES + lane] != 0.0:
+            for i in range(k):
+                work[(at + i) * LANES + lane] = math.nan
+
+
+@helper(inline=True)
+def _address(array, offset):
+    """Return an address in an array, which must be a parameter of the kernel."""
+    return array.ctypes.data + offset
+
+
+@kernel(reorder=False)
+def evaluate(
+    code: IndexMatrix, first: int, last: int, lists: IndexVector, scalars: Vector, tables: Vector, t: Vector, u: Matrix,
+    v: Matrix, work: Vector, scratch: Matrix, out: Matrix, jac: Stack,
+) -> None:  # fmt: skip
+    """Run a program: its first stretch once, its second, up to the instruction ``last``, for each block of points.
+
+    ``t`` (K,), ``u`` (K, n) and ``v`` (K, n or 0) are the points; ``out`` (K, values) and ``jac`` (K, values, columns) are
+    filled where instructions store something. ``work`` holds the registers, ``scratch`` a small linear system.
+    """
+    widths = Widths(8 * u.shape[1], 8 * v.shape[1], 8 * out.shape[1], 8 * jac.shape[1] * jac.shape[2])
+    count = u.shape[0]
+    for block in range(-1, (count + LANES - 1) // LANES):
+        point = max(block, 0) * LANES
+        lanes = min(LANES, count - point) if block >= 0 else 1
+        memory = Memory(
+            _address(code, 0), _address(work, 0), _address(scalars, 0), _address(lists, 0), _address(t, 8 * point),
+            _address(u, widths.u * point), _address(v, widths.v * point), _address(out, widths.out * point),
+            _address(jac, widths.jac * point),
+        )  # fmt: skip
+        now, end = (0, first) if block < 0 else (first, last)
+        while True:
+            now = interpret(memory, widths, lanes, now, end)
+            if now >= end:
+                break
+            if code[now, 0] == POLYGAMMA:
+                for lane in range(lanes):
+                    work[code[now, 1] * LANES + lane] = _polygamma(code[now, 3], work[code[now, 2] * LANES + lane])
+            elif code[now, 0] == TABLE_OF:
+                for lane in range(lanes):
+                    work[code[now, 1] * LANES + lane] = _table(tables, code[now, 3], work[code[now, 2] * LANES + lane])
+            else:
+                _iterate(memory, widths, lanes, work, lists, scratch, code[now, 2])
+            now += 1
+
+
+#: Codes of the operations that are written in Python.
+POLYGAMMA, TABLE_OF = CODES["polygamma"], CODES["table"]
+#: Bernoulli numbers B_2, B_4, ...
+BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6)
+#: Newton steps for an unknown. Damped steps on a convex function arrive in 5 to 20.
+NEWTON = 60
+#: Halvings of a step that does not lower the potential or the residual. 40 make it 1e-12 of itself.
+HALVINGS = 40
+#: A step below this part of the unknown is the last: the next would be its square. Ten times larger, 1e-16 would be lost.
+SETTLED = 1e-9
+#: Square of the size below which an unknown counts as this large. Smaller unknowns are found to 1e-9 of this size squared.
+SMALLEST = 1.0
+#: Where a potential is not convex, a pivot is at least this part of 1 + the diagonal: Newton's step is then long, and damped.
+LEAST_PIVOT = 1e-3
+#: A potential that does not decrease by more than its round-off is accepted.
+ROUNDING = 1e-14

@@ -1,0 +1,335 @@
+"""Unknowns that are found by iteration at each point, as operations of a tape.
+
+`minimum` and `root` are called inside a user's function. They record the potential or the residual with unknowns of its own on the
+same tape; the interpreter finds the unknowns by Newton's method in all points of a block (`contin.functions.interpreter`).
+Derivatives follow from the theorem on implicit functions, with operations on the tape: with A w = b the linearized equations at the
+solution, dw/dz = -A^-1 dG/dz. They are exact, and can be differentiated again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contin.errors import ProblemError
+from contin.functions import derivatives
+from contin.functions.recorded_arrays import recorded, select
+from contin.functions.stand_ins import prepared
+from contin.functions.tape import Number, Tape, Unrecordable
+
+#: Largest number of unknowns that are found together. Their equations are solved with a dense matrix at every point.
+_MOST = 16
+#: Newton steps and halvings of each in Python, as in the interpreter.
+_NEWTON = 60
+_HALVINGS = 40
+
+
+@dataclass(frozen=True)
+class Search:
+    """Unknowns w, and what determines them; all are places on a tape.
+
+    Attributes
+    ----------
+    minimum : bool
+        w minimizes the potential; else the slopes are a residual that vanishes.
+    unknowns : tuple of int
+    potential : int
+        The potential, or the constant 0.
+    slopes : tuple of int
+        Its gradient, or the residual.
+    matrix : tuple of int
+        Lower triangle of the Hessian by rows, or the Jacobian by rows.
+    starts : tuple of int
+        Where Newton's method starts.
+    """
+
+    minimum: bool
+    unknowns: tuple[int, ...]
+    potential: int
+    slopes: tuple[int, ...]
+    matrix: tuple[int, ...]
+    starts: tuple[int, ...]
+
+    @property
+    def results(self) -> tuple[int, ...]:
+        """Everything that is computed at each step."""
+        return (self.potential, *self.slopes, *self.matrix)
+
+    def moved(self, places: Mapping[int, int]) -> Search:
+        """Return the same search with other places."""
+        tuples = [tuple(places[place] for place in group) for group in (self.unknowns, self.slopes, self.matrix, self.starts)]
+        return Search(self.minimum, tuples[0], places[self.potential], *tuples[1:])
+
+    def entry(self, i: int, j: int) -> int:
+        """Return the place of an entry of the matrix."""
+        if not self.minimum:
+            return self.matrix[i * len(self.unknowns) + j]
+        i, j = max(i, j), min(i, j)
+        return self.matrix[i * (i + 1) // 2 + j]
+
+    def partials(self, tape: Tape, index: int, operands: Sequence[Number]) -> list[Any]:
+        """Return the derivatives of one unknown by what the equations read."""
+        found = tape.kept(("implicit", self, tuple(operand.place for operand in operands)), lambda: self._implicit(tape, operands))
+        return [column[index] for column in found]
+
+    def _implicit(self, tape: Tape, operands: Sequence[Number]) -> list[list[Any]]:
+        """Return the derivatives of all unknowns by each operand."""
+        k, places = len(self.unknowns), [operand.place for operand in operands]
+        solution = [tape.apply("root", *operands, data=(self, i)) for i in range(k)]
+        at = {unknown: number.place for unknown, number in zip(self.unknowns, solution)}
+        by = derivatives.jacobian(tape, self.slopes, places)
+        wanted = [self.entry(i, j) for i in range(k) for j in range(k)] + list(by.values())
+        moved = tape.substitute(wanted, at)
+        matrix = [[Number(tape, moved[i * k + j]) for j in range(k)] for i in range(k)]
+        entries = dict(zip(by, moved[k * k :]))
+        columns = []
+        for number in range(len(places)):
+            if not any((i, number) in entries for i in range(k)):  # a start
+                columns.append([None] * k)
+                continue
+            right = [-Number(tape, entries[i, number]) if (i, number) in entries else 0.0 for i in range(k)]
+            columns.append(solved(matrix, right, self.minimum))
+        return columns
+
+    def evaluate(self, index: int, operands: Sequence[float]) -> float:
+        """Raise: an unknown is evaluated with its tape (`Tape.evaluate`)."""
+        raise NotImplementedError
+
+
+def solved(matrix: Sequence[Sequence[Any]], right: Sequence[Any], symmetric: bool) -> list[Any]:
+    """Return the solution of a small linear system of recorded numbers: by elimination, with pivots chosen unless it is symmetric
+    and definite."""
+    k = len(right)
+    a, b = [list(row) for row in matrix], list(right)
+    for i in range(k):
+        for j in range(i + 1, k) if not symmetric else ():
+            larger = abs(a[j][i]) > abs(a[i][i])
+            rows = [(select(larger, y, x), select(larger, x, y)) for x, y in zip([*a[i], b[i]], [*a[j], b[j]])]
+            a[i], b[i] = [pair[0] for pair in rows[:-1]], rows[-1][0]
+            a[j], b[j] = [pair[1] for pair in rows[:-1]], rows[-1][1]
+        for j in range(i + 1, k):
+            factor = a[j][i] / a[i][i]
+            a[j] = [y - factor * x for x, y in zip(a[i], a[j])]
+            b[j] = b[j] - factor * b[i]
+    for i in reversed(range(k)):
+        for j in range(i + 1, k):
+            b[i] = b[i] - a[i][j] * b[j]
+        b[i] = b[i] / a[i][i]
+    return b
+
+
+def minimum(potential: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the unknowns w that minimize ``potential(w)``, found by Newton's method with steps that lower it.
+
+    It is for implicit laws inside a user's function: the potential may use states and parameters, and derivatives are exact.
+
+    Parameters
+    ----------
+    potential : callable
+        ``potential(w)`` of a tuple of numbers returns a number; smooth, and convex between ``start`` and the minimum.
+    start : sequence of float
+        Where the search starts; numbers that may depend on states and parameters.
+
+    Returns
+    -------
+    tuple
+        The unknowns; nan where there is no minimum.
+
+    Raises
+    ------
+    ProblemError
+        No unknowns, or more than 16.
+
+    Examples
+    --------
+    >>> from contin import minimum
+    >>> minimum(lambda w: (w[0] - 3) ** 2 + w[0] ** 4 / 4, [0.0])
+    (1.2134116627622296,)
+    """
+    return _found(potential, start, True)
+
+
+def root(residual: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the unknowns w with ``residual(w) = 0``, found by Newton's method with steps that reduce it.
+
+    Parameters
+    ----------
+    residual : callable
+        ``residual(w)`` of a tuple of numbers returns as many numbers.
+    start : sequence of float
+        Where the search starts; numbers that may depend on states and parameters.
+
+    Returns
+    -------
+    tuple
+        The unknowns; nan where none are found.
+
+    Raises
+    ------
+    ProblemError
+        No unknowns, more than 16, or another number of residuals.
+
+    Examples
+    --------
+    The rate w of w + w**3 = u, with its exact derivative 1/(1 + 3 w**2):
+
+    >>> import numpy as np
+    >>> from contin import Batch, root
+    >>> batch = Batch([lambda u, p: root(lambda w: (w[0] + w[0] ** 3 - u.u,), [0.0])[0]], [0], ["u"], [], times=False)
+    >>> given = np.zeros(1), np.array([[10.0]]), np.empty((0, 1)), np.empty(0)
+    >>> value, slope = batch.jacobian(*given, batch.columns([]))
+    >>> print(value.item(), 1 / slope.item())
+    2.0 13.0
+    """
+    return _found(residual, start, False)
+
+
+def _found(function: Callable[..., Any], start: Sequence[Any], minimal: bool) -> tuple[Any, ...]:
+    starts = list(start)
+    if not 1 <= len(starts) <= _MOST:
+        raise ProblemError(f"start: {len(starts)} unknowns, must be 1 to {_MOST}")
+    function = prepared(function)
+    tape = _tape_of(function, starts)
+    if tape is None:
+        return _in_python(function, starts, minimal)
+    search, operands = recorded_search(tape, function, starts, minimal)
+    return tuple(tape.apply("root", *operands, data=(search, i)) for i in range(len(starts)))
+
+
+def _tape_of(function: Callable[..., Any], starts: Sequence[Any]) -> Tape | None:
+    """Return the tape on which a function is being recorded; None where all numbers are ordinary ones."""
+    known = recorded(starts)
+    if known is not None:
+        return known.tape
+    tape = Tape()
+    try:
+        result = function(tuple(tape.input(("probe", i)) for i in range(len(starts))))
+    except Unrecordable:
+        return _foreign(function, starts)
+    found = recorded(result)
+    return None if found is None or found.tape is tape else found.tape
+
+
+def _foreign(function: Callable[..., Any], starts: Sequence[float]) -> Tape | None:
+    """Return the tape of the numbers that a function refers to, other than its arguments."""
+    found = recorded(function(tuple(starts)))
+    return None if found is None else found.tape
+
+
+def recorded_search(
+    tape: Tape, function: Callable[..., Any], starts: Sequence[Any], minimal: bool
+) -> tuple[Search, list[Number]]:
+    """Return the search for unknowns on a tape, and the numbers that its equations read.
+
+    Raises
+    ------
+    Unrecordable
+        A search within a search.
+    """
+    k = len(starts)
+    unknowns = [tape.input(("unknown", tape.searches, i)) for i in range(k)]
+    tape.searches += 1
+    result = function(tuple(unknowns))
+    values = [tape.number(value) for value in (result if isinstance(result, (tuple, list, np.ndarray)) else [result])]
+    if len(values) != (1 if minimal else k):
+        raise ProblemError(f"{'potential' if minimal else 'residual'} returns {len(values)} values, must return {1 if minimal else k}")
+    search = search_of(tape, [each.place for each in unknowns], [each.place for each in values], starts, minimal)
+    return search, operands_of(tape, search)
+
+
+def search_of(
+    tape: Tape, unknowns: Sequence[int], values: Sequence[int], starts: Sequence[Any], minimal: bool
+) -> Search:
+    """Return the search for places of unknowns, with the potential or the residuals at ``values``."""
+    k, zero = len(unknowns), tape.constant(0.0)
+    if minimal:
+        by = derivatives.jacobian(tape, values, unknowns)
+        slopes = [by.get((0, i), zero) for i in range(k)]
+    else:
+        slopes = list(values)
+    second = derivatives.jacobian(tape, slopes, unknowns)
+    pairs = [(i, j) for i in range(k) for j in range(i + 1 if minimal else k)]
+    matrix = tuple(second.get(pair, zero) for pair in pairs)
+    given = tuple(tape.number(value).place for value in starts)
+    return Search(minimal, tuple(unknowns), values[0] if minimal else zero, tuple(slopes), matrix, given)
+
+
+def operands_of(tape: Tape, search: Search) -> list[Number]:
+    """Return what the equations of a search read besides its unknowns, and the starts.
+
+    Raises
+    ------
+    Unrecordable
+        A search within a search.
+    """
+    depends = tape.reading(search.results, search.unknowns)
+    operands: dict[int, None] = {}
+    for place in tape.needed(search.results):
+        operation = tape.operations[place]
+        if depends[place] and operation.name == "root":
+            raise Unrecordable("it searches for unknowns within a search")
+        inside = operation.operands if depends[place] else ()
+        operands.update(dict.fromkeys(each for each in inside if not depends[each]))
+    operands.update(dict.fromkeys(place for place in search.results if not depends[place]))
+    operands.update(dict.fromkeys(search.starts))
+    return [Number(tape, place) for place in operands if tape.value(place) is None]
+
+
+def _in_python(function: Callable[..., Any], starts: Sequence[float], minimal: bool) -> tuple[float, ...]:
+    """Return the unknowns for ordinary numbers."""
+    tape = Tape()
+    try:
+        search, _ = recorded_search(tape, function, starts, minimal)
+    except Unrecordable as reason:
+        raise ProblemError(f"{'potential' if minimal else 'residual'} cannot be differentiated: {reason}") from None
+    return tuple(newton(tape, search, {}))
+
+
+def newton(tape: Tape, search: Search, values: dict[Any, float]) -> list[float]:
+    """Return the unknowns of a search in Python, as the interpreter finds them; nan where it does not arrive."""
+    k = len(search.unknowns)
+    slots = [tape.operations[place].data for place in search.unknowns]
+    w = np.array(tape.evaluate(search.starts, values))
+
+    def at(w: Any) -> tuple[float, Any, Any]:
+        found = tape.evaluate(search.results, {**values, **dict(zip(slots, w.tolist()))})
+        by_place = dict(zip(search.results, found))
+        G = np.array([by_place[place] for place in search.slopes])
+        A = np.array([[by_place[search.entry(i, j)] for j in range(k)] for i in range(k)])
+        return (by_place[search.potential] if search.minimum else float(G @ G) / 2), G, A
+
+    with np.errstate(all="ignore"):
+        value, G, A = at(w)
+        for _ in range(_NEWTON):
+            step = _step(A, G, search.minimum)
+            if np.all(step * step <= 1e-18 * (1.0 + w * w)):
+                return (w + step).tolist()
+            slope, part = (float(G @ step) if search.minimum else -float(G @ G)), 1.0
+            for _ in range(_HALVINGS):
+                trial, new_G, new_A = at(w + part * step)
+                if trial <= value + 1e-4 * part * slope + 1e-14 * (np.hypot(1.0, value) if search.minimum else value):
+                    break
+                part /= 2
+            w, value, G, A = w + part * step, trial, new_G, new_A
+    return [float("nan")] * k
+
+
+def _step(A: Any, G: Any, minimal: bool) -> Any:
+    if not minimal:
+        try:
+            return np.linalg.solve(A, -G)
+        except np.linalg.LinAlgError:
+            return np.full(len(G), np.nan)
+    a, b = A.copy(), -G
+    for i in range(len(b)):
+        a[i, i] = max(abs(a[i, i]), 1e-3 * (1.0 + abs(A[i, i])))
+        for j in range(i + 1, len(b)):
+            factor = a[j, i] / a[i, i]
+            a[j, i:] -= factor * a[i, i:]
+            b[j] -= factor * b[i]
+    for i in reversed(range(len(b))):
+        b[i] = (b[i] - a[i, i + 1 :] @ b[i + 1 :]) / a[i, i]
+    return b

@@ -1,0 +1,320 @@
+"""The operations of a tape: value, derivative and kernel code of each, side by side.
+
+`TABLE` has a `Primitive` for every name. A rule of derivatives gets the operands and the result as recorded numbers and returns
+the derivative by each operand, recorded as well, so that derivatives have derivatives.
+
+Kernel code is one of three kinds. ``vector`` names an instruction of `contin.functions.interpreter` for eight numbers at a time.
+``scalar`` is the text of an expression of x (and y) for one number. Operations with neither are written out there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """An operation.
+
+    Attributes
+    ----------
+    evaluate : callable
+        ``evaluate(data, *operands)`` returns the value for plain numbers; never an exception, but nan or inf.
+    partials : callable
+        ``partials(tape, data, operands, result)`` returns the derivative by each operand: a recorded number, a number, or None
+        where it is zero everywhere.
+    scalar : str
+        Kernel code for one number.
+    external : str
+        The C library's function that ``scalar`` calls.
+    constant : callable, optional
+        ``evaluate`` where an operation of constants is carried out when it is recorded.
+    simplify : callable, optional
+        ``simplify(tape, places)`` returns the place of an equal operation that is simpler, or None.
+    commutes : bool
+        The two operands may be exchanged.
+    selects : bool
+        A derivative is zero where the operand is not chosen, and the value there may be nan.
+    """
+
+    evaluate: Callable[..., float]
+    partials: Callable[..., Any]
+    scalar: str = ""
+    external: str = ""
+    constant: Callable[..., float] | None = None
+    simplify: Callable[..., int | None] | None = None
+    commutes: bool = False
+    selects: bool = False
+
+
+def _quiet(function: Callable[..., Any]) -> Callable[..., float]:
+    """Return a NumPy function of numbers after ``data``, without warnings."""
+
+    def evaluate(data: Any, *operands: Any) -> float:
+        with np.errstate(all="ignore"):
+            return float(function(*map(np.float64, operands)))
+
+    return evaluate
+
+
+# --- simplifications: the value is the same for all finite operands -------------------------------------------------------------
+
+
+def _simple_add(tape: Any, places: tuple[int, ...]) -> int | None:
+    a, b = places
+    if tape.value(a) == 0:
+        return b
+    if tape.value(b) == 0:
+        return a
+    for one, other in ((a, b), (b, a)):
+        operation = tape.operations[one]
+        if operation.name == "neg":
+            return int(tape.at("sub", (other, operation.operands[0])))
+    return None
+
+
+def _simple_sub(tape: Any, places: tuple[int, ...]) -> int | None:
+    a, b = places
+    if tape.value(b) == 0:
+        return a
+    if tape.value(a) == 0:
+        return int(tape.at("neg", (b,)))
+    if a == b:
+        return int(tape.constant(0.0))
+    operation = tape.operations[b]
+    return int(tape.at("add", (a, operation.operands[0]))) if operation.name == "neg" else None
+
+
+def _simple_mul(tape: Any, places: tuple[int, ...]) -> int | None:
+    for one, other in (places, places[::-1]):
+        value, operation = tape.value(one), tape.operations[one]
+        if value == 0:
+            return int(tape.constant(0.0))
+        if value == 1:
+            return other
+        if value == -1:
+            return int(tape.at("neg", (other,)))
+        if operation.name == "neg":
+            return int(tape.at("neg", (tape.at("mul", (operation.operands[0], other)),)))
+    return None
+
+
+def _simple_div(tape: Any, places: tuple[int, ...]) -> int | None:
+    a, b = places
+    if tape.value(b) == 1:
+        return a
+    if tape.value(a) == 0:
+        return int(tape.constant(0.0))
+    operation = tape.operations[a]
+    return int(tape.at("neg", (tape.at("div", (operation.operands[0], b)),))) if operation.name == "neg" else None
+
+
+def _simple_neg(tape: Any, places: tuple[int, ...]) -> int | None:
+    operation = tape.operations[places[0]]
+    return operation.operands[0] if operation.name == "neg" else None
+
+
+def _simple_select(tape: Any, places: tuple[int, ...]) -> int | None:
+    condition, a, b = places
+    value = tape.value(condition)
+    if value is not None:
+        return a if value != 0 else b
+    return a if a == b else None
+
+
+# --- derivatives --------------------------------------------------------------------------------------------------------------
+
+
+def _of_pow(tape: Any, data: Any, operands: Any, result: Any) -> tuple[Any, Any]:
+    from contin.functions.tape import power
+
+    x, y = operands
+    return y * power(x, y - 1.0), tape.apply("product", result, tape.apply("log", x))
+
+
+def _of_select(tape: Any, data: Any, operands: Any, result: Any) -> tuple[Any, Any, Any]:
+    condition = operands[0]
+    return None, tape.apply("select", condition, 1.0, 0.0), tape.apply("select", condition, 0.0, 1.0)
+
+
+def _of_product(tape: Any, data: Any, operands: Any, result: Any) -> tuple[Any, Any]:
+    return operands[1], operands[0]
+
+
+def _one(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a rule for one operand from ``function(tape, x, result)``."""
+    return lambda tape, data, operands, result: (function(tape, operands[0], result),)
+
+
+def _none(tape: Any, data: Any, operands: Any, result: Any) -> tuple[None, ...]:
+    return (None,) * len(operands)
+
+
+#: 2 / sqrt(pi), the slope of the error function at 0.
+_OF_ERF = 2 / math.sqrt(math.pi)
+
+
+def polygamma(order: int, x: float) -> float:
+    """Return the derivative of this order (0: itself) of the logarithmic derivative of the gamma function.
+
+    Raised to 15 by recurrence, then the asymptotic series (DLMF 5.11.2, differentiated).
+    """
+    if x <= 0 and x == math.floor(x):
+        return math.nan
+    if not math.isfinite(x):
+        return math.nan if x != math.inf else (math.inf if order == 0 else 0.0)
+    sign, total, factorial = (-1.0 if order % 2 == 0 else 1.0), 0.0, math.factorial(order)
+    while x < 15:
+        total += sign * factorial / x ** (order + 1)
+        x += 1
+    bernoulli = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6)
+    if order == 0:
+        tail = math.log(x) - 0.5 / x - sum(b / (2 * k * x ** (2 * k)) for k, b in enumerate(bernoulli, start=1))
+        return total + tail
+    tail = math.factorial(order - 1) / x**order + factorial / (2 * x ** (order + 1))
+    for k, b in enumerate(bernoulli, start=1):
+        tail += b * math.factorial(2 * k + order - 1) / (math.factorial(2 * k) * x ** (2 * k + order))
+    return total + sign * tail
+
+
+def _mod(x: Any, y: Any) -> Any:
+    return np.mod(x, y)
+
+
+def _sum(data: Any, *operands: float) -> float:
+    total = operands[0]
+    for operand in operands[1:]:
+        total = total + operand
+    return total
+
+
+def _dot(data: Any, *operands: float) -> float:
+    half = len(operands) // 2
+    total = operands[0] * operands[half]
+    for x, y in zip(operands[1:half], operands[half + 1 :]):
+        total = total + x * y
+    return total
+
+
+def _linear(data: tuple[float, ...], *operands: float) -> float:
+    total = data[0] * operands[0]
+    for factor, operand in zip(data[1:], operands[1:]):
+        total = total + factor * operand
+    return total
+
+
+def _of_dot(tape: Any, data: Any, operands: Any, result: Any) -> Any:
+    half = len(operands) // 2
+    return (*operands[half:], *operands[:half])
+
+
+def _of_table(tape: Any, data: Any, operands: Any, result: Any) -> Any:
+    return (tape.apply("table", operands[0], data=data.derivative()),)
+
+
+def _primitive(numpy_function: Any, partials: Any, scalar: str = "", external: str = "", **more: Any) -> Primitive:
+    evaluate = _quiet(numpy_function)
+    return Primitive(evaluate, partials, scalar, external, constant=evaluate, **more)
+
+
+def _library(numpy_function: Any, name: str, derivative: Any) -> Primitive:
+    """Return a function of one number that the C library has."""
+    return _primitive(numpy_function, _one(derivative), f"{name}(x)", name)
+
+
+def _special(name: str) -> Any:
+    def evaluate(x: Any) -> Any:
+        from scipy import special  # type: ignore[import-untyped]
+
+        return getattr(special, name)(x)
+
+    return evaluate
+
+
+TABLE: dict[str, Primitive] = {
+    "input": Primitive(lambda data: math.nan, _none),
+    "constant": Primitive(lambda data: data, _none),
+    # arithmetic
+    "add": _primitive(np.add, lambda *_: (1.0, 1.0), simplify=_simple_add, commutes=True),
+    "sub": _primitive(np.subtract, lambda *_: (1.0, -1.0), simplify=_simple_sub),
+    "mul": _primitive(np.multiply, lambda tape, data, xs, r: (xs[1], xs[0]), simplify=_simple_mul, commutes=True),
+    "div": _primitive(np.divide, lambda tape, data, xs, r: (1.0 / xs[1], -r / xs[1]), simplify=_simple_div),
+    "neg": _primitive(np.negative, lambda *_: (-1.0,), simplify=_simple_neg),
+    # n operands: their sum; a scalar product of two halves; a sum with constant factors
+    "sum": Primitive(_sum, lambda tape, data, xs, r: (1.0,) * len(xs), constant=_sum),
+    "dot": Primitive(_dot, _of_dot, constant=_dot),
+    "linear": Primitive(_linear, lambda tape, data, xs, r: data, constant=_linear),
+    # decisions
+    "lt": _primitive(np.less, _none),
+    "le": _primitive(np.less_equal, _none),
+    "eq": _primitive(np.equal, _none, commutes=True),
+    "select": _primitive(lambda c, a, b: a if c != 0 else b, _of_select, simplify=_simple_select, selects=True),
+    # a product that is 0 where one of its factors is, also if the other one is nan or inf
+    "product": _primitive(
+        lambda x, y: 0.0 if x == 0 or y == 0 else x * y, _of_product, simplify=_simple_mul, commutes=True, selects=True
+    ),
+    "abs": _primitive(np.absolute, lambda tape, data, xs, r: (tape.apply("select", xs[0] < 0, -1.0, 1.0),)),
+    "sign": _primitive(np.sign, _none),
+    "floor": _primitive(np.floor, _none),
+    "ceil": _primitive(np.ceil, _none),
+    "trunc": _primitive(np.trunc, _none),
+    "rint": _primitive(np.rint, _none),
+    # functions
+    "sqrt": _primitive(np.sqrt, _one(lambda tape, x, r: 0.5 / r)),
+    "exp": _library(np.exp, "exp", lambda tape, x, r: r),
+    "exp2": _library(np.exp2, "exp2", lambda tape, x, r: r * math.log(2)),
+    "expm1": _library(np.expm1, "expm1", lambda tape, x, r: tape.apply("exp", x)),
+    "log": _library(np.log, "log", lambda tape, x, r: 1.0 / x),
+    "log1p": _library(np.log1p, "log1p", lambda tape, x, r: 1.0 / (1.0 + x)),
+    "log2": _library(np.log2, "log2", lambda tape, x, r: (1 / math.log(2)) / x),
+    "log10": _library(np.log10, "log10", lambda tape, x, r: (1 / math.log(10)) / x),
+    "cbrt": _library(np.cbrt, "cbrt", lambda tape, x, r: 1.0 / (3.0 * r * r)),
+    "sin": _library(np.sin, "sin", lambda tape, x, r: tape.apply("cos", x)),
+    "cos": _library(np.cos, "cos", lambda tape, x, r: -tape.apply("sin", x)),
+    "tan": _library(np.tan, "tan", lambda tape, x, r: 1.0 + r * r),
+    "asin": _library(np.arcsin, "asin", lambda tape, x, r: 1.0 / tape.apply("sqrt", 1.0 - x * x)),
+    "acos": _library(np.arccos, "acos", lambda tape, x, r: -1.0 / tape.apply("sqrt", 1.0 - x * x)),
+    "atan": _library(np.arctan, "atan", lambda tape, x, r: 1.0 / (1.0 + x * x)),
+    "sinh": _library(np.sinh, "sinh", lambda tape, x, r: tape.apply("cosh", x)),
+    "cosh": _library(np.cosh, "cosh", lambda tape, x, r: tape.apply("sinh", x)),
+    "tanh": _library(np.tanh, "tanh", lambda tape, x, r: 1.0 - r * r),
+    "asinh": _library(np.arcsinh, "asinh", lambda tape, x, r: 1.0 / tape.apply("sqrt", x * x + 1.0)),
+    "acosh": _library(np.arccosh, "acosh", lambda tape, x, r: 1.0 / tape.apply("sqrt", x * x - 1.0)),
+    "atanh": _library(np.arctanh, "atanh", lambda tape, x, r: 1.0 / (1.0 - x * x)),
+    "erf": _library(_special("erf"), "erf", lambda tape, x, r: _OF_ERF * tape.apply("exp", -(x * x))),
+    "erfc": _library(_special("erfc"), "erfc", lambda tape, x, r: -_OF_ERF * tape.apply("exp", -(x * x))),
+    "gamma": _primitive(
+        _special("gamma"), _one(lambda tape, x, r: r * tape.apply("polygamma", x, data=0)), "tgamma(x)", "tgamma"
+    ),
+    "lgamma": _primitive(
+        _special("gammaln"), _one(lambda tape, x, r: tape.apply("polygamma", x, data=0)), "lgamma(x)", "lgamma"
+    ),
+    "polygamma": Primitive(
+        lambda data, x: polygamma(data, x),
+        lambda tape, data, xs, r: (tape.apply("polygamma", xs[0], data=data + 1),),
+    ),
+    "pow": _primitive(np.power, _of_pow, "pow(x, y)", "pow"),
+    "atan2": _primitive(
+        np.arctan2, lambda tape, data, xs, r: _of_angle(*xs), "atan2(x, y)", "atan2"
+    ),
+    "hypot": _primitive(np.hypot, lambda tape, data, xs, r: (xs[0] / r, xs[1] / r), "hypot(x, y)", "hypot"),
+    "mod": _primitive(
+        _mod, lambda tape, data, xs, r: (1.0, -tape.apply("floor", xs[0] / xs[1])), "floored(fmod(x, y), y)", "fmod"
+    ),
+    # a piecewise polynomial; an unknown that is found by iteration
+    "table": Primitive(lambda data, x: data.evaluate(x), _of_table, constant=lambda data, x: data.evaluate(x)),
+    "root": Primitive(
+        lambda data, *operands: data[0].evaluate(data[1], operands),
+        lambda tape, data, xs, r: data[0].partials(tape, data[1], xs),
+    ),
+}  # fmt: skip
+
+
+def _of_angle(y: Any, x: Any) -> tuple[Any, Any]:
+    square = x * x + y * y
+    return x / square, -y / square

@@ -1,0 +1,412 @@
+"""Lowering: recorded operations become a program for the interpreter, `contin.functions.interpreter`.
+
+A program has two stretches. The first computes, once a call, what depends on parameters and constants only: the scalars. The
+second runs over blocks of points; its registers hold one number for each point of a block. Operands of the second stretch are
+registers or scalars. Registers are used again after the last use of what they hold.
+
+Each instruction is a row of five whole numbers: code, target, and up to three operands (registers, scalars or places in
+``lists``).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Container, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array, Indices
+from contin.functions.primitives import TABLE
+from contin.functions.tape import Operation, Tape
+
+#: The slot of t.
+TIME = "t"
+
+#: Codes of instructions that are not operations of a tape, or have another form where an operand is a scalar.
+_OWN = (
+    "load u", "load v", "load t", "fill", "copy", "keep", "store", "store scalar", "store slope", "store scalar slope",
+    "add s", "sub s", "s sub", "mul s", "div s", "s div", "mul add", "mul sub", "sub mul", "mul s add",
+)  # fmt: skip
+#: Operations of which a register and a scalar make one instruction: its name with the scalar on the right, and on the left.
+_WITH_SCALAR = {"add": ("add s", "add s"), "sub": ("sub s", "s sub"), "mul": ("mul s", "mul s"), "div": ("div s", "s div")}
+CODES: dict[str, int] = {
+    name: code for code, name in enumerate([*_OWN, *(name for name in TABLE if name not in ("input", "constant"))])
+}
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Where the inputs of a program are found: by slot, the column of u, of v, or of p. The slot of t is `TIME`."""
+
+    u: Mapping[Hashable, int]
+    v: Mapping[Hashable, int]
+    p: Mapping[Hashable, int]
+
+
+@dataclass(frozen=True)
+class Program:
+    """Instructions, and what they need.
+
+    Attributes
+    ----------
+    code : ndarray of int, shape (instructions, 5)
+    first, last : int
+        Ends of the first and of the second stretch. Behind are the instructions of searches, which both may use.
+    lists : ndarray of int
+        Operands of instructions that take any number.
+    scalars : ndarray
+        The constants, then room for the parameters and for what the first stretch computes.
+    parameters : int
+        Where the parameters stand among the scalars.
+    registers : int
+        Number of registers.
+    operations : int
+        Number of arithmetic instructions of the second stretch.
+    tables : ndarray
+        Piecewise polynomials.
+    unknowns : int
+        Largest number of unknowns that are found together.
+    """
+
+    code: Indices
+    first: int
+    last: int
+    lists: Indices
+    scalars: Array
+    parameters: int
+    registers: int
+    operations: int
+    tables: Array
+    unknowns: int
+
+
+class Slope(NamedTuple):
+    """Where a derivative is stored: its place in the flattened Jacobian of one point."""
+
+    at: int
+
+
+def program(tape: Tape, results: Sequence[tuple[int, int | Slope]], inputs: Inputs) -> Program:
+    """Return the program that computes operations and stores each in a column of the values, or at a `Slope`.
+
+    Parameters
+    ----------
+    results : sequence of (place, where)
+    inputs : Inputs
+    """
+    return _Lowering(tape, results, inputs).program()
+
+
+class _Lowering:
+    """What both stretches share: the tape, the scalars, lists of operands, tables, and the instructions of searches."""
+
+    def __init__(self, tape: Tape, results: Sequence[tuple[int, int | Slope]], inputs: Inputs) -> None:
+        self.tape, self.results, self.inputs = tape, results, inputs
+        self.lists: list[int] = []
+        self.tables: list[float] = []
+        self.searches: list[list[int]] = []
+        self.begins: list[int] = []  # places in lists that count instructions of searches from their first one
+        self.unknowns = 0
+        places = [place for place, _ in results]
+        self.needed = tape.needed(places)
+        self.varies = tape.reading(places, [place for place in self.needed if self._varies(tape.operations[place])])
+        self._number_scalars()
+
+    def _varies(self, operation: Operation) -> bool:
+        return operation.name == "input" and operation.data not in self.inputs.p
+
+    def _number_scalars(self) -> None:
+        """Give a scalar to every constant and parameter."""
+        operations, inputs = self.tape.operations, self.inputs
+        fixed = [place for place in self.needed if not self.varies[place]]
+        self.once = [place for place in fixed if operations[place].name not in ("constant", "input")]
+        searches = [operations[place].data[0] for place in self.needed if operations[place].name == "root"]
+        inside = [place for search in dict.fromkeys(searches) for place in self.tape.needed(search.results)]
+        constants = dict.fromkeys(place for place in [*fixed, *inside] if operations[place].name == "constant")
+        self.scalar = {place: number for number, place in enumerate(constants)}
+        self.constants = [operations[place].data for place in constants]
+        sums = [place for place in [*self.needed, *inside] if operations[place].name == "linear"]
+        factors = sorted({factor for place in sums for factor in operations[place].data})
+        self.factor = {factor: len(self.constants) + number for number, factor in enumerate(factors)}
+        self.constants += factors
+        for place in fixed:
+            if operations[place].name == "input":
+                self.scalar[place] = len(self.constants) + inputs.p[operations[place].data]
+        self.scalars = len(self.constants) + len(inputs.p)
+
+    def program(self) -> Program:
+        """Return the program."""
+        operations = self.tape.operations
+        wanted = {place for place, _ in self.results}
+        for place in self.needed:
+            if self.varies[place]:
+                wanted.update(operations[place].operands)
+        first = _Stretch(self, self.once, {}, keeps=wanted)
+        stores: dict[int, list[int | Slope]] = {}
+        for place, where in self.results:
+            stores.setdefault(place, []).append(where)
+        second = _Stretch(self, self._ordered(), stores)
+        for place, where in self.results:
+            if not self.varies[place]:
+                name = "store scalar slope" if isinstance(where, Slope) else "store scalar"
+                second.code.append([CODES[name], _at(where), self.scalar[place], 0, 0])
+        last = len(first.code) + len(second.code)
+        for at in self.begins:
+            self.lists[at] += last
+        silent = {CODES[name] for name in _SILENT}
+        return Program(
+            np.array([*first.code, *second.code, *self.searches], dtype=np.int64).reshape(-1, 5), len(first.code), last,
+            np.array(self.lists or [0], dtype=np.int64),
+            np.array([*self.constants, *[0.0] * (self.scalars - len(self.constants))]), len(self.constants),
+            max(first.most, second.most, 1), sum(row[0] not in silent for row in [*second.code, *self.searches]),
+            np.array(self.tables or [0.0]), self.unknowns,
+        )  # fmt: skip
+
+    def _ordered(self) -> list[int]:
+        """Return the operations that vary, each result's just before it: what is needed late is computed late."""
+        found: list[int] = []
+        seen = set()
+        for result, _ in self.results:
+            stack = [(result, False)]
+            while stack:
+                place, done = stack.pop()
+                if done:
+                    found.append(place)
+                elif self.varies[place] and place not in seen:
+                    seen.add(place)
+                    stack.append((place, True))
+                    stack.extend((operand, False) for operand in reversed(self.tape.operations[place].operands))
+        return found
+
+
+#: Instructions that move numbers.
+_SILENT = ("load u", "load v", "load t", "fill", "keep", "store", "store scalar", "store slope", "store scalar slope")
+
+
+def _at(where: int | Slope) -> int:
+    return where.at if isinstance(where, Slope) else where
+
+
+class _Stretch:
+    """Instructions in a row, and their registers.
+
+    Parameters
+    ----------
+    shared : _Lowering
+    places : sequence of int
+        The operations, in order.
+    stores : mapping of int to list
+        Where results are stored, by operation.
+    keeps : container of int
+        Operations whose results become scalars.
+    given : mapping of int to int
+        Registers of operations that are computed elsewhere.
+    first : int
+        The first register that may be used.
+    pinned : mapping of int to int
+        Registers that results are to be found in afterwards.
+    """
+
+    def __init__(
+        self, shared: _Lowering, places: Sequence[int], stores: Mapping[int, list[int | Slope]], *,
+        keeps: Container[int] = (), given: Mapping[int, int] | None = None, first: int = 0,
+        pinned: Mapping[int, list[int]] | None = None,
+    ) -> None:  # fmt: skip
+        self.shared, self.operations, self.scalar = shared, shared.tape.operations, shared.scalar
+        self.registers, self.given, self.inside = dict(given or {}), set(given or {}), {*places, *(given or {})}
+        self.code: list[list[int]] = []
+        self.free: list[int] = []
+        self.most = first
+        pinned = pinned or {}
+        self.fused = self._fusible(places, stores, keeps, pinned)
+        self.left = Counter(operand for place in places if place not in self.fused for operand in self._operands(place))
+        for place in places:
+            if place in self.fused:
+                continue
+            self._instruct(place)
+            for where in stores.get(place, ()):
+                name = "store slope" if isinstance(where, Slope) else "store"
+                self.code.append([CODES[name], _at(where), self.registers[place], 0, 0])
+            for register in pinned.get(place, ()):
+                self.code.append([CODES["copy"], register, self.registers[place], 0, 0])
+            if place in keeps:
+                self.scalar[place] = shared.scalars
+                self.code.append([CODES["keep"], shared.scalars, self.registers[place], 0, 0])
+                shared.scalars += 1
+            if not self.left[place]:
+                self._release(place)
+
+    def _fusible(
+        self, places: Sequence[int], stores: Container[int], keeps: Container[int], pinned: Container[int]
+    ) -> dict[int, int]:
+        """Return products that are used once, by a sum or difference that takes them in; by product, that operation."""
+        uses: Counter[int] = Counter(operand for place in places for operand in self.operations[place].operands)
+        fused: dict[int, int] = {}
+        for place in places:
+            name, operands = self.operations[place].name, self.operations[place].operands
+            if name not in ("add", "sub") or not all(operand in self.inside for operand in operands):
+                continue
+            for operand in reversed(operands):
+                factor = self.operations[operand]
+                if factor.name != "mul" or uses[operand] != 1 or operand in self.given:
+                    continue
+                if operand in stores or operand in keeps or operand in pinned:
+                    continue
+                registers = [each in self.inside and each not in self.scalar for each in factor.operands]
+                if all(registers) or (name == "add" and any(registers)):
+                    fused[operand] = place
+                    break
+        return fused
+
+    def _operands(self, place: int) -> list[int]:
+        """Return the operands of an operation, those of a product that it takes in included."""
+        found: list[int] = []
+        for operand in self.operations[place].operands:
+            if self.fused.get(operand) == place:
+                found += self.operations[operand].operands
+            else:
+                found.append(operand)
+        return found
+
+    # --- registers -----------------------------------------------------------------------------------------------------
+
+    def _take(self) -> int:
+        """Return a register that is not in use."""
+        if self.free:
+            return self.free.pop()
+        self.most += 1
+        return self.most - 1
+
+    def _register(self, place: int) -> int:
+        """Return the register of an operand; a scalar is filled into one."""
+        if place not in self.registers:
+            register = self.registers[place] = self._take()
+            self.code.append([CODES["fill"], register, self.scalar[place], 0, 0])
+        return self.registers[place]
+
+    def _release(self, place: int) -> None:
+        if place not in self.given:
+            register = self.registers.pop(place, None)
+            if register is not None:
+                self.free.append(register)
+
+    # --- one instruction -----------------------------------------------------------------------------------------------
+
+    def _instruct(self, place: int) -> None:
+        """Write the instruction of an operation, and free the registers that no later one needs."""
+        operation = self.operations[place]
+        if place in self.registers:  # found with another unknown
+            name, given = "", []
+        elif operation.name == "input":
+            name, given = self._load(operation.data)
+        elif operation.name == "root":
+            self._root(place)
+            name, given = "", []
+        else:
+            product = next((operand for operand in operation.operands if self.fused.get(operand) == place), None)
+            name, given = self._plain(operation) if product is None else self._fused(operation, product)
+        for operand in self._operands(place):
+            self.left[operand] -= 1
+            if self.left[operand] <= 0:
+                self._release(operand)
+        if name:
+            target = self.registers[place] = self._take()
+            self.code.append([CODES[name], target, *given, *[0] * (3 - len(given))])
+
+    def _load(self, slot: Hashable) -> tuple[str, list[int]]:
+        inputs = self.shared.inputs
+        if slot == TIME:
+            return "load t", []
+        return ("load u", [inputs.u[slot]]) if slot in inputs.u else ("load v", [inputs.v[slot]])
+
+    def _plain(self, operation: Operation) -> tuple[str, list[int]]:
+        """Return name and operands of an instruction that stands for one operation."""
+        name, operands = operation.name, operation.operands
+        if name in ("sum", "dot", "linear"):
+            return name, self._list(operation)
+        if name == "table":
+            tables = self.shared.tables
+            tables.extend(operation.data.numbers())
+            return name, [self._register(operands[0]), len(tables) - operation.data.numbers().size]
+        if name == "polygamma":
+            return name, [self._register(operands[0]), operation.data]
+        if name in _WITH_SCALAR:
+            a, b = operands
+            if b in self.scalar and a not in self.scalar:
+                return _WITH_SCALAR[name][0], [self._register(a), self.scalar[b]]
+            if a in self.scalar and b not in self.scalar:
+                return _WITH_SCALAR[name][1], [self._register(b), self.scalar[a]]
+        return name, [self._register(operand) for operand in operands]
+
+    def _list(self, operation: Operation) -> list[int]:
+        """Return where the registers of many operands stand, and how many; the factors of a sum follow as scalars."""
+        count = len(operation.operands) // 2 if operation.name == "dot" else len(operation.operands)
+        listed = [self._register(operand) for operand in operation.operands]
+        if operation.name == "linear":
+            listed += [self.shared.factor[factor] for factor in operation.data]
+        start = len(self.shared.lists)
+        self.shared.lists += listed
+        return [start, count]
+
+    def _fused(self, operation: Operation, product: int) -> tuple[str, list[int]]:
+        """Return name and operands of a sum or difference with a product in it."""
+        operands = operation.operands
+        other = operands[1] if operands[0] == product else operands[0]
+        a, b = self.operations[product].operands
+        if a in self.scalar or b in self.scalar:
+            factor, scalar = (b, a) if a in self.scalar else (a, b)
+            return "mul s add", [self._register(factor), self.scalar[scalar], self._register(other)]
+        kind = "mul add" if operation.name == "add" else ("mul sub" if operands[0] == product else "sub mul")
+        return kind, [self._register(a), self._register(b), self._register(other)]
+
+    def _root(self, place: int) -> None:
+        """Write the search for unknowns: registers as `contin.functions.interpreter` describes them, kept to the end."""
+        shared, operation = self.shared, self.operations[place]
+        search, k = operation.data[0], len(operation.data[0].unknowns)
+        registers = {operand: self._register(operand) for operand in operation.operands}
+        starts = [self._register(start) for start in search.starts]
+        at = self.most
+        self.most += 5 * k + 4 + len(search.matrix)
+        results = [search.potential, *search.slopes, *search.matrix]
+        pinned: dict[int, list[int]] = {}
+        for number, result in enumerate(results):
+            pinned.setdefault(result, []).append(at + k + number)
+        depends = shared.tape.reading(results, search.unknowns)
+        inner = [each for each in shared.tape.needed(results) if depends[each] and each not in search.unknowns]
+        unknowns = {unknown: at + number for number, unknown in enumerate(search.unknowns)}
+        varying = {operand: register for operand, register in registers.items() if operand not in self.scalar}
+        sub = _Stretch(shared, inner, {}, given={**varying, **unknowns}, first=self.most, pinned=pinned)
+        for result, targets in pinned.items():
+            if not depends[result] or result in unknowns:
+                for target in targets:
+                    row = (
+                        ["fill", target, self.scalar[result]]
+                        if result in self.scalar
+                        else ["copy", target, {**varying, **unknowns}[result]]
+                    )
+                    sub.code.append([CODES[str(row[0])], int(row[1]), int(row[2]), 0, 0])
+        self.most = sub.most
+        start, begin = len(shared.lists), len(shared.searches)
+        shared.searches += sub.code
+        shared.lists += [k, int(search.minimum), begin, len(shared.searches), at, *starts]
+        shared.begins += [start + 2, start + 3]
+        shared.unknowns = max(shared.unknowns, k)
+        self.code.append([CODES["root"], at, start, 0, 0])
+        for each in self.inside:
+            other = self.operations[each]
+            if other.name == "root" and other.data[0] == search and other.operands == operation.operands:
+                self.registers[each] = at + other.data[1]
+                self.given.add(each)  # its register is not used again
+
+
+def evaluated(found: Program, points: Array, count: int) -> Array:
+    """Return the values of a program without parameters at points, shape (points, count)."""
+    from contin.functions.interpreter import LANES, evaluate  # that module needs this one
+
+    out, none = np.empty((len(points), count)), np.empty((0, 0))
+    work, scratch = np.empty(found.registers * LANES), np.empty((max(found.unknowns, 1), found.unknowns + 1))
+    given = np.zeros(len(points)), points, none, work, scratch, out, np.empty((0, 0, 0))
+    evaluate(found.code, found.first, found.last, found.lists, found.scalars.copy(), found.tables, *given)
+    return out

@@ -1,0 +1,371 @@
+"""Stand-ins: copies of a user's function, and of what it calls, that take recorded numbers.
+
+Functions of ``math`` take ordinary numbers only, and arrays that NumPy makes hold no recorded ones. In the copies, their names
+stand for functions that take both. Everything else is what it was: globals, closures, defaults, objects with their methods.
+"""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import math
+import types
+from typing import Any
+
+import numpy as np
+
+from contin.functions.recorded_arrays import (
+    FUNCTIONS,
+    UFUNCS,
+    Numbers,
+    SparseConstant,
+    elementwise,
+    largest,
+    numbers,
+    operation,
+    recorded,
+    scalar_product,
+    smallest,
+    tabulated,
+)
+from contin.functions.recorded_function import RecordedFunction
+from contin.functions.tables import Table
+from contin.functions.tape import Number, Unrecordable, power
+
+
+def prepared(function: Any) -> Any:
+    """Return a copy of a function that takes recorded numbers.
+
+    Raises
+    ------
+    Unrecordable
+        It is no plain Python function, or one that catches exceptions.
+    """
+    return _Copies().function(function)
+
+
+class _Copies:
+    """Copies of functions, each made once."""
+
+    def __init__(self) -> None:
+        self._done: dict[int, Any] = {}
+        self._kept: list[Any] = []  # what is known by its address stays alive
+
+    def function(self, function: Any) -> Any:
+        """Return the copy of a function, method, partial function, or object that can be called."""
+        function = getattr(function, "py_func", function)
+        if isinstance(function, RecordedFunction):
+            return function
+        if isinstance(function, functools.partial):
+            arguments = [self.value(value) for value in function.args]
+            named = {name: self.value(value) for name, value in function.keywords.items()}
+            return functools.partial(self.function(function.func), *arguments, **named)
+        if isinstance(function, types.MethodType):
+            return types.MethodType(self.function(function.__func__), self.value(function.__self__))
+        if isinstance(function, types.FunctionType):
+            return self._copy(function)
+        found = self.value(function)
+        if found is function and not isinstance(function, type):
+            call = getattr(type(function), "__call__", None)
+            if isinstance(call, types.FunctionType):
+                return types.MethodType(self.function(call), self._object(function))
+            raise Unrecordable(f"{getattr(function, '__name__', type(function).__name__)} is no plain Python function")
+        return found
+
+    def _copy(self, function: types.FunctionType) -> Any:
+        if id(function) in self._done:
+            return self._done[id(function)]
+        if _catches(function.__code__):
+            raise Unrecordable(f"{function.__name__} catches exceptions (try, with)")
+        scope: dict[str, Any] = {"__name__": function.__module__, "__builtins__": builtins}
+        cells = tuple(types.CellType() for _ in function.__closure__ or ())
+        copy = types.FunctionType(function.__code__, scope, function.__name__, None, cells or None)
+        self._done[id(function)] = copy
+        self._kept.append(function)
+        copy.__defaults__ = None if function.__defaults__ is None else tuple(map(self.value, function.__defaults__))
+        copy.__kwdefaults__ = {name: self.value(value) for name, value in (function.__kwdefaults__ or {}).items()} or None
+        for name in _names(function.__code__):
+            if name in function.__globals__:
+                scope[name] = self.value(function.__globals__[name])
+            elif name in _BUILTINS:
+                scope[name] = _BUILTINS[name]
+        for cell, given in zip(cells, function.__closure__ or ()):
+            try:
+                cell.cell_contents = self.value(given.cell_contents)
+            except ValueError:  # a name that has no value yet
+                continue
+        return copy
+
+    def value(self, value: Any) -> Any:
+        """Return what stands for a value."""
+        if isinstance(value, (Number, Numbers, RecordedFunction, _Module, _Object)):
+            return value
+        own = _own(value)
+        if own is not None:
+            return own
+        value = getattr(value, "py_func", value)
+        if isinstance(value, types.FunctionType) and value.__module__.startswith(_HERE):
+            return value  # it takes recorded numbers
+        if isinstance(value, (types.FunctionType, types.MethodType, functools.partial)):
+            return self.function(value)
+        if isinstance(value, types.ModuleType):
+            return _Module(value, self)
+        if isinstance(value, (list, tuple)) and any(map(_may_hold_functions, value)):
+            parts = [self.value(part) for part in value]
+            return type(value)(*parts) if hasattr(value, "_fields") else type(value)(parts)
+        if isinstance(value, dict) and any(map(_may_hold_functions, value.values())):
+            return {name: self.value(part) for name, part in value.items()}
+        return self._object(value) if _is_object(value) else value
+
+    def _object(self, value: Any) -> Any:
+        if id(value) not in self._done:
+            self._kept.append(value)
+            self._done[id(value)] = _Object(value, self)
+        return self._done[id(value)]
+
+
+class _Module:
+    """A module whose functions take recorded numbers."""
+
+    def __init__(self, module: types.ModuleType, copies: _Copies) -> None:
+        self._module, self._copies = module, copies
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._module, name)
+        foreign = self._module.__name__.partition(".")[0] in _FOREIGN
+        if not foreign or isinstance(value, types.ModuleType):
+            return self._copies.value(value)
+        own = _own(value)
+        return value if own is None else own
+
+
+#: Where functions are written for recorded numbers.
+_HERE = __name__.rpartition(".")[0]
+#: Libraries whose functions stay what they are, if there is no stand-in for them.
+_FOREIGN = ("math", "numpy", "scipy", "cmath", "builtins")
+
+
+class _Object:
+    """An object of a user's class whose methods take recorded numbers."""
+
+    def __init__(self, value: Any, copies: _Copies) -> None:
+        object.__setattr__(self, "_given", (value, copies))
+
+    def __getattr__(self, name: str) -> Any:
+        value, copies = object.__getattribute__(self, "_given")
+        found = getattr(value, name)
+        if isinstance(found, types.MethodType) and found.__self__ is value:
+            return types.MethodType(copies.function(found.__func__), self)
+        return copies.value(found)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise Unrecordable("it changes an object")
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        value, copies = object.__getattribute__(self, "_given")
+        return copies.function(type(value).__call__)(self, *arguments, **named)
+
+    def __getitem__(self, key: Any) -> Any:
+        value, copies = object.__getattribute__(self, "_given")
+        return copies.value(value[key])
+
+    def __iter__(self) -> Any:
+        value, copies = object.__getattribute__(self, "_given")
+        return iter([copies.value(part) for part in value])
+
+    def __len__(self) -> int:
+        return len(object.__getattribute__(self, "_given")[0])
+
+
+def _names(code: types.CodeType) -> set[str]:
+    """Return the global names that a code object, and those inside it, may use."""
+    inner = (constant for constant in code.co_consts if isinstance(constant, types.CodeType))
+    return set(code.co_names).union(*map(_names, inner))
+
+
+def _catches(code: types.CodeType) -> bool:
+    return bool(getattr(code, "co_exceptiontable", b"")) and not code.co_flags & _GENERATOR
+
+
+#: The flag of generators, which always have a table of exceptions.
+_GENERATOR = 0x20
+
+
+def _may_hold_functions(value: Any) -> bool:
+    return callable(value) or isinstance(value, (list, tuple, dict)) or _is_object(value) or hasattr(value, "tocsr")
+
+
+def _is_object(value: Any) -> bool:
+    """Return whether a value is an object of a user's class."""
+    if type(value).__module__.partition(".")[0] in ("numpy", "scipy", "builtins", __name__.partition(".")[0]):
+        return isinstance(value, types.SimpleNamespace)
+    if isinstance(value, (tuple, list, dict, type, float, int, str)):
+        return False
+    return isinstance(value, types.SimpleNamespace) or bool(type(value).__flags__ & _HEAP_TYPE)
+
+
+#: The flag of classes that a class statement made (CPython: Py_TPFLAGS_HEAPTYPE).
+_HEAP_TYPE = 1 << 9
+
+
+def _own(value: Any) -> Any:
+    """Return the stand-in of a function, sparse matrix or spline; None of everything else."""
+    if isinstance(value, np.ufunc):
+        function = UFUNCS.get(value.__name__)
+        return None if function is None else _for_all(value, function)
+    if type(value).__module__.startswith("scipy."):
+        return _of_scipy(value)
+    try:
+        return _STAND_INS.get(value) if callable(value) else None
+    except TypeError:  # it cannot be a key
+        return None
+
+
+def _of_scipy(value: Any) -> Any:
+    """Return the stand-in of a sparse matrix, or of a spline."""
+    if hasattr(value, "tocsr"):
+        return SparseConstant(value)
+    if type(value).__name__ in ("CubicSpline", "PPoly", "PchipInterpolator", "Akima1DInterpolator", "CubicHermiteSpline"):
+        if np.ndim(value.c) == 2 and value.extrapolate is True:
+            return _for_all(value, tabulated(Table.piecewise(value.x, value.c)))
+    elif type(value).__name__ == "BSpline" and np.ndim(value.c) == 1 and value.extrapolate is True:
+        from scipy.interpolate import PPoly
+
+        pieces = PPoly.from_spline(value)
+        inside = [i for i, (a, b) in enumerate(zip(pieces.x, pieces.x[1:])) if b > a]
+        knots = [*(pieces.x[i] for i in inside), pieces.x[inside[-1] + 1]]
+        return _for_all(value, tabulated(Table.piecewise(knots, pieces.c[:, inside])))
+    return None
+
+
+def _for_all(original: Any, function: Any) -> Any:
+    """Return a function that records for recorded numbers, and is the original one for all others."""
+
+    class _Either:
+        def __call__(self, *inputs: Any, **options: Any) -> Any:
+            if recorded(*inputs) is None:
+                return original(*inputs, **options)
+            if options.get("out") is not None or options.get("where") is not None:
+                raise Unrecordable("it calls a function of NumPy with out= or where=")
+            return elementwise(function, *inputs)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(original, name)
+
+    return _Either()
+
+
+def _of_math(name: str) -> Any:
+    own, original = operation(_RENAMED.get(name, name)), getattr(math, name)
+    return lambda *inputs: original(*inputs) if recorded(*inputs) is None else own(*inputs)
+
+
+def _unless_recorded(original: Any, function: Any) -> Any:
+    return lambda *inputs: original(*inputs) if recorded(*inputs) is None else function(*inputs)
+
+
+def _most(choose: Any, original: Any) -> Any:
+    """Return ``max`` or ``min`` of recorded numbers: a selection, no decision."""
+
+    def chosen(*values: Any, **options: Any) -> Any:
+        listed = list(values[0]) if len(values) == 1 else list(values)
+        if recorded(*listed) is None or options:
+            return original(listed, **options)
+        return functools.reduce(choose, listed)
+
+    return chosen
+
+
+def _maker(original: Any) -> Any:
+    """Return a function of NumPy that makes arrays of floating-point numbers; they can hold recorded ones."""
+
+    def make(*given: Any, **options: Any) -> Any:
+        if recorded(*given) is not None:
+            own = FUNCTIONS.get(original)
+            if own is not None:
+                return own(*given, **options)
+            if original in (np.array, np.asarray, np.asanyarray, np.ascontiguousarray):
+                return numbers(np.array(elementwise(lambda x: x, given[0]), dtype=object))
+            array = np.empty(given[0], dtype=object)  # np.full of a recorded number
+            array[...] = given[1]
+            return array.view(Numbers)
+        made = original(*given, **options)
+        if original in (np.array, np.asarray, np.asanyarray, np.ascontiguousarray):
+            return made
+        kind = options.get("dtype")
+        return made.astype(object).view(Numbers) if made.dtype.kind == "f" and kind in (None, float, np.float64) else made
+
+    return make
+
+
+class _FloatKind(type):
+    """The class of `_Float`: a recorded number is a float."""
+
+    def __call__(cls, value: Any = 0.0) -> Any:
+        return value if recorded(value) is not None else float(value)
+
+    def __instancecheck__(cls, value: Any) -> bool:
+        return isinstance(value, (float, Number))
+
+
+class _Float(metaclass=_FloatKind):
+    """The stand-in of ``float``: a recorded number stays what it is."""
+
+
+def _ldexp(x: Any, n: Any) -> Any:
+    return x * 2.0**n
+
+
+def _copysign(x: Any, y: Any) -> Any:
+    return abs(x) * operation("sign")(operation("sign")(y) + 0.5)
+
+
+def _pow_of_math(x: Any, y: Any) -> Any:
+    return power(x, y) if isinstance(x, Number) else x**y
+
+
+def _distance(p: Any, q: Any) -> Any:
+    difference = [a - b for a, b in zip(p, q)]
+    return operation("sqrt")(scalar_product(difference, difference))
+
+
+#: Functions of ``math`` under the same name on the tape, or under another one.
+_RENAMED = {"fabs": "abs"}
+_OF_MATH = (
+    "sqrt", "exp", "exp2", "expm1", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh",
+    "tanh", "asinh", "acosh", "atanh", "atan2", "erf", "erfc", "gamma", "lgamma", "fabs", "floor", "ceil", "trunc",
+)  # fmt: skip
+
+
+def _log(x: Any, base: Any = math.e) -> Any:
+    return operation("log")(x) if base == math.e else operation("log")(x) / operation("log")(base)
+
+
+def _hypot(*values: Any) -> Any:
+    return operation("hypot")(*values) if len(values) == 2 else operation("sqrt")(scalar_product(values, values))
+
+
+_STAND_INS: dict[Any, Any] = {getattr(math, name): _of_math(name) for name in _OF_MATH if hasattr(math, name)}
+_STAND_INS |= {
+    math.log: _unless_recorded(math.log, _log), math.hypot: _unless_recorded(math.hypot, _hypot),
+    math.pow: _unless_recorded(math.pow, _pow_of_math), math.copysign: _unless_recorded(math.copysign, _copysign),
+    math.radians: _unless_recorded(math.radians, lambda x: x * (math.pi / 180)), math.ldexp: _unless_recorded(math.ldexp, _ldexp),
+    math.degrees: _unless_recorded(math.degrees, lambda x: x * (180 / math.pi)),
+    math.isfinite: _unless_recorded(math.isfinite, lambda x: abs(x) < math.inf),
+    math.isnan: _unless_recorded(math.isnan, lambda x: x != x),
+    math.fmod: _unless_recorded(math.fmod, lambda x, y: x - y * operation("trunc")(x / y)),
+    math.dist: _unless_recorded(math.dist, _distance),
+    max: _most(largest, max), min: _most(smallest, min),
+    float: _Float, np.float64: _Float,
+}  # fmt: skip
+_STAND_INS |= {
+    each: _maker(each)
+    for each in (
+        np.zeros, np.empty, np.ones, np.full, np.zeros_like, np.empty_like, np.ones_like, np.full_like, np.array, np.asarray,
+        np.asanyarray, np.ascontiguousarray,
+    )
+}  # fmt: skip
+_STAND_INS |= {each: own for each, own in FUNCTIONS.items() if each not in _STAND_INS and each is not np.asarray}
+#: Built-in functions that have a stand-in, by name.
+_BUILTINS = {name: _STAND_INS[getattr(builtins, name)] for name in ("max", "min", "float")}
+

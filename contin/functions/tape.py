@@ -1,0 +1,482 @@
+"""The tape: what a function computes, recorded as a list of operations that can be differentiated, counted, printed and run.
+
+A `Tape` holds operations in order; each refers to earlier ones by their numbers. Operations of constants are carried out at
+once, and equal operations are stored once. A `Number` stands for the result of an operation: Python's operators on it append
+operations. `contin.functions.primitives` lists the operations with their values and derivatives.
+
+Example: recording (x + 1) * (x + 1) makes three operations, of which the sum is stored once::
+
+    0  input (x)
+    1  constant 1.0
+    2  add 0 1
+    3  mul 2 2
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin.functions import primitives
+
+
+class Unrecordable(BaseException):
+    """A function needs what a recorded number does not have, such as its value.
+
+    It is no ``Exception``, so that a user's function does not catch it.
+    """
+
+
+class Operation(NamedTuple):
+    """One entry of a tape: the name of a primitive, the numbers of its operands, and what else it needs."""
+
+    name: str
+    operands: tuple[int, ...] = ()
+    data: Any = None
+
+
+class Tape:
+    """Recorded operations.
+
+    Attributes
+    ----------
+    operations : list of Operation
+    decide : callable, optional
+        ``decide(condition)`` returns the outcome that the present recording assumes where a function asks for the truth of a
+        number. Without it such a question raises `Unrecordable`.
+
+    Examples
+    --------
+    >>> tape = Tape()
+    >>> x = tape.input(0)
+    >>> y = (x + 1) * (1 + x)
+    >>> [operation.name for operation in tape.operations]
+    ['input', 'constant', 'add', 'mul']
+    """
+
+    def __init__(self) -> None:
+        self.operations: list[Operation] = []
+        self.decide: Callable[[int], bool] | None = None
+        self.searches = 0  # in the present recording: names their unknowns
+        self._known: dict[Any, int] = {}
+        self._results: dict[Any, Any] = {}
+
+    def kept(self, key: Any, make: Callable[[], Any]) -> Any:
+        """Return what was made for a key before, or make it."""
+        if key not in self._results:
+            self._results[key] = make()
+        return self._results[key]
+
+    def input(self, slot: Hashable) -> Number:
+        """Return the number of this input; whole slots are those of u, v and p in order."""
+        return Number(self, self._append(Operation("input", (), slot), ("input", slot)))
+
+    def constant(self, value: float) -> int:
+        """Return the place of a constant."""
+        value = float(value)
+        return self._append(Operation("constant", (), value), ("constant", value.hex()))
+
+    def value(self, place: int) -> float | None:
+        """Return the value of a constant, None of another operation."""
+        operation = self.operations[place]
+        return operation.data if operation.name == "constant" else None
+
+    def number(self, value: Any) -> Number:
+        """Return a Number for one of this tape or a real number.
+
+        Raises
+        ------
+        Unrecordable
+            It is neither.
+        """
+        if isinstance(value, Number):
+            if value.tape is not self:
+                raise Unrecordable("it uses a number of another recording")
+            return value
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            return self.number(value.item())
+        if isinstance(value, (numbers.Real, np.bool_)):
+            return Number(self, self.constant(float(value)))
+        raise Unrecordable(f"it computes with {type(value).__name__}, not with numbers")
+
+    def apply(self, name: str, *operands: Any, data: Any = None) -> Number:
+        """Append an operation, unless it can be carried out or simplified, or is there already."""
+        places = tuple(self.number(operand).place for operand in operands)
+        return Number(self, self.at(name, places, data))
+
+    def at(self, name: str, places: tuple[int, ...], data: Any = None) -> int:
+        """Do the same with the places of the operands; return the place of the result."""
+        primitive = primitives.TABLE[name]
+        if primitive.constant is not None:
+            known = [self.value(place) for place in places]
+            if places and None not in known:
+                return self.constant(primitive.constant(data, *known))
+        if primitive.simplify is not None:
+            simpler = primitive.simplify(self, places)
+            if simpler is not None:
+                return simpler
+        if primitive.commutes and places[0] > places[1]:
+            places = places[::-1]
+        return self._append(Operation(name, places, data), (name, places, data))
+
+    def _append(self, operation: Operation, key: Any) -> int:
+        known = self._known.get(key)
+        if known is None:
+            known = self._known[key] = len(self.operations)
+            self.operations.append(operation)
+        return known
+
+    def reading(self, places: Iterable[int], sources: Iterable[int]) -> list[bool]:
+        """Return for every operation up to the last of ``places`` whether it depends on one of ``sources``."""
+        last = max(places, default=-1)
+        depends = [False] * (last + 1)
+        for source in sources:
+            if source <= last:
+                depends[source] = True
+        for place, operation in enumerate(self.operations[: last + 1]):
+            if not depends[place]:
+                depends[place] = any(depends[operand] for operand in operation.operands)
+        return depends
+
+    def needed(self, places: Iterable[int]) -> list[int]:
+        """Return all operations that the ``places`` are computed from, and these, in order."""
+        found, stack = set(places), list(places)
+        while stack:
+            for operand in self.operations[stack.pop()].operands:
+                if operand not in found:
+                    found.add(operand)
+                    stack.append(operand)
+        return sorted(found)
+
+    def substitute(self, places: Sequence[int], values: dict[int, int]) -> list[int]:
+        """Return the ``places`` as they are with other operations in the place of some (both by their places)."""
+        moved = dict(values)
+        reads = self.reading(places, values)
+        for place in self.needed(places):
+            if place in moved or not reads[place]:
+                moved.setdefault(place, place)
+                continue
+            operation = self.operations[place]
+            moved[place] = self.at(operation.name, tuple(moved[operand] for operand in operation.operands), operation.data)
+        return [moved[place] for place in places]
+
+    def replay(self, other: Tape, places: Sequence[int], values: Mapping[int, Any]) -> list[Number]:
+        """Return operations of another tape, carried out on this one with ``values`` of its inputs by place."""
+        moved = {place: self.number(value).place for place, value in values.items()}
+        self._replay(other, places, moved)
+        return [Number(self, moved[place]) for place in places]
+
+    def _replay(self, other: Tape, places: Sequence[int], moved: dict[int, int]) -> None:
+        for place in other.needed(places):
+            if place in moved:
+                continue
+            operation = other.operations[place]
+            if operation.name == "constant":
+                moved[place] = self.constant(operation.data)
+                continue
+            data = operation.data
+            if operation.name == "root":
+                data = (self._moved_search(other, data[0], moved), data[1])
+            moved[place] = self.at(operation.name, tuple(moved[operand] for operand in operation.operands), data)
+
+    def _moved_search(self, other: Tape, search: Any, moved: dict[int, int]) -> Any:
+        """Return a search of another tape with places on this one."""
+        if ("search", search) not in moved:  # type: ignore[comparison-overlap]
+            inner = dict(moved)
+            for number, unknown in enumerate(search.unknowns):
+                inner[unknown] = self.input(("unknown", self.searches, number)).place
+            self.searches += 1
+            self._replay(other, [*search.results, *search.starts], inner)
+            moved["search", search] = search.moved(inner)  # type: ignore[index]
+        return moved["search", search]  # type: ignore[index]
+
+    def evaluate(self, places: Sequence[int], values: Mapping[Any, float]) -> list[float]:
+        """Return the values of operations in Python, for ``values`` of the inputs by slot."""
+        found: dict[int, Any] = {}
+        for place in self.needed(places):
+            operation = self.operations[place]
+            if operation.name == "input":
+                found[place] = values[operation.data]
+            elif operation.name == "constant":
+                found[place] = operation.data
+            elif operation.name == "root":
+                found[place] = self._unknown(operation, values)
+            else:
+                evaluate = primitives.TABLE[operation.name].evaluate
+                found[place] = evaluate(operation.data, *(found[operand] for operand in operation.operands))
+        return [float(found[place]) for place in places]
+
+    def evaluate_arrays(self, places: Sequence[int], values: Mapping[Any, Any]) -> list[Any]:
+        """Return the values of operations for arrays of the inputs by slot, all of one shape."""
+        from contin.functions.program import Inputs, evaluated, program  # that module needs this one
+
+        slots = {slot: column for column, slot in enumerate(values)}
+        found = program(self, list(zip(places, range(len(places)))), Inputs(slots, {}, {}))
+        arrays = [np.asarray(value, dtype=float) for value in values.values()]
+        points = np.ascontiguousarray(np.stack([array.ravel() for array in arrays], axis=1))
+        columns = evaluated(found, points, len(places))
+        return [columns[:, column].reshape(arrays[0].shape) for column in range(len(places))]
+
+    def lines(self, places: Sequence[int], labels: Mapping[int, str]) -> list[str]:
+        """Return operations as lines of text, with ``labels`` of inputs by place; what is used once stands where it is used."""
+        return _Printer(self, places, labels).lines()
+
+    def _unknown(self, operation: Operation, values: Mapping[Any, float]) -> float:
+        """Return an unknown that is found by iteration."""
+        from contin.functions.iteration import newton  # that module needs this one
+
+        search, index = operation.data
+        return newton(self, search, dict(values))[index]
+
+
+class Number:
+    """The result of an operation on a tape; see `Tape`.
+
+    It has Python's arithmetic. Its value is not known while a function is recorded: ``float(x)`` raises `Unrecordable`, and the
+    truth of a comparison is assumed by the recording.
+    """
+
+    __slots__ = ("place", "tape")
+
+    def __init__(self, tape: Tape, place: int) -> None:
+        self.tape, self.place = tape, place
+
+    def __repr__(self) -> str:
+        value = self.known
+        return f"<recorded number {self.place}>" if value is None else f"<recorded constant {value!r}>"
+
+    @property
+    def known(self) -> float | None:
+        """The value of a constant; None of other numbers."""
+        return self.tape.value(self.place)
+
+    @property
+    def real(self) -> Number:
+        """The number itself."""
+        return self
+
+    @property
+    def imag(self) -> float:
+        """Zero: recorded numbers are real."""
+        return 0.0
+
+    def conjugate(self) -> Number:
+        """Return the number itself."""
+        return self
+
+    def _with(self, name: str, *operands: Any) -> Any:
+        if any(not _is_scalar(operand) for operand in operands):
+            return NotImplemented
+        return self.tape.apply(name, *operands)
+
+    def __add__(self, other: Any) -> Any:
+        return self._with("add", self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return self._with("add", other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return self._with("sub", self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return self._with("sub", other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return self._with("mul", self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return self._with("mul", other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        return self._with("div", self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self._with("div", other, self)
+
+    def __mod__(self, other: Any) -> Any:
+        return self._with("mod", self, other)
+
+    def __rmod__(self, other: Any) -> Any:
+        return self._with("mod", other, self)
+
+    def __floordiv__(self, other: Any) -> Any:
+        return _floor_of(self._with("div", self, other))
+
+    def __rfloordiv__(self, other: Any) -> Any:
+        return _floor_of(self._with("div", other, self))
+
+    def __pow__(self, other: Any) -> Any:
+        return power(self, other) if _is_scalar(other) else NotImplemented
+
+    def __rpow__(self, other: Any) -> Any:
+        return power(self.tape.number(other), self) if _is_scalar(other) else NotImplemented
+
+    def __neg__(self) -> Number:
+        return self.tape.apply("neg", self)
+
+    def __pos__(self) -> Number:
+        return self
+
+    def __abs__(self) -> Number:
+        return self.tape.apply("abs", self)
+
+    def __lt__(self, other: Any) -> Any:
+        return self._with("lt", self, other)
+
+    def __gt__(self, other: Any) -> Any:
+        return self._with("lt", other, self)
+
+    def __le__(self, other: Any) -> Any:
+        return self._with("le", self, other)
+
+    def __ge__(self, other: Any) -> Any:
+        return self._with("le", other, self)
+
+    def __eq__(self, other: Any) -> Any:
+        return self._with("eq", self, other)
+
+    def __ne__(self, other: Any) -> Any:
+        equal = self._with("eq", self, other)
+        return equal if equal is NotImplemented else 1.0 - equal
+
+    def __invert__(self) -> Any:
+        return self.tape.apply("eq", self, 0.0)
+
+    def __and__(self, other: Any) -> Any:
+        return self.tape.apply("select", self, _truth(self.tape, other), 0.0)
+
+    def __or__(self, other: Any) -> Any:
+        return self.tape.apply("select", self, 1.0, _truth(self.tape, other))
+
+    __rand__, __ror__ = __and__, __or__
+
+    def __bool__(self) -> bool:
+        value = self.known
+        if value is not None:
+            return value != 0
+        if self.tape.decide is None:
+            raise Unrecordable("it decides by a comparison (if, while)")
+        return self.tape.decide(self.place)
+
+    def _refuse(self, *_: object) -> Any:
+        raise Unrecordable("it needs the value of a number (float, int, an index, or foreign compiled code)")
+
+    __float__ = __int__ = __index__ = __complex__ = __round__ = __hash__ = _refuse  # type: ignore[assignment]
+    __trunc__ = _refuse
+
+    def __floor__(self) -> Any:
+        return self.tape.apply("floor", self)
+
+    def __ceil__(self) -> Any:
+        return self.tape.apply("ceil", self)
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        from contin.functions.recorded_arrays import ufunc_of_numbers  # that module needs this one
+
+        return ufunc_of_numbers(ufunc, method, inputs, options)
+
+    def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
+        from contin.functions.recorded_arrays import function_of_numbers
+
+        return function_of_numbers(function, inputs, options)
+
+
+def _is_scalar(value: Any) -> bool:
+    return isinstance(value, (Number, numbers.Real, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim == 0)
+
+
+def _floor_of(value: Any) -> Any:
+    return value if value is NotImplemented else value.tape.apply("floor", value)
+
+
+def _truth(tape: Tape, value: Any) -> Number:
+    """Return 1 for a condition that holds, else 0."""
+    return tape.apply("sub", 1.0, tape.apply("eq", value, 0.0))
+
+
+#: Largest whole power that is written as products. Larger ones use the library's function.
+_LARGEST_POWER = 64
+
+
+def power(base: Number, exponent: Any) -> Number:
+    """Return base ** exponent: whole powers as products, as NumPy's and Python's squares; others by the library's function."""
+    tape = base.tape
+    known = exponent.known if isinstance(exponent, Number) else float(exponent)
+    if known is None or base.known is not None:
+        return tape.apply("pow", base, exponent)
+    if known == 0.5:
+        return tape.apply("sqrt", base)
+    if known == math.floor(known) and abs(known) <= _LARGEST_POWER:
+        result = _whole_power(base, int(abs(known)))
+        return result if known >= 0 else 1.0 / result
+    return tape.apply("pow", base, known)
+
+
+def _whole_power(base: Number, exponent: int) -> Number:
+    """Return a product of squares."""
+    result, square = base.tape.number(1.0), base
+    while exponent:
+        if exponent & 1:
+            result = result * square
+        exponent >>= 1
+        if exponent:
+            square = square * square
+    return result
+
+
+#: Operations that are written with a sign between their operands, and how tightly it binds.
+_SIGNS = {"add": (" + ", 1), "sub": (" - ", 1), "mul": (" * ", 2), "div": (" / ", 2), "lt": (" < ", 0), "le": (" <= ", 0), "eq": (" == ", 0)}
+#: The binding of a negative sign and of names.
+_NEGATIVE, _NAME = 1, 9
+
+
+class _Printer:
+    """The text of operations."""
+
+    def __init__(self, tape: Tape, places: Sequence[int], labels: Mapping[int, str]) -> None:
+        self.tape, self.places = tape, places
+        self.uses: dict[int, int] = {}
+        self.needed = tape.needed(places)
+        for place in self.needed:
+            for operand in tape.operations[place].operands:
+                self.uses[operand] = self.uses.get(operand, 0) + 1
+        self.texts: dict[int, tuple[str, int]] = {place: (label, _NAME) for place, label in labels.items()}
+
+    def lines(self) -> list[str]:
+        """Return a line for what is used several times, and for each result."""
+        found: list[str] = []
+        for place in self.needed:
+            if place in self.texts:
+                continue
+            text = self._text(self.tape.operations[place])
+            if self.uses.get(place, 0) > 1 and self.tape.operations[place].name != "constant":
+                name = f"z{len(found) + 1}"
+                found.append(f"{name} = {text[0]}")
+                text = name, _NAME
+            self.texts[place] = text
+        return found + [self.texts[place][0] for place in self.places]
+
+    def _text(self, operation: Operation) -> tuple[str, int]:
+        name, operands = operation.name, [self.texts[operand] for operand in operation.operands]
+        if name == "constant":
+            return f"{operation.data:.17g}".rstrip(), _NAME if operation.data >= 0 else _NEGATIVE
+        if name in _SIGNS:
+            sign, binds = _SIGNS[name]
+            right = binds + (name in ("sub", "div"))
+            return sign.join([_within(operands[0], binds), _within(operands[1], right)]), binds
+        if name == "neg":
+            return f"-{_within(operands[0], _NEGATIVE + 1)}", _NEGATIVE
+        if name == "select":
+            condition, a, b = (text for text, _ in operands)
+            return f"({a} if {condition} else {b})", _NAME
+        inside = ", ".join(text for text, _ in operands)
+        return f"{name}({inside})", _NAME
+
+
+def _within(text: tuple[str, int], binds: int) -> str:
+    """Return a text, in brackets where it binds less tightly."""
+    return text[0] if text[1] >= binds else f"({text[0]})"
