@@ -31,12 +31,8 @@ class ProblemError(ContinError, ValueError):
     """
 
 
-class CompilationError(ProblemError):
-    """A function cannot be compiled, or differentiated symbolically."""
-
-
 class InterpretedWarning(UserWarning):
-    """A function cannot be compiled and is evaluated in Python; the message says why, and what it costs."""
+    """A function cannot be recorded and is evaluated in Python; the message says why, and what it costs."""
 
 
 class ConvergenceError(ContinError, ArithmeticError):

@@ -159,6 +159,8 @@ def _intrinsic(write: Callable[..., Any]) -> Any:
         returned = ir.VoidType() if nothing else context.get_value_type(result)
         function = ir.Function(module, ir.FunctionType(returned, [value.type for value in values]), name)
         function.linkage = "linkonce_odr"  # one copy where modules are linked
+        if write.__name__ in _SMALL:
+            function.attributes.add("optsize")
         builder, given = ir.IRBuilder(function.append_basic_block()), iter(function.args)
         arguments = [
             kind(*itertools.islice(given, len(kind._fields))) if hasattr(kind, "_fields") else next(given)
@@ -182,7 +184,7 @@ class _Entry:
 
         PyObject *entry(PyObject *self, PyObject *const *arguments, Py_ssize_t count)
 
-    ``self`` is the tuple (numpy.ndarray, None, Raised, TypeError). An argument of another kind raises TypeError.
+    ``self`` is the tuple (numpy.ndarray, None, TypeError). An argument of another kind raises TypeError. Kernels raise nothing.
     """
 
     def __init__(self, context: Any, done: Any, parameters: list[Any], name: str) -> None:
@@ -201,8 +203,7 @@ class _Entry:
         entry = llvm.parse_assembly(cgutils.normalize_ir_text(str(self.module)))
         entry.verify()
         module.link_in(entry)
-        if not any(function.name.startswith(_ALLOCATES) for function in module.functions):
-            module.link_in(llvm.parse_assembly(_NOTHING_TO_RELEASE))
+        module.link_in(llvm.parse_assembly(_NOTHING_TO_RELEASE))
         for function in module.functions:
             if not function.is_declaration and function.name != self.name:
                 function.linkage = "internal"
@@ -218,13 +219,8 @@ class _Entry:
         kind = conventions.get_function_type(described.restype, described.argtypes)
         kernel = ir.Function(self.module, kind, described.llvm_func_name)
         thread = self._call("PyEval_SaveThread", _POINTER)
-        status, result = conventions.call_function(builder, kernel, described.restype, described.argtypes, values)
+        _, result = conventions.call_function(builder, kernel, described.restype, described.argtypes, values)
         self._call("PyEval_RestoreThread", ir.VoidType(), thread)
-        raises, returns = self.function.append_basic_block(), self.function.append_basic_block()
-        builder.cbranch(status.is_error, raises, returns)
-        builder.position_at_end(raises)
-        self._raise(status)
-        builder.position_at_end(returns)
         builder.ret(self._result(described.restype, result))
         builder.position_at_end(self.wrong)
         text = cgutils.global_constant(builder.module, "wrong", cgutils.make_bytearray(_WRONG_ARGUMENTS))
@@ -280,16 +276,6 @@ class _Entry:
         make = "PyLong_FromLongLong" if isinstance(kind, types.Integer) else "PyFloat_FromDouble"
         return self._call(make, _POINTER, value)
 
-    def _raise(self, status: Any) -> None:
-        """Set the exception `Raised`, with what numba pickled, and leave."""
-        builder = self.builder
-        described = builder.load(status.excinfoptr)
-        data, size = builder.extract_value(described, 0), builder.sext(builder.extract_value(described, 1), _WORD)
-        pickled = self._call("PyBytes_FromStringAndSize", _POINTER, data, size)
-        self._call("PyErr_SetObject", ir.VoidType(), self._own(_RAISED), pickled)
-        self._call("Py_DecRef", ir.VoidType(), pickled)
-        builder.branch(self.failed)
-
     def _own(self, place: int) -> Any:
         """Return an entry of the tuple ``self``."""
         return _field(self.builder, self.function.args[0], _ENTRIES + 8 * place, _POINTER)
@@ -311,7 +297,7 @@ def _linked(library: Any) -> Any:
     for other in dict.fromkeys(library._linking_libraries):
         library._final_module.link_in(other._get_module_for_linking(), preserve=True)
     for function in library._final_module.functions:
-        if _instructions(function) > _LONG and _OF_USERS not in function.name:
+        if _instructions(function) > _LONG:
             function.add_function_attribute("noinline")  # it stands in the machine code once
     library._optimize_final_module()
     return library._final_module
@@ -323,14 +309,14 @@ def _instructions(function: Any) -> int:
 
 
 #: Helpers of more instructions are called, not copied to where they are called: kernels run as fast, and are compiled in three
-#: quarters of the time (a limit of 150 saves a tenth). Names of users' functions have this in them (`rewriting.py`).
-_LONG, _OF_USERS = 30, "user_"
+#: quarters of the time (a limit of 150 saves a tenth).
+_LONG = 30
+#: Instructions whose loops are not unrolled: long ones with many short loops. It takes a third of the time to compile.
+_SMALL = ("interpret",)
 #: Arrays that Python gives have no owner that compiled code releases, so this is never called where no others are made.
 _NOTHING_TO_RELEASE = "define void @NRT_MemInfo_call_dtor(i8* %nothing) { ret void }"
-#: How names of functions begin that make arrays.
-_ALLOCATES = ("NRT_MemInfo_alloc", "NRT_Allocate", "NRT_MemInfo_new")
 #: Places in the tuple ``self``, see `contin.functions.machine_code.loaded`.
-_ARRAY, _NONE, _RAISED, _WRONG = range(4)
+_ARRAY, _NONE, _WRONG = range(3)
 #: What TypeError says.
 _WRONG_ARGUMENTS = b"an argument of a kernel is not of the type in its annotations\0"
 

@@ -407,61 +407,66 @@ def _value(work, at, k, minimum, lane):
 
 
 @helper
-def _iterate(memory, widths, lanes, work, lists, scratch, row):
-    """Find unknowns in all lanes by Newton's method with halved steps; nan where it does not arrive.
+def _begin(work, lists, row, lanes):
+    """Put the unknowns of all lanes where their search starts.
 
     ``lists`` has from ``row`` on: k, 1 for a minimum and 0 for a root, the first instruction of the program for value, gradient
-    and matrix, its end, the register described in `_direction` (behind the step: value before, slope, part of the step; these
-    are kept from one iteration to the next), and the registers of the starts.
+    and matrix, its end, the register described in `_direction` (behind the step: value before, slope, part of the step that is
+    tried: -1 at the start, 0 where the search has arrived), and the registers of the starts.
     """
-    k, minimum, begin, end, at = lists[row], lists[row + 1], lists[row + 2], lists[row + 3], lists[row + 4]
+    k, at = lists[row], lists[row + 4]
+    size = k * (k + 1) // 2 if lists[row + 1] else k * k
+    part = at + 4 * k + 3 + size
+    for lane in range(lanes):
+        work[part * LANES + lane] = -1.0
+        for i in range(k):
+            work[(at + i) * LANES + lane] = work[lists[row + 5 + i] * LANES + lane]
+
+
+@helper
+def _advance(work, lists, row, lanes, scratch):
+    """Judge the place that each lane has tried, and choose its next; return whether any search goes on.
+
+    A step of Newton's method is halved until it lowers the potential, or the residual, enough.
+    """
+    k, minimum, at = lists[row], lists[row + 1], lists[row + 4]
     size = k * (k + 1) // 2 if minimum else k * k
     before = at + 2 * k + 1 + size
     step = before + k
     value, slope, part = step + k, step + k + 1, step + k + 2
+    moving = False
     for lane in range(lanes):
-        work[part * LANES + lane] = 1.0  # 0 where it has arrived
-        for i in range(k):
-            work[(at + i) * LANES + lane] = work[lists[row + 5 + i] * LANES + lane]
-    interpret(memory, widths, lanes, begin, end)
-    for _ in range(NEWTON):
-        moving = False
-        for lane in range(lanes):
-            if work[part * LANES + lane] == 0.0:
-                continue
-            work[slope * LANES + lane] = _direction(work, at, k, minimum, lane, scratch)
-            work[value * LANES + lane] = _value(work, at, k, minimum, lane)
-            arrived = True
+        length = work[part * LANES + lane]
+        if length == 0.0:
+            continue
+        now, old = _value(work, at, k, minimum, lane), work[value * LANES + lane]
+        rounding = ROUNDING * (math.sqrt(1.0 + old * old) if minimum else abs(old))
+        if length > SHORTEST and not now <= old + 1e-4 * length * work[slope * LANES + lane] + rounding:
+            work[part * LANES + lane] = length / 2
             for i in range(k):
-                x, change = work[(at + i) * LANES + lane], scratch[i, k]
-                work[(before + i) * LANES + lane], work[(step + i) * LANES + lane] = x, change
-                work[(at + i) * LANES + lane] = x + change
-                arrived = arrived and change * change <= SETTLED * SETTLED * (SMALLEST + x * x)
-            work[part * LANES + lane] = 0.0 if arrived else 1.0
-            moving = moving or not arrived
-        if not moving:
-            return
-        for _ in range(HALVINGS):
-            interpret(memory, widths, lanes, begin, end)
-            again = False
-            for lane in range(lanes):
-                length = work[part * LANES + lane]
-                if length == 0.0:
-                    continue
-                old = work[value * LANES + lane]
-                allowed = old + 1e-4 * length * work[slope * LANES + lane] + ROUNDING * (abs(old) if not minimum else math.hypot(1.0, old))
-                if _value(work, at, k, minimum, lane) <= allowed:
-                    continue
-                again = True
-                work[part * LANES + lane] = length / 2
-                for i in range(k):
-                    change = work[(step + i) * LANES + lane] * length / 2
-                    work[(at + i) * LANES + lane] = work[(before + i) * LANES + lane] + change
-            if not again:
-                break
-        for lane in range(lanes):  # the next step begins from here
-            if work[part * LANES + lane] != 0.0:
-                work[part * LANES + lane] = 1.0
+                change = work[(step + i) * LANES + lane] * length / 2
+                work[(at + i) * LANES + lane] = work[(before + i) * LANES + lane] + change
+            moving = True
+            continue
+        work[slope * LANES + lane] = _direction(work, at, k, minimum, lane, scratch)
+        work[value * LANES + lane] = now
+        arrived = True
+        for i in range(k):
+            x, change = work[(at + i) * LANES + lane], scratch[i, k]
+            work[(before + i) * LANES + lane] = x
+            work[(step + i) * LANES + lane] = change
+            work[(at + i) * LANES + lane] = x + change
+            arrived = arrived and change * change <= SETTLED * SETTLED * (SMALLEST + x * x)
+        work[part * LANES + lane] = 0.0 if arrived else 1.0
+        moving = moving or not arrived
+    return moving
+
+
+@helper
+def _give_up(work, lists, row, lanes):
+    """Put nan where a search has not arrived."""
+    k, at = lists[row], lists[row + 4]
+    part = at + 4 * k + 3 + (k * (k + 1) // 2 if lists[row + 1] else k * k)
     for lane in range(lanes):
         if work[part * LANES + lane] != 0.0:
             for i in range(k):
@@ -506,7 +511,15 @@ def evaluate(
                 for lane in range(lanes):
                     work[code[now, 1] * LANES + lane] = _table(tables, code[now, 3], work[code[now, 2] * LANES + lane])
             else:
-                _iterate(memory, widths, lanes, work, lists, scratch, code[now, 2])
+                row, moving = code[now, 2], True
+                _begin(work, lists, row, lanes)
+                for _ in range(EVALUATIONS):
+                    interpret(memory, widths, lanes, lists[row + 2], lists[row + 3])
+                    moving = _advance(work, lists, row, lanes, scratch)
+                    if not moving:
+                        break
+                if moving:
+                    _give_up(work, lists, row, lanes)
             now += 1
 
 
@@ -514,10 +527,10 @@ def evaluate(
 POLYGAMMA, TABLE_OF = CODES["polygamma"], CODES["table"]
 #: Bernoulli numbers B_2, B_4, ...
 BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6)
-#: Newton steps for an unknown. Damped steps on a convex function arrive in 5 to 20.
-NEWTON = 60
-#: Halvings of a step that does not lower the potential or the residual. 40 make it 1e-12 of itself.
-HALVINGS = 40
+#: Places that a search for unknowns tries, halved steps included. Damped steps on a convex function arrive in 5 to 20.
+EVALUATIONS = 200
+#: A step is not halved below this part of itself.
+SHORTEST = 1e-12
 #: A step below this part of the unknown is the last: the next would be its square. Ten times larger, 1e-16 would be lost.
 SETTLED = 1e-9
 #: Square of the size below which an unknown counts as this large. Smaller unknowns are found to 1e-9 of this size squared.

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
 import importlib
 import importlib.util
 import os
@@ -30,7 +31,6 @@ import numpy as np
 
 from contin.functions import machine_code
 from contin.functions.cache import cache_directory
-from contin.functions.fingerprint import Fingerprint, contents
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -44,22 +44,18 @@ class Kernel:
         The Python function.
     reorder : bool
         As in `kernel`.
-    key : str, optional
-        A fingerprint of the function; by default that of the file it stands in.
     """
 
-    def __init__(self, function: Callable[..., Any], reorder: bool, key: str = "") -> None:
+    def __init__(self, function: Callable[..., Any], reorder: bool) -> None:
         functools.update_wrapper(self, function)
-        self.function, self.reorder, self._given = function, reorder, key
+        self.function, self.reorder = function, reorder
         self.name = f"{function.__module__}.{function.__qualname__}"
 
     @functools.cached_property
     def key(self) -> str:
         """The name of its machine code in the cache: a fingerprint of all that the code depends on."""
-        fingerprint = Fingerprint()
-        own = self._given or contents(Path(self.function.__code__.co_filename))
-        fingerprint.note(self.name, self.reorder, own, *_surroundings())
-        return fingerprint.text()[:32]
+        own = contents(Path(self.function.__code__.co_filename))
+        return hashlib.sha256(repr((self.name, self.reorder, own, *_surroundings())).encode()).hexdigest()[:32]
 
     def stored(self) -> Callable[..., Any] | None:
         """Return the function that runs the machine code in the cache; None where there is none that can be used."""
@@ -175,10 +171,20 @@ def prepare(modules: Sequence[str]) -> None:
 
 
 @functools.cache
+def contents(*files: Path) -> str:
+    """Return a fingerprint of what files hold."""
+    return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
+
+
+#: Files that decide what machine code is made of, besides the one in which a kernel stands and those of its helpers in `linalg`.
+_MADE_BY = ("compiler", "kernel", "kernel_parts", "machine_code", "primitives", "program")
+
+
+@functools.cache
 def _surroundings() -> tuple[str, ...]:
     """Return what all machine code depends on: the engine's files that kernels and compiler consist of, and the machine."""
     here = Path(__file__).parent
-    files = sorted([*here.glob("*.py"), *(here.parent / "linalg").glob("*.py")])
+    files = [here / f"{name}.py" for name in _MADE_BY] + sorted((here.parent / "linalg").glob("*.py"))
     numba = importlib.util.find_spec("numba")  # its version stands in a file; to ask for it would take 20 ms
     release = contents(Path(str(numba.origin)).with_name("_version.py")) if numba is not None else ""
     return contents(*files), sys.version, release, llvmlite.__version__, np.__version__, *machine_code.machine()

@@ -14,7 +14,6 @@ import ctypes
 import functools
 import hashlib
 import json
-import pickle
 import sys
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -41,19 +40,6 @@ class Code(NamedTuple):
     entry: str
     foreign: tuple[str, ...]
     object: bytes
-
-
-class Raised(Exception):
-    """An exception of the compiled function, as the compiler pickled it."""
-
-    def exception(self) -> BaseException:
-        """Return the exception."""
-        try:
-            kind, arguments = pickle.loads(self.args[0])[:2]
-            found: BaseException = kind(*(arguments or ()))
-        except Exception:  # of a kind that only the compiler can read
-            return RuntimeError("a compiled function raised an exception that cannot be read")
-        return found
 
 
 def machine() -> tuple[str, str, str]:
@@ -142,11 +128,6 @@ def loaded(code: Code, name: str, doc: str | None) -> Callable[..., Any]:
     """
     engine = _engine()
     missing = [symbol for symbol in code.foreign if llvm.address_of_symbol(symbol) is None]
-    if missing:  # those of numba's library
-        from numba.core.registry import cpu_target  # takes .3 s; only code that makes arrays of its own needs it
-
-        cpu_target.target_context.refresh()
-        missing = [symbol for symbol in missing if llvm.address_of_symbol(symbol) is None]
     if missing:
         raise ContinError(f"{name}: the function {missing[0]}, which its machine code calls, is not there")
     engine.add_object_file(llvm.object_file.ObjectFileRef.from_data(code.object))
@@ -156,7 +137,7 @@ def loaded(code: Code, name: str, doc: str | None) -> Callable[..., Any]:
     _KEPT.append(method)
     make = ctypes.pythonapi.PyCFunction_NewEx
     make.restype, make.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
-    function: Callable[..., Any] = make(ctypes.addressof(method), (np.ndarray, None, Raised, TypeError), module)
+    function: Callable[..., Any] = make(ctypes.addressof(method), (np.ndarray, None, TypeError), module)
     return function
 
 

@@ -60,7 +60,7 @@ def recorded(*values: Any) -> Number | None:
 def elementwise(function: Callable[..., Any], *inputs: Any) -> Any:
     """Return a function of numbers applied to arrays, broadcast; a number for numbers."""
     if not any(isinstance(value, (np.ndarray, list, tuple)) for value in inputs):
-        return function(*inputs)
+        return function(*(value.item() if isinstance(value, np.generic) else value for value in inputs))
     arrays = np.broadcast_arrays(*(_plain(value) for value in inputs))
     result = np.empty(arrays[0].shape, dtype=object)
     flat = [array.ravel() for array in arrays]

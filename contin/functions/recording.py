@@ -198,7 +198,7 @@ def _called(function: Any, fills: bool, size: int, signature: Signature, time: A
         arguments.append(numbers(group) if fills else named_values(tuple(names))(*group))
     if not fills:
         result = function(*arguments)
-        return _plain(result).tolist() if isinstance(result, np.ndarray) else result
+        return (_plain(result).ravel().tolist() if result.ndim else result.item()) if isinstance(result, np.ndarray) else result
     filled = numbers([0.0] * size)
     function(*arguments, filled)
     return filled.tolist()

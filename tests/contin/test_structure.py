@@ -76,7 +76,7 @@ def test_jacobian_of_a_problem_in_groups_against_differences():
     """Solves with the factored matrix undo central differences of the residual (error of these about 1e-9)."""
     stated = problem()
     assert [len(group) for group in coupled_groups(stated.batch("field").depends[:5, :5])] == [3, 1, 1]
-    assert len(stated.batch("field").colouring([0]).owner) < 6  # inputs are perturbed together
+    assert len(stated.batch("field").columns([0]).owner) < 6  # inputs are perturbed together
     random = np.random.default_rng(1)
     system = contin.Collocation(stated, np.array([0, 0.2, 0.5, 1.0]), 4, ["target", "load", "mean"], {})
     x, direction, row = random.standard_normal((3, system.size))

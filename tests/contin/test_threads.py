@@ -170,7 +170,7 @@ def values(batch, u, none, p):
 
 
 def jacobian(batch, u, none, p):
-    return np.concatenate([array.ravel() for array in batch.jacobian(u[:, 0], u, none, p, batch.colouring([0]))])
+    return np.concatenate([array.ravel() for array in batch.jacobian(u[:, 0], u, none, p, batch.columns([0]))])
 
 
 # --- how threads end ---------------------------------------------------------------------------------------------------

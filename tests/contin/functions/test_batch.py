@@ -39,7 +39,7 @@ def test_values_and_jacobian_are_exact_to_round_off():
     batch = Batch([every_function], [3], ("a", "b"), ("k", "unused"))
     u, p, t = np.array([[0.7, 1.3]]), np.array([0.4, 9.0]), np.array([0.25])
     none = np.empty((0, 2))
-    values, jacobian = batch.jacobian(t, u, none, p, batch.colouring([1, 0]))
+    values, jacobian = batch.jacobian(t, u, none, p, batch.columns([1, 0]))
     assert np.array_equal(jacobian[0, :, 2], np.zeros(3))  # nothing depends on the unused parameter
     with mpmath.workdps(40):
         at = [mpmath.mpf(value) for value in (t[0], *u[0], p[0])]
@@ -63,12 +63,12 @@ def test_functions_of_both_ends_and_filled_arrays():
 
     batch = Batch([ends], [2], ("x", "y"), ("k",), ends=True)
     _, jacobian = batch.jacobian(
-        np.zeros(1), np.array([[1.0, 2.0]]), np.array([[3.0, 4.0]]), np.array([5.0]), batch.colouring([0])
+        np.zeros(1), np.array([[1.0, 2.0]]), np.array([[3.0, 4.0]]), np.array([5.0]), batch.columns([0])
     )
     assert np.allclose(jacobian[0], [[1, 0, 0, -5, -4], [0, 0, 6, 0, 0]])
     batch = Batch([filled], [3], ("a", "b", "c"), ("k",))
     u, p = np.array([[1.0, 2.0, 3.0]]), np.array([2.0])
-    values, jacobian = batch.jacobian(np.zeros(1), u, np.empty((0, 3)), p, batch.colouring([0]))
+    values, jacobian = batch.jacobian(np.zeros(1), u, np.empty((0, 3)), p, batch.columns([0]))
     assert np.allclose(values, [[2, 8, 18]])
     assert np.allclose(jacobian[0], [[4, 0, 0, 1], [0, 8, 0, 4], [0, 0, 12, 9]])
 
@@ -81,7 +81,7 @@ def test_powers_of_negative_numbers_and_comparisons():
         return x**3, x**2, x**-2, x**5, x**p.whole, (x * x if x > 0 else -3 * x), (1 - x) ** 0.5, x**0
 
     batch = Batch([powers], [8], ("x",), ("whole",))
-    values, jacobian = batch.jacobian(np.zeros(1), np.array([[-1.5]]), np.empty((0, 1)), np.array([3.0]), batch.colouring([]))
+    values, jacobian = batch.jacobian(np.zeros(1), np.array([[-1.5]]), np.empty((0, 1)), np.array([3.0]), batch.columns([]))
     x = -1.5
     assert np.allclose(values[0], [x**3, x**2, x**-2, x**5, x**3, -3 * x, (1 - x) ** 0.5, 1], rtol=1e-15)
     expected = [3 * x**2, 2 * x, -2 * x**-3, 5 * x**4, 3 * x**2, -3, -0.5 * (1 - x) ** -0.5, 0]
@@ -111,7 +111,7 @@ def test_what_numba_itself_does_not_expect_is_a_sentence():
 
     batch = Batch([rhs], [2], ["a", "b"], ["k"])
     with pytest.warns(InterpretedWarning, match="'rhs' cannot be compiled.*0.0, not 0"):
-        jacobian = batch.jacobian(np.zeros(1), np.zeros((1, 2)), np.empty((0, 2)), np.zeros(1), batch.colouring([]))[1]
+        jacobian = batch.jacobian(np.zeros(1), np.zeros((1, 2)), np.empty((0, 2)), np.zeros(1), batch.columns([]))[1]
     assert jacobian.tolist() == [[[0.0, 2.0], [1.0, 0.0]]]
 
 
@@ -144,7 +144,7 @@ def test_parameters_that_are_not_read():
     assert first._evaluate is second._evaluate
     place = np.zeros(1), np.array([[2.0]]), np.empty((0, 1))
     for batch, p in ((first, [3.0, 5.0, 7.0]), (second, [5.0, 7.0, 3.0])):
-        values, jacobian = batch.jacobian(*place, np.array(p), batch.colouring([0, 1, 2]))
+        values, jacobian = batch.jacobian(*place, np.array(p), batch.columns([0, 1, 2]))
         assert values[0, 0] == batch.values(*place, np.array(p))[0, 0] == 13.0
         by_name = dict(zip(["x", *(["a", "b", "c"] if batch is first else ["d", "c", "a"])], jacobian[0, 0]))
         assert by_name == {"x": 3.0, "a": 2.0, "c": 1.0, ("b" if batch is first else "d"): 0.0}
@@ -154,4 +154,4 @@ def test_a_batch_without_derivatives():
     batch = Batch([lambda t, u, p: u.x**2], [0], ["x"], [], derivatives=False)
     assert batch.values(np.zeros(1), np.array([[3.0]]), np.empty((0, 1)), np.empty(0))[0, 0] == 9.0
     with pytest.raises(ProblemError, match="without them"):
-        batch.colouring([])
+        batch.columns([])

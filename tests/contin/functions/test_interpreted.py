@@ -100,7 +100,7 @@ def test_functions_for_real_numbers_are_not_taken_with_complex_ones():
 
     batch = Batch([odd], [1], ["x"], ["a"], times=False)
     for x in (0.0, 1.0, -2.0):
-        jacobian = batch.jacobian(np.zeros(1), np.array([[x]]), np.empty((0, 1)), np.zeros(1), batch.colouring([]))[1]
+        jacobian = batch.jacobian(np.zeros(1), np.array([[x]]), np.empty((0, 1)), np.zeros(1), batch.columns([]))[1]
         assert abs(jacobian[0, 0, 0] - 2 * abs(x)) < 1e-7  # at 0 it has no third derivative
 
 
@@ -125,7 +125,7 @@ def test_functions_of_real_numbers_compile():
     none, p = np.empty((0, 1)), np.zeros(1)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        values, jacobian = batch.jacobian(np.zeros(1), np.array([[x]]), none, p, batch.colouring([]))
+        values, jacobian = batch.jacobian(np.zeros(1), np.array([[x]]), none, p, batch.columns([]))
     slope, psi = 2 / math.sqrt(math.pi) * math.exp(-x * x), special.digamma
     expected = [
         1, 0, x / math.hypot(x, 2), slope, -slope, special.gamma(x) * psi(x), psi(x), 1, 3, math.sqrt(2),

@@ -66,7 +66,7 @@ def test_it_is_compiled_with_exact_derivatives(case):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         given = np.zeros(1), np.array([[3.0]]), np.empty((0, 1)), np.array([2.0])
-        values, jacobian = batch.jacobian(*given, batch.colouring([0]))
+        values, jacobian = batch.jacobian(*given, batch.columns([0]))
     assert values[0, 0] == 10 and jacobian[0, 0].tolist() == [4, -1]
 
 
@@ -92,7 +92,7 @@ def test_complex_numbers_of_the_user_are_no_complex_step():
 
     batch = Batch([function], [2], ["x", "y"], [], times=False)
     given = np.zeros(1), np.array([[3.0, 2.0]]), np.empty((0, 2)), np.empty(0)
-    values, jacobian = batch.jacobian(*given, batch.colouring([]))
+    values, jacobian = batch.jacobian(*given, batch.columns([]))
     assert np.allclose(values, [[3, 5]], rtol=1e-14)
     assert np.allclose(jacobian[0], [[1, 0], [6, -4]], rtol=0, atol=1e-9)
     assert batch.depends.all()
@@ -102,7 +102,7 @@ def test_complex_numbers_of_the_user_are_no_complex_step():
 def test_a_sparse_matrix_has_its_pattern():
     """The second difference of four values: derivatives are the matrix, found with three evaluations."""
     batch = Batch([lambda u, p: MATRIX @ u + 0 * u**2], [4], list("abcd"), [], times=False)
-    colours = batch.colouring([])
+    colours = batch.columns([])
     given = np.zeros(1), np.arange(4.0)[None], np.empty((0, 4)), np.empty(0)
     entries = batch.entries(*given, colours)[1]
     found = scipy.sparse.coo_array((entries, colours.entries[:2]), shape=(4, 4))
