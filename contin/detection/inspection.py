@@ -142,7 +142,7 @@ class Inspection:
         found = [point for point in found if not self._at_the_start(point)]
         closed = self._closed()
         if closed is not None:
-            found.append(closed)
+            found.insert(0, closed)  # the first point once more, which was labelled already
         return _in_order(found)
 
     def _at_the_start(self, point: SpecialPoint) -> bool:
@@ -355,7 +355,10 @@ class Inspection:
 
 
 def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
-    """Return special points in order of their places; of those at one place branch points and folds first, others as given."""
+    """Return special points in order of their places; of those at one place the ones without a test function and folds first.
+
+    Others stay as given.
+    """
     ranked = sorted(points, key=lambda point: point.test is not None and point.test.label != "LP")
     rank = {id(point): number for number, point in enumerate(ranked)}
     along = sorted(ranked, key=lambda point: point.at)
