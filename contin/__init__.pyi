@@ -46,7 +46,7 @@ __all__ = [
     "Collocation", "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram",
     "MapProblem", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "Pointwise", "ProblemError", "Segment",
     "SegmentedProblem", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem",
-    "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "eigenbasis", "exact_text", "follow", "from_auto", "gradient",
-    "homoclinic", "interpolation", "load", "locate_branch_point", "point_of", "read_auto", "read_columns", "save",
+    "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "eigenbasis", "exact_text", "follow", "from_auto",
+    "gradient", "homoclinic", "interpolation", "load", "locate_branch_point", "point_of", "read_auto", "read_columns", "save",
     "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

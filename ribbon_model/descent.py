@@ -204,8 +204,8 @@ def _positive(matrix) -> bool:
 def modes(strip: Strip, number: int = 8) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest eigenvalues of the Hessian of the energy on the closed strips, over the mean squared change of strain.
 
-    A negative one is a direction in which an equilibrium is unstable; a shift of phase has one near zero. The signs of the vectors,
-    and the bases of equal eigenvalues (modes of a circle come in pairs), are those of `contin.eigenbasis`.
+    A negative one is a direction in which an equilibrium is unstable; a shift of phase has one near zero. The signs of the
+    vectors, and the bases of equal eigenvalues (modes of a circle come in pairs), are those of `contin.eigenbasis`.
 
     Returns
     -------

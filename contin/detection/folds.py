@@ -75,7 +75,8 @@ class FoldSearch:
 
         The parameter goes one way before a fold and the other way behind it. Where its rate is so small that it may be
         round-off, and the parameter itself does not differ from one fold to the next, or to both ends of the step, there is
-        none. A fold where it does not differ from a first point on which branches cross is that point. For rates that may be errors of the mesh see `contin.detection.significance`.
+        none. A fold where it does not differ from a first point on which branches cross is that point. For rates that may be
+        errors of the mesh see `contin.detection.significance`.
         """
         segment = self.segment
         left, right = (segment.low, segment.before), (segment.step, segment.trial)

@@ -31,8 +31,8 @@ from contin.stepping.trial import Linearization, TestFunction, Trial
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
 #: labelled already.
 _AT_START = 1e-6
-#: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times larger,
-#: points that are distinct in the digits shown could change places.
+#: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
+#: larger, points that are distinct in the digits shown could change places.
 _AT_ONCE = 1e-8
 #: This close to a branch point tangents are round-off: the square root of it, times ten.
 _BLURRED = 1e-7

@@ -72,9 +72,9 @@ class SecondVariation:
         return int(np.count_nonzero(values < 0))
 
     def modes(self, count: int, t: Array) -> Array:
-        """Return a basis of the modes of the eigenvalues nearest to zero: dx at t (K,), shape (count, K, n), the largest number 1.
+        """Return a basis of the modes of the eigenvalues nearest to zero: dx at t (K,), shape (count, K, n).
 
-        The basis and its signs follow from the space (`contin.linalg.orientation.canonical_basis`).
+        The largest number of each is 1. Basis and signs follow from the space (`contin.linalg.orientation.canonical_basis`).
         """
         order = np.argsort(np.abs(self.eigenvalues))[:count]
         modes = np.array([self._profile.at(self._vectors[:, j], np.asarray(t, dtype=float)) for j in order])

@@ -27,8 +27,8 @@ _CLEAR = 1e-6
 STANDS = 1e-13
 #: Rates below this are round-off of tangents; it is 1e-16 to 1e-15 in the canard explosions of the tests.
 _ROUND_OFF = 1e-14
-#: Distance from a first point at which the sign of a small rate is looked at: a located fold is known to 1e-9 to 1e-6, and at ten
-#: times this distance another fold could lie between.
+#: Distance from a first point at which the sign of a small rate is looked at: located folds are known to 1e-9 to 1e-6. Ten
+#: times larger, another fold could lie between.
 _BESIDE = 1e-4
 #: A rate is significant where that on the finer mesh differs by less than this part of it.
 _AGREES = 0.5

@@ -66,8 +66,8 @@ def oriented_along(vector: Array, cosine: float) -> Array:
 def canonical_basis(vectors: Array, weights: Array | float = 1.0) -> Array:
     """Return the orthonormal basis of the space that rows span that does not depend on these rows.
 
-    It consists of the projections of unit vectors onto the space, each made orthogonal to those before it: first the one with the
-    largest projection (`pivot`), then the one of which most is left, and so on.
+    It consists of the projections of unit vectors onto the space, each made orthogonal to those before it: first the one with
+    the largest projection (`pivot`), then the one of which most is left, and so on.
 
     Parameters
     ----------

@@ -25,8 +25,8 @@ SIZES = {"x": 1.0, "y": 1.0}
 
 def rotated(seed):
     """Coordinates X = (x + y) / sqrt(2), Y = (x - y) / sqrt(2), and x, y of equations, with random units in the last place."""
-    c = np.sqrt(0.5) * (1 + EPS * np.random.default_rng(seed).integers(-3, 4, 8)) if seed is not None else np.full(8, np.sqrt(0.5))
-    return tuple(map(float, c))
+    units = np.zeros(8) if seed is None else np.random.default_rng(seed).integers(-3, 4, 8)
+    return tuple(map(float, np.sqrt(0.5) * (1 + EPS * units)))
 
 
 def arms_of(seed, both):
@@ -160,7 +160,8 @@ pitchfork = lorenz.origin().labelled("BP")[0]
 arms = [lorenz.trace(pitchfork, branch=1, direction=way, limits={"rho": (-1, 30)}) for way in (1, -1)]
 sizes = lorenz.units.factors
 found["lorenz"] = [
-    [[point.label, *(short(point[name] / sizes[name]) for name in ("rho", "X"))] for point in arm if point.label] for arm in arms
+    [[point.label, *(short(point[name] / sizes[name]) for name in ("rho", "X"))] for point in arm if point.label]
+    for arm in arms
 ]
 cusp = AlgebraicProblem(lambda u, p: (p.b + p.a * u.x - u.x**3,), ["x"], {"a": -1.0, "b": 0.0}, {"X": lambda u, p: u.x})
 parts = contin.diagram(contin.solve(cusp, [0.0]), free=["a"], depth=1, limits={"a": (-1, 1)})
@@ -182,7 +183,7 @@ def on_kernel(name):
 
 
 def test_two_kernels():
-    """A pitchfork diagram with functions (buckling of a hinged rod in its second mode), Lorenz's arms, a curve through a cusp."""
+    """A pitchfork diagram with functions (buckling of a rod in its second mode), Lorenz's arms, a curve through a cusp."""
     flags = pathlib.Path("/proc/cpuinfo")
     if not (flags.exists() and " avx512f" in flags.read_text()):
         pytest.skip("the processor has no AVX-512: OpenBLAS's kernel SkylakeX does not run")
