@@ -137,7 +137,7 @@ def ordered(vectors: Sequence[Array], cosines: Sequence[float]) -> list[int]:
     return sorted(range(len(vectors)), key=functools.cmp_to_key(compare))
 
 
-def first_least(values: Sequence[float]) -> int:
+def first_least(values: Sequence[float] | Array) -> int:
     """Return the lowest index of a value equal to the smallest of some positive ones, but for round-off.
 
     Examples

@@ -75,6 +75,16 @@ def test_direction_at_a_fold(unit):
     assert branch.points[-1].x[0] > 0 and branch.points[0].x[0] == pytest.approx(-1.0)
 
 
+def test_from_a_branch_point_without_a_branch():
+    """The matrix is singular there: the run takes the branch on which the point was found, to larger parameters."""
+    problem = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2) / 3, -u.y / 7), ["x", "y"], {"a": -1.0})
+    branch = contin.trace(contin.solve(problem, [0.0, 0.0]), free=["a"], direction=-1, limits={"a": (-2, 2)}, scales=SIZES)
+    back = contin.trace(branch.points[-1], limits={"a": (-2, 2)})
+    for direction in (1, -1):
+        ahead = contin.trace(back.labelled("BP")[0], limits={"a": (-2, 2)}, direction=direction)
+        assert ahead.points[-1]["a"] == pytest.approx(2 * direction) and abs(ahead.points[-1].x[0]) < 1e-9
+
+
 def test_solutions_away_from_a_symmetric_guess():
     """Known solutions -1 and 1 are equally far from the guess 0: the search starts from the one given first."""
     problem = AlgebraicProblem(lambda u, p: (u.x - u.x**3 + 0.001 * u.x**5,), ["x"], {"a": 0.0})
