@@ -19,8 +19,9 @@ from contin.arrays import Array
 #: Part of the largest component from which another one counts as equal. On a mesh of ten intervals the humps of sin(8 pi t), of
 #: equal height, differ by 5 % at the nodes. 0.9, 0.87 and 0.71 are ratios of symmetric problems: it must be none of them.
 _EQUAL = 0.89
-#: Cosine below which two directions count as orthogonal: those of the arms of symmetric pitchforks are 1e-13 to 1e-8. Ten times
-#: larger, arms of imperfect symmetry are oriented by their components, not by the branch that they leave.
+#: Cosine below which two directions count as orthogonal. Of the branch points of eight problems of the bank, along the last
+#: step: 1e-15 to 1e-14 where a symmetry makes them so, 1e-7 to 1e-5 from errors of steps, 4e-4 and more elsewhere. Ten times
+#: larger, the latter are oriented by their components, not by the branch that they leave.
 _ORTHOGONAL = 1e-4
 #: Relative difference below which two distances are equal, or two eigenvalues, relative to the largest: those of mirror images
 #: differ by 1e-15 to 1e-9.
