@@ -80,7 +80,7 @@ class Segment:
         self.state, self.trial, self.step, self.newton = state, trial, step, newton
         self.low, self.before = before
         self._last: Place | None = None
-        #: Factors that the step left. Searches may take the trial's anew; a resumed run, without factors of its first point from
+        #: Factors that the step left. Searches may take new ones; a resumed run, without factors of its first point from
         #: Newton's method, does so in other steps.
         self._factors = trial.factors if trial.is_linearized else None
 
