@@ -20,6 +20,7 @@ from .functions.batch import Batch
 from .functions.cache import cache_directory
 from .functions.gradient import gradient
 from .functions.iteration import minimum, root
+from .linalg.orientation import eigenbasis
 from .names import exact_text
 from .problems.algebraic import AlgebraicProblem
 from .problems.boundary_value import BoundaryValueProblem
@@ -45,7 +46,8 @@ __all__ = [
     "Collocation", "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram",
     "MapProblem", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "ProblemError", "Segment",
     "SegmentedProblem", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem",
-    "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "exact_text", "follow", "from_auto", "gradient",
-    "homoclinic", "interpolation", "load", "locate_branch_point", "minimum", "point_of", "read_auto", "read_columns", "root", "save",
+    "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "eigenbasis", "exact_text", "follow", "from_auto",
+    "gradient", "homoclinic", "interpolation", "load", "locate_branch_point", "minimum", "point_of", "read_auto", "read_columns",
+    "root", "save",
     "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

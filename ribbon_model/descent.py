@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
-from contin import correct
+from contin import correct, eigenbasis
 from ribbon_model import exact, second_variation
 from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH
@@ -38,6 +38,7 @@ GYRATION = 0.05
 
 _FASTEST = 1e8  # largest time step: Newton's method
 _ROUND_OFF = 1e-14  # of the energy
+_PAIRED = 2  # further modes computed: the last one asked for may be one of a pair, or of three
 _PLANAR = 1e-6  # difference of strains from those of a circle
 _SAME = 1e-6  # of energy and kappa*: the same equilibrium
 _COVERINGS = range(1, 10, 2)  # of the primary branches on which an equilibrium is searched
@@ -203,7 +204,8 @@ def _positive(matrix) -> bool:
 def modes(strip: Strip, number: int = 8) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest eigenvalues of the Hessian of the energy on the closed strips, over the mean squared change of strain.
 
-    A negative one is a direction in which an equilibrium is unstable; a shift of phase has one near zero.
+    A negative one is a direction in which an equilibrium is unstable; a shift of phase has one near zero. The signs of the
+    vectors, and the bases of equal eigenvalues (modes of a circle come in pairs), are those of `contin.eigenbasis`.
 
     Returns
     -------
@@ -211,8 +213,10 @@ def modes(strip: Strip, number: int = 8) -> tuple[np.ndarray, np.ndarray]:
     vectors : ndarray, shape (n, number)
         With root mean square 1 over the segments.
     """
-    values, vectors = eigh(_Tangent(strip).hessian, subset_by_index=(0, number - 1))
-    return values, vectors * math.sqrt(len(strip.strains))
+    hessian = _Tangent(strip).hessian
+    last = min(number + _PAIRED, len(hessian)) - 1
+    values, vectors = eigh(hessian, subset_by_index=(0, last))
+    return values[:number], eigenbasis(values, vectors.T)[:number].T * math.sqrt(len(strip.strains))
 
 
 def perturbed(strip: Strip, amplitude: float) -> Strip:

@@ -15,6 +15,7 @@ from contin.discretization.connections import ConnectionCollocation
 from contin.discretization.cycles import CycleCollocation
 from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
+from contin.linalg.orientation import first_least
 from contin.problems.connection import TIME, ConnectionProblem
 from contin.problems.cycle import PERIOD
 from contin.results.point import Point
@@ -66,7 +67,7 @@ def homoclinic(cycle: Point, free: Sequence[str], *, mesh: MeshControl | None = 
     parameters = {name: value for name, value in cycle.parameters.items() if name != PERIOD}
     problem = ConnectionProblem(system.problem.field, names, parameters, unstable=unstable)
     degree = system.degree
-    cut = int(np.abs(states[::degree] - rest).max(axis=1)[:-1].argmin())  # at a mesh point
+    cut = first_least(np.abs(states[::degree] - rest).max(axis=1)[:-1])  # at a mesh point
     mesh_points = np.concatenate([system.mesh[cut:], 1 + system.mesh[1 : cut + 1]]) - system.mesh[cut]
     mesh_points[-1] = 1.0
     turned = np.concatenate([states[cut * degree :], states[1 : cut * degree + 1]])

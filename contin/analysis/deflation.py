@@ -13,6 +13,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
+from contin.linalg.orientation import first_least
 from contin.results.point import Point
 from contin.stepping.newton import Corrected, Newton, correct
 
@@ -39,7 +40,7 @@ def correct_away(system: Discretization, x: Array, others: Sequence[Point], newt
     """
     known = [point.system.carrier(system)(point.x)[: system.state_size] for point in others]
     known = [np.append(states, x[system.state_size :]) for states in known]
-    nearest = min(known, key=lambda root: inner(system, x - root, x - root))
+    nearest = known[first_least([inner(system, x - root, x - root) for root in known])]
     away = x - nearest
     if np.max(np.abs(away)) < _SAME:  # the known solution itself for a guess
         away = np.where(np.arange(x.size) < system.state_size, _ASIDE * (1 + np.abs(x)), 0.0)

@@ -27,7 +27,7 @@ from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint, with_details
-from contin.detection.significance import STANDS, free_values, sense
+from contin.detection.significance import STANDS, free_values, growing, sense
 from contin.detection.test_functions import (
     fold,
     limits,
@@ -203,8 +203,7 @@ class Continuation:
         if rescaled is not system:
             x, row = self._first_correction(rescaled, z)
             system, linear = rescaled, linearization(rescaled, x, row)
-        unit = linear.tangent
-        unit *= settings.direction * (np.sign(unit[system.parameter_index(self.primary)]) or 1.0)
+        unit = settings.direction * growing(system, x, linear.tangent, self.primary, settings.newton)
         state = standing_at(system, x, unit, settings.step)
         return dataclasses.replace(state, sign=system.linearize(x, (state.row,))[1].sign)
 

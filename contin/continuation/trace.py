@@ -13,6 +13,7 @@ from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.system import System
 from contin.errors import ProblemError
+from contin.linalg.orientation import oriented_along
 from contin.problems.statement import forget_changed
 from contin.results.branch import Branch
 from contin.results.point import Point, underlying
@@ -36,7 +37,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         two parameters they lead to the branch of solutions through it.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
-        the opposite way.
+        the opposite way. By default the one that it was found on, with ``direction`` that of the primary parameter.
     progress : bool, optional
         Show one line on standard error while the run is under way, and clear it at the end: by default where standard error is
         a terminal.
@@ -64,7 +65,12 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
     if branch is None:
-        return follow_until_interrupted(Continuation(system, x, settings), shown)
+        tangents = start.details.tangents if isinstance(start.details, (BranchPoint, MultiplePoint)) else ()
+        own = None
+        if tangents and system is start.system:  # the equations tell no tangent there
+            rate = tangents[0][system.parameter_index(settings.primary or system.free[0])]
+            own = settings.direction * oriented_along(tangents[0], rate)
+        return follow_until_interrupted(Continuation(system, x, settings, own), shown)
     checks.whole("branch", branch, 0, 10)
     if branch == 1 and switches(start):
         cycles, x, tangent = switched(start)

@@ -18,6 +18,7 @@ from contin.arrays import Array
 from contin.detection.bordered import BorderedMatrix
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
+from contin.linalg.orientation import ordered, oriented, oriented_along
 from contin.stepping.newton import Newton
 
 #: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear.
@@ -46,7 +47,7 @@ class BranchPoint:
     ----------
     x : ndarray, shape (size,)
     tangents : tuple of ndarray
-        Unit tangents of the two branches; empty where none is real (an isolated point).
+        Unit tangents of the two branches, `contin.linalg.orientation.oriented`; empty where none is real (an isolated point).
     kernel : ndarray, shape (2, size)
         Orthonormal basis of the kernel of F_x.
     left : ndarray, shape (equations,)
@@ -81,6 +82,8 @@ class BranchPoint:
     def along(self, system: Discretization, direction: Array) -> BranchPoint:
         """Return the same branch point with its tangents in order: first the one nearest to ``direction``, with its sense.
 
+        A tangent orthogonal to it, as of a symmetric pitchfork's arms, is oriented by its largest component.
+
         Examples
         --------
         >>> from contin import Algebraic, AlgebraicProblem
@@ -91,8 +94,8 @@ class BranchPoint:
         [-0.707107, -0.707107]
         """
         cosines = [inner(system, tangent, direction) for tangent in self.tangents]
-        order = sorted(range(len(cosines)), key=lambda i: -abs(cosines[i]))
-        tangents = [self.tangents[i] * (np.sign(cosines[i]) or 1.0) for i in order]
+        order = ordered(self.tangents, cosines)
+        tangents = [oriented_along(self.tangents[i], cosines[i]) for i in order]
         return dataclasses.replace(self, tangents=tuple(tangents))
 
 
@@ -197,7 +200,8 @@ class _Search:
             matrix = BorderedMatrix(system, self.x, *self._borders)
             hessian = matrix.hessian(self.x)
         tangents = [a @ matrix.kernel for a in _null_directions(hessian)]
-        tangents = [tangent / np.sqrt(inner(system, tangent, tangent)) for tangent in tangents]
+        tangents = [oriented(tangent / np.sqrt(inner(system, tangent, tangent))) for tangent in tangents]
+        tangents = [tangents[i] for i in ordered(tangents, [0.0] * len(tangents))]
         kernel = _orthonormal(system, matrix.kernel)
         change = np.array([[inner(system, new, old) for old in matrix.kernel] for new in kernel])
         gram = np.array([[inner(system, a, b) for b in matrix.kernel] for a in matrix.kernel])

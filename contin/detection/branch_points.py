@@ -18,6 +18,7 @@ from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
 from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
+from contin.linalg.orientation import canonical_basis
 from contin.linalg.singular import smallest_directions
 from contin.stepping.trial import Trial, sign_changed
 
@@ -112,6 +113,7 @@ class BranchPointSearch:
                     trial = Trial.without_tangent(state.system, found.x)
                     return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
         kernel = smallest_directions(segment.trial.factors, state.system.size, count + 1)[0][:count]
+        kernel = canonical_basis(kernel, state.system.weights)
         return SpecialPoint(step, "BP", "possible", segment.trial, details=MultiplePoint(count, kernel))
 
     def _apart(self, middle: float) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.discretization.cycles import CycleCollocation
 from contin.errors import ConvergenceError
+from contin.linalg.orientation import first_least
 from contin.problems.cycle import PERIOD
 from contin.stepping.newton import correct
 from contin.stepping.trial import TestFunction, Trial, linearization
@@ -98,7 +99,7 @@ def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, Compl
     """
     points = system.at_gauss_points(x)
     size = np.ptp(points, axis=0)
-    states = points[_speeds(system, x).argmin()].copy()
+    states = points[first_least(_speeds(system, x))].copy()
     for _ in range(_UPDATES):
         try:
             update = np.linalg.solve(system.rates_by_states(x, states[None])[0], system.rates(x, states[None])[0])

@@ -25,6 +25,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.detection.segment import SpecialPoint
 from contin.discretization.connections import ConnectionCollocation
+from contin.linalg.orientation import oriented
 from contin.stepping.trial import TestFunction, Trial
 
 #: A null vector's part at an end below this part of its length is round-off: the orbit is long.
@@ -90,7 +91,7 @@ def _leading_vectors(system: ConnectionCollocation, x: Array, side: int) -> tupl
     """Return the eigenvectors, right and left, of a real leading eigenvalue, with the signs of the reference."""
     _, *there = _eigenvalues(system, system.reference, side)
     _, *here = _eigenvalues(system, x, side)
-    signs = [np.sign((vector.conj() @ known).real) for vector, known in zip(here, there)]
+    signs = [np.sign((vector.conj() @ oriented(known)).real) for vector, known in zip(here, there)]
     right, left = (sign * vector.real / np.linalg.norm(vector.real) for sign, vector in zip(signs, here))
     return right, left
 

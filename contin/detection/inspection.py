@@ -31,6 +31,9 @@ from contin.stepping.trial import Linearization, TestFunction, Trial
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
 #: labelled already.
 _AT_START = 1e-6
+#: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
+#: larger, points that are distinct in the digits shown could change places.
+_AT_ONCE = 1e-8
 #: This close to a branch point tangents are round-off: the square root of it, times ten.
 _BLURRED = 1e-7
 #: A test function is zero at the first point of a run where it is smaller by this factor than at the next: a corrected point
@@ -139,8 +142,8 @@ class Inspection:
         found = [point for point in found if not self._at_the_start(point)]
         closed = self._closed()
         if closed is not None:
-            found.append(closed)
-        return sorted(found, key=lambda point: (point.at, point.test is not None and point.test.label != "LP"))
+            found.insert(0, closed)  # the first point once more, which was labelled already
+        return _in_order(found)
 
     def _at_the_start(self, point: SpecialPoint) -> bool:
         """Return whether a special point is the first point of the run once more."""
@@ -349,3 +352,20 @@ class Inspection:
         if abs(rate) < _STATIONARY or abs(change) < _STANDS * (1 + abs(p)):
             return False
         return bool(1 / _EXPLAINED < change / expected < _EXPLAINED)
+
+
+def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
+    """Return special points in order of their places; of those at one place the ones without a test function and folds first.
+
+    Others stay as given.
+    """
+    ranked = sorted(points, key=lambda point: point.test is not None and point.test.label != "LP")
+    rank = {id(point): number for number, point in enumerate(ranked)}
+    along = sorted(ranked, key=lambda point: point.at)
+    groups: list[list[SpecialPoint]] = []
+    for point in along:
+        if groups and point.at - groups[-1][-1].at < _AT_ONCE:
+            groups[-1].append(point)
+        else:
+            groups.append([point])
+    return [point for group in groups for point in sorted(group, key=lambda point: rank[id(point)])]

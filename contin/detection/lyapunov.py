@@ -18,6 +18,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.bends import bends
+from contin.linalg.orientation import oriented
 
 #: An error is no smaller than this part of the terms: round-off, which second differences divide by the square of their length.
 _ROUND_OFF = 1e-13
@@ -46,7 +47,7 @@ def critical_pair(jacobian: Array, frequency: float | None = None) -> CriticalPa
         off_axis = np.where(values.imag > 0, np.abs(values.real), np.inf)
         frequency = float(values[np.argmin(off_axis)].imag)
     right = vectors[:, np.argmin(np.abs(values - 1j * frequency))].astype(complex)
-    right = right / np.linalg.norm(right)
+    right = oriented(right / np.linalg.norm(right))
     values, vectors = np.linalg.eig(jacobian.T)
     left = vectors[:, np.argmin(np.abs(values - 1j * frequency))]
     with np.errstate(all="ignore"):
@@ -63,6 +64,7 @@ def _by_iteration(jacobian: Array, frequency: float) -> CriticalPair:
     for _ in range(_ITERATIONS):
         right, left = lu_solve(factors, right), lu_solve(factors, left, trans=1)
         right, left = right / np.linalg.norm(right), left / np.linalg.norm(left)
+    right = oriented(right)
     with np.errstate(all="ignore"):
         return CriticalPair(frequency, right, left / (left @ right))
 

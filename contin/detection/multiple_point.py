@@ -19,6 +19,7 @@ from contin.arrays import Array
 from contin.discretization.cycles import CycleCollocation
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
+from contin.linalg.orientation import canonical_basis, ordered, oriented, oriented_along
 from contin.linalg.singular import smallest_directions
 from contin.stepping.newton import Newton
 
@@ -168,9 +169,8 @@ def _bordered(system: Discretization, x: Array, row: Array, dimension: int, newt
     if len(right) < dimension or not np.all(np.isfinite(response)):
         raise ConvergenceError("the matrix is singular")
     u, _, vh = np.linalg.svd(response)
-    phi = [row / system.weights, *(u[:, :dimension].T @ right)]
-    psi = (vh[:dimension] @ left)[:, : system.equations]
-    psi /= np.linalg.norm(psi, axis=1)[:, None]
+    phi = [row / system.weights, *canonical_basis(u[:, :dimension].T @ right, system.weights)]
+    psi = canonical_basis((vh[:dimension] @ left)[:, : system.equations])
     return _Manifold(system, x, _orthonormal(system, np.array(phi)), psi, newton)
 
 
@@ -203,12 +203,10 @@ def _described(manifold: _Manifold, s: Array, row: Array) -> MultiplePoint:
     tangents = []
     for a in [] if continuum else directions:
         tangent = a @ vectors
-        tangents.append(tangent / np.sqrt(inner(system, tangent, tangent)))
-    tangents.sort(key=lambda tangent: -abs(inner(system, tangent, ours)))
-    if not tangents:
-        tangents = [ours]
-    tangents[0] = tangents[0] * (np.sign(inner(system, tangents[0], ours)) or 1.0)
-    across = np.linalg.svd(along[None])[2][1:] @ basis
+        tangents.append(oriented(tangent / np.sqrt(inner(system, tangent, tangent))))
+    cosines = [inner(system, tangent, ours) for tangent in tangents]
+    tangents = [oriented_along(tangents[i], cosines[i]) for i in ordered(tangents, cosines)] or [ours]
+    across = canonical_basis(np.linalg.svd(along[None])[2][1:] @ basis, system.weights)
     return MultiplePoint(manifold.d, across, x, tuple(tangents), continuum)
 
 

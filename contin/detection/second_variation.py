@@ -36,6 +36,7 @@ from contin.discretization.basis import interpolation
 from contin.discretization.collocation import Collocation
 from contin.discretization.protocol import Discretization
 from contin.errors import ProblemError
+from contin.linalg.orientation import canonical_basis
 from contin.problems.variational import Symmetry, VariationalProblem
 from contin.stepping.trial import TestFunction, Trial
 
@@ -71,9 +72,14 @@ class SecondVariation:
         return int(np.count_nonzero(values < 0))
 
     def modes(self, count: int, t: Array) -> Array:
-        """Return dx at t (K,), shape (count, K, n), of the eigenvalues nearest to zero, the largest number 1."""
+        """Return a basis of the modes of the eigenvalues nearest to zero: dx at t (K,), shape (count, K, n).
+
+        The largest number of each is 1. Basis and signs follow from the space (`contin.linalg.orientation.canonical_basis`).
+        """
         order = np.argsort(np.abs(self.eigenvalues))[:count]
         modes = np.array([self._profile.at(self._vectors[:, j], np.asarray(t, dtype=float)) for j in order])
+        if len(modes):
+            modes = canonical_basis(modes.reshape(len(modes), -1)).reshape(modes.shape)
         largest = np.abs(modes).max(axis=(1, 2), keepdims=True, initial=0.0)
         result: Array = modes / np.where(largest > 0, largest, 1.0)
         return result

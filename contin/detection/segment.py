@@ -80,6 +80,9 @@ class Segment:
         self.state, self.trial, self.step, self.newton = state, trial, step, newton
         self.low, self.before = before
         self._last: Place | None = None
+        #: Factors that the step left. Searches may take new ones; a resumed run, without factors of its first point from
+        #: Newton's method, does so in other steps.
+        self._factors = trial.factors if trial.is_linearized else None
 
     def at(self, distance: float) -> Trial:
         """Return the point of the curve at a distance along the state's tangent.
@@ -90,7 +93,7 @@ class Segment:
         """
         if self._last is not None and self._last[0] == distance:
             return self._last[1]
-        guess, factors = self.guess(distance), self.trial.factors
+        guess, factors = self.guess(distance), self.trial.factors if self._factors is None else self._factors
         if self._last is not None:  # off the cubic by about as much as the last one was
             place, last = self._last
             guess = guess + last.x - self.guess(place)

@@ -15,7 +15,9 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.detection.segment import Segment, SpecialPoint
+from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
+from contin.linalg.orientation import oriented
 from contin.stepping.newton import Newton, correct
 from contin.stepping.trial import TestFunction, Trial, linearization
 
@@ -25,6 +27,9 @@ _CLEAR = 1e-6
 STANDS = 1e-13
 #: Rates below this are round-off of tangents; it is 1e-16 to 1e-15 in the canard explosions of the tests.
 _ROUND_OFF = 1e-14
+#: Distance from a first point at which the sign of a small rate is looked at: located folds are known to 1e-9 to 1e-6. Ten
+#: times larger, another fold could lie between.
+_BESIDE = 1e-4
 #: A rate is significant where that on the finer mesh differs by less than this part of it.
 _AGREES = 0.5
 
@@ -51,6 +56,25 @@ def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
     again = finer.value(fold)
     significant = abs(again) > _ROUND_OFF and abs(again - rate) < _AGREES * abs(rate)
     return float(np.sign(rate)) if significant else 0.0
+
+
+def growing(system: Discretization, x: Array, tangent: Array, primary: str, newton: Newton) -> Array:
+    """Return the unit tangent at x along which the primary parameter grows, or the one `oriented` where it stands still.
+
+    It stands still at x if its rates on both sides of x have opposite signs, as at a fold: the rate at x is round-off then. A
+    small rate with one sign on both sides belongs to a parameter of another size.
+    """
+    at = system.parameter_index(primary)
+    if abs(tangent[at]) >= _CLEAR:
+        found: Array = tangent * np.sign(tangent[at])
+        return found
+    row = system.weights * tangent
+    try:
+        places = [correct(system, x + s * tangent, row, row @ x + s, newton).x for s in (-_BESIDE, _BESIDE)]
+    except ConvergenceError:
+        return np.asarray(oriented(tangent))
+    before, behind = (linearization(system, place, row).tangent[at] for place in places)
+    return np.asarray(tangent * np.sign(before) if before * behind > 0 else oriented(tangent))
 
 
 def on_finer_mesh(trial: Trial, newton: Newton) -> Trial | None:

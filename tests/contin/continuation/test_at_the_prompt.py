@@ -27,6 +27,7 @@ def parabola():
 )
 def test_a_line_of_progress(monkeypatch, terminal, wanted, shown):
     """It is shown on a terminal or where it is asked for, overwritten in place, and cleared."""
+    contin.trace(parabola(), free=["a"], direction=-1, limits={"a": (-1, 4)})  # compiled before: that shows a line of its own
     file = Terminal(terminal)
     monkeypatch.setattr(progress.sys, "stderr", file)
     monkeypatch.setattr(progress, "_FIRST", 0.0)
