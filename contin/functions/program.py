@@ -123,7 +123,7 @@ class _Lowering:
         fixed = [place for place in self.needed if not self.varies[place]]
         self.once = [place for place in fixed if operations[place].name not in ("constant", "input")]
         searches = [operations[place].data[0] for place in self.needed if operations[place].name == "root"]
-        inside = [place for search in dict.fromkeys(searches) for place in self.tape.needed(search.results)]
+        inside = [place for search in dict.fromkeys(searches) for place in self.tape.needed((*search.results, *search.starts))]
         constants = dict.fromkeys(place for place in [*fixed, *inside] if operations[place].name == "constant")
         self.scalar = {place: number for number, place in enumerate(constants)}
         self.constants = [operations[place].data for place in constants]

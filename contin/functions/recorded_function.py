@@ -21,8 +21,8 @@ class RecordedFunction:
     name : str
     names : sequence of str
         Of its arguments.
-    arguments : sequence of tuple of str or None
-        Names of the components of each argument; None for a number.
+    arguments : sequence of tuple of str, list of them, or None
+        Names of the components of each argument; a list stands for a tuple of named tuples, None for a number.
     tape : Tape
     inputs : sequence of int
         Places of all components of the arguments, in order.
@@ -47,8 +47,8 @@ class RecordedFunction:
     def __call__(self, *arguments: Any) -> Any:
         """Return the value: recorded for recorded numbers, else computed in Python."""
         values: list[Any] = []
-        for names, argument in zip(self._arguments, arguments):
-            values += [argument] if names is None else list(argument)
+        for argument in arguments:
+            values += _flat(argument)
         known = recorded(*values)
         if known is None:
             slots = [self._tape.operations[place].data for place in self._inputs]
@@ -60,8 +60,8 @@ class RecordedFunction:
     def arrays(self, *arguments: Any) -> tuple[Any, ...]:
         """Return the values for arrays of numbers, broadcast: shape of the arguments for each."""
         values: list[Any] = []
-        for names, argument in zip(self._arguments, arguments):
-            values += [argument] if names is None else list(argument)
+        for argument in arguments:
+            values += _flat(argument)
         slots = [self._tape.operations[place].data for place in self._inputs]
         return tuple(self._tape.evaluate_arrays(self._results, dict(zip(slots, np.broadcast_arrays(*values)))))
 
@@ -75,15 +75,32 @@ class RecordedFunction:
             labels += [name] if names is None else [f"{name}.{each}" for each in names]
         return labels
 
+    def compact(self) -> RecordedFunction:
+        """Return the same function on a tape of its own, which has what it needs and nothing else."""
+        tape = Tape()
+        inputs = {place: tape.input(self._tape.operations[place].data) for place in self._inputs}
+        results = [number.place for number in tape.replay(self._tape, self._results, inputs)]
+        places = [inputs[place].place for place in self._inputs]
+        return RecordedFunction(self.__name__, self._names, self._arguments, tape, places, results, self._single)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return dict(vars(self.compact()))
+
+    def _data(self) -> tuple[Any, ...]:
+        own = self.compact()
+        return own._names, own._arguments, own._inputs, own._results, own._single, own._tape.operations
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RecordedFunction):
             return NotImplemented
-        return self._data() == other._data()
+        return self is other or self._data() == other._data()
 
     def __hash__(self) -> int:
-        return hash((self._names, self._arguments, self._results))
+        return hash((self._names, self._arguments, self._single))
 
-    def _data(self) -> tuple[Any, ...]:
-        needed = self._tape.needed([*self._inputs, *self._results])
-        operations = [(place, self._tape.operations[place]) for place in needed]
-        return self._names, self._arguments, self._inputs, self._results, self._single, operations
+
+def _flat(argument: Any) -> list[Any]:
+    """Return the numbers of an argument: of a number, a tuple, or a tuple of tuples."""
+    if isinstance(argument, tuple):
+        return [number for part in argument for number in _flat(part)]
+    return list(argument) if isinstance(argument, (list, np.ndarray)) and np.ndim(argument) else [argument]

@@ -18,7 +18,8 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.program import TIME
 from contin.functions.recorded_arrays import _plain, numbers
-from contin.functions.signature import Signature, named_values
+from contin.functions.recorded_function import RecordedFunction
+from contin.functions.signature import Arguments, Signature, argument_count, named_values, takes_arrays
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Number, Tape, Unrecordable
 
@@ -251,3 +252,51 @@ def _filled(function: Function, size: int, signature: Signature, time: float, in
 
 #: Places around which functions are compared: positive and negative numbers.
 _CENTERS = (0.5, 1.5, -0.5)
+
+
+def function_of(function: Function, arguments: Arguments, count: int | None = None) -> RecordedFunction:
+    """Return a user's function as a recording, which can be pickled and compared.
+
+    Parameters
+    ----------
+    arguments : sequence of tuple of str or None
+        Names of the components of each argument; None for a number.
+    count : int, optional
+        Number of values of a function that fills an array, its last argument.
+
+    Raises
+    ------
+    Unrecordable
+    """
+    tape, single = Tape(), True
+    places: list[int] = []
+
+    def inputs(names: Any) -> Any:
+        if isinstance(names, list):
+            return tuple(inputs(each) for each in names)
+        group = [tape.input(("argument", len(places) + number)) for number in range(1 if names is None else len(names))]
+        places.extend(each.place for each in group)
+        return group[0] if names is None else named_values(tuple(names))(*group)
+
+    groups = [inputs(names) for names in arguments]
+    fills = argument_count(function) == len(arguments) + 1
+    arrays = not fills and takes_arrays(function, arguments)
+
+    def call(copy: Any) -> Sequence[Any]:
+        nonlocal single
+        last = len(groups) - (not fills)
+        given = [numbers(list(group)) if isinstance(group, tuple) and (fills or arrays) and number < last else group
+                 for number, group in enumerate(groups)]  # fmt: skip
+        if fills:
+            filled = numbers([0.0] * (count or len(groups[0])))
+            copy(*given, filled)
+            single = False
+            return list(filled.tolist())
+        result = copy(*given)
+        single = not isinstance(result, (tuple, list)) and np.ndim(result) == 0
+        return [result] if single else (_plain(result).ravel().tolist() if isinstance(result, np.ndarray) else list(result))
+
+    results = recorded_paths(tape, function, call)
+    letters = [f"a{number}" for number in range(len(groups))]
+    name = getattr(function, "__name__", "function")
+    return RecordedFunction(name, letters, list(arguments), tape, places, results, single)

@@ -104,7 +104,9 @@ class _Copies:
         if own is not None:
             return own
         value = getattr(value, "py_func", value)
-        if isinstance(value, types.FunctionType) and value.__module__.startswith(_HERE):
+        if isinstance(value, functools._lru_cache_wrapper) and not value.__module__.startswith(_HERE):
+            value = value.__wrapped__  # recorded numbers are no keys
+        if isinstance(value, (types.FunctionType, functools._lru_cache_wrapper)) and value.__module__.startswith(_HERE):
             return value  # it takes recorded numbers
         if isinstance(value, (types.FunctionType, types.MethodType, functools.partial)):
             return self.function(value)
@@ -197,7 +199,8 @@ def _may_hold_functions(value: Any) -> bool:
 
 def _is_object(value: Any) -> bool:
     """Return whether a value is an object of a user's class."""
-    if type(value).__module__.partition(".")[0] in ("numpy", "scipy", "builtins", __name__.partition(".")[0]):
+    module = type(value).__module__
+    if module.partition(".")[0] in ("numpy", "scipy", "builtins") or module.startswith(_HERE):
         return isinstance(value, types.SimpleNamespace)
     if isinstance(value, (tuple, list, dict, type, float, int, str)):
         return False

@@ -65,6 +65,18 @@ class Tape:
         self._known: dict[Any, int] = {}
         self._results: dict[Any, Any] = {}
 
+    def __getstate__(self) -> list[Operation]:
+        """Return the operations."""
+        return self.operations
+
+    def __setstate__(self, operations: list[Operation]) -> None:
+        self.__init__()  # type: ignore[misc]
+        for operation in operations:
+            key = (operation.name, operation.operands, operation.data)
+            if operation.name in ("constant", "input"):
+                key = (operation.name, operation.data.hex() if operation.name == "constant" else operation.data)  # type: ignore[assignment]
+            self._append(operation, key)
+
     def kept(self, key: Any, make: Callable[[], Any]) -> Any:
         """Return what was made for a key before, or make it."""
         if key not in self._results:
@@ -473,6 +485,15 @@ class _Printer:
         if name == "select":
             condition, a, b = (text for text, _ in operands)
             return f"({a} if {condition} else {b})", _NAME
+        if name in ("sum", "dot", "linear"):
+            half = len(operands) // 2
+            given = zip(operands[:half], operands[half:]) if name == "dot" else [(each,) for each in operands]
+            if name == "linear":
+                given = [((f"{factor:.17g}", _NAME), *each) for factor, each in zip(operation.data, given)]
+            return " + ".join(" * ".join(_within(factor, 2) for factor in term) for term in given), 1
+        if name == "root":
+            search, index = operation.data
+            return f"{'argmin' if search.minimum else 'root'}{min(search.unknowns)}[{index}]", _NAME
         inside = ", ".join(text for text, _ in operands)
         return f"{name}({inside})", _NAME
 

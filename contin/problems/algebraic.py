@@ -15,7 +15,7 @@ from contin import checks
 from contin.arrays import Array, Function, Indices
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Signature, argument_count, result_count
+from contin.functions.signature import Arguments, Signature, argument_count, result_count
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 
@@ -88,6 +88,10 @@ class AlgebraicProblem(Restated):
     def state_names(self) -> tuple[str, ...]:
         """Names of the states: ``states``, also where a number was given."""
         return cast(tuple[str, ...], self.states)
+
+    def signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        return {"residual": self._signature.arguments, "functionals": self._signature.arguments}
 
     @property
     def _signature(self) -> Signature:

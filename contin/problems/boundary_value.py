@@ -12,7 +12,7 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Signature, argument_count, result_count
+from contin.functions.signature import Arguments, Signature, argument_count, result_count
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 
@@ -111,6 +111,11 @@ class BoundaryValueProblem(Restated):
         if name not in self._batches:
             self._batches[name] = self._compiled(name)
         return self._batches[name]
+
+    def signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        point = self._of_point.arguments
+        return {"rhs": point, "boundary": self._of_ends.arguments, "integrals": point, "functionals": point}
 
     @property
     def _of_point(self) -> Signature:

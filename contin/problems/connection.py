@@ -10,10 +10,10 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Signature
+from contin.functions.signature import Arguments, Signature
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
-from contin.problems.vector_field import check_field, found_elsewhere, generated, scaled
+from contin.problems.vector_field import check_field, found_elsewhere, scaled
 
 #: The name, among the parameters, of the time that the computed part of the orbit takes.
 TIME = "time"
@@ -92,9 +92,13 @@ class ConnectionProblem(BoundaryValueProblem):
         object.__setattr__(self, "homoclinic", homoclinic)
         object.__setattr__(self, "unstable", unstable)
         object.__setattr__(self, "stable", count - unstable if stable is None else stable)
-        rhs, boundary = scaled(field, TIME, count), _at_rest(field, names, homoclinic)
+        rhs, boundary = scaled(field, TIME), _at_rest(field, names, homoclinic)
         super().__init__(rhs, boundary, names, {**parameters, TIME: 1.0, **dict.fromkeys(own[1:], 0.0)})
         object.__setattr__(self, "functionals", {"gap": found_elsewhere})
+
+    def signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        return {"field": Signature(self.state_names, tuple(self.parameters), times=False).arguments}
 
     @property
     def multipliers(self) -> tuple[str, ...]:
@@ -126,10 +130,9 @@ class ConnectionProblem(BoundaryValueProblem):
 def _at_rest(field: Function, names: Sequence[str], homoclinic: bool) -> Function:
     """Return the boundary conditions: the field vanishes at the equilibria."""
     state: Any = namedtuple("State", names)  # type: ignore[misc]  # noqa: PYI024
-    lines = ["def boundary(a, b, p):"]
-    values = []
-    for kind in ("from_",) if homoclinic else ("from_", "to_"):
-        lines.append(f"    {kind} = field(State({''.join(f'p.{kind}{name}, ' for name in names)}), p)")
-        values += [f"{kind}[{i}], " for i in range(len(names))]
-    lines.append(f"    return ({''.join(values)})")
-    return generated("boundary", "\n".join(lines), {"field": field, "State": state})
+    kinds = ("from_",) if homoclinic else ("from_", "to_")
+
+    def boundary(a: Any, b: Any, p: Any) -> Any:
+        return [rate for kind in kinds for rate in field(state(*(getattr(p, kind + name) for name in names)), p)]
+
+    return boundary

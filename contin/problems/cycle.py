@@ -14,12 +14,12 @@ from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
-from contin.functions.signature import Signature
+from contin.functions.signature import Arguments, Signature
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
-from contin.problems.cycle_symmetry import averaged, check_equivariance, linear, order_of, symmetry_matrix
+from contin.problems.cycle_symmetry import averaged, check_equivariance, image, order_of, symmetry_matrix
 from contin.problems.statement import check_statement
-from contin.problems.vector_field import check_field, found_elsewhere, generated, of_parameters, scaled
+from contin.problems.vector_field import check_field, found_elsewhere, of_parameters, scaled
 
 #: What is said of a field with other arguments.
 _FORCED = "must be a function of (t, u, p), as a period is given"
@@ -112,7 +112,7 @@ class CycleProblem(BoundaryValueProblem):
         turn = _turn(symmetry, forced, count)
         check_equivariance(field, turn, names, parameters)
         found = None if period is None else of_parameters("period", period, parameters, positive=True)
-        rhs = scaled(field, PERIOD, count, order_of(turn)) if found is None else _scaled_by_forcing(field, found, count)
+        rhs = scaled(field, PERIOD, order_of(turn)) if found is None else _scaled_by_forcing(field, found)
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "means", means)
         object.__setattr__(self, "period", found)
@@ -121,6 +121,14 @@ class CycleProblem(BoundaryValueProblem):
         super().__init__(rhs, _periodic(turn), names, {**parameters, **({ROUNDS: 1.0} if forced else {PERIOD: 1.0})})
         columns = [*extremes, PERIOD] if forced else extremes
         object.__setattr__(self, "functionals", {**dict.fromkeys(columns, found_elsewhere), **means})
+
+    def signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        states, own = self.state_names, (PERIOD, ROUNDS)
+        parameters = tuple(name for name in self.parameters if name not in own)
+        of_field = Signature(states, parameters, times=self.period is not None).arguments
+        of_means = Signature(states, tuple(self.parameters), times=self.period is not None).arguments
+        return {"field": of_field, "functionals": of_means, "period": [parameters]}
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:
@@ -238,17 +246,24 @@ def rounds_of(free: Sequence[str], parameters: Mapping[str, float]) -> int:
     return int(rounds)
 
 
-def _scaled_by_forcing(field: Function, period: Function, count: int) -> Function:
+def _scaled_by_forcing(field: Function, period: Function) -> Function:
     """Return a forced field times the period, at the time from 0 to 1."""
-    values = "".join(f"T * r[{i}], " for i in range(count))
-    source = f"def rhs(t, u, p):\n    T = p.rounds * period(p)\n    r = field(T * t, u, p)\n    return ({values})"
-    return generated("rhs", source, {"field": field, "period": period})
+
+    def rhs(t: Any, u: Any, p: Any) -> Any:
+        duration = p.rounds * period(p)
+        return [duration * rate for rate in field(duration * t, u, p)]
+
+    return rhs
 
 
 def _periodic(turn: Array) -> Function:
     """Return the boundary conditions S u(0) - u(1) = 0."""
-    values = "".join(f"{linear('a', row)} - b[{i}], " for i, row in enumerate(turn))
-    return generated("boundary", f"def boundary(a, b, p):\n    return ({values})", {})
+    rows = turn.tolist()
+
+    def boundary(a: Any, b: Any, p: Any) -> Any:
+        return [turned - end for turned, end in zip(image(rows, a), b)]
+
+    return boundary
 
 
 def _of_time(function: Function) -> Function:

@@ -11,7 +11,6 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import ProblemError
-from contin.problems.vector_field import generated
 
 #: The largest order of a symmetry: rings of more oscillators are rare, and one n-th of a cycle should be worth a mesh.
 _MOST = 60
@@ -83,16 +82,23 @@ def check_equivariance(field: Function, matrix: Array, names: Sequence[str], par
             )
 
 
-def linear(name: str, row: Array) -> str:
-    """Return the text of the product of a row and the vector of a name."""
-    terms = [f"{name}[{j}]" if factor == 1 else f"{float(factor)!r} * {name}[{j}]" for j, factor in enumerate(row) if factor]
-    return "(" + " + ".join(terms) + ")" if len(terms) > 1 or terms[0][0] == "-" else terms[0]
+def image(matrix: Sequence[Sequence[float]], u: Sequence[Any]) -> list[Any]:
+    """Return the product of a matrix, as a list of rows, and a vector; zeros and ones are not multiplied."""
+    return [_product(row, u) for row in matrix]
+
+
+def _product(row: Sequence[float], u: Sequence[Any]) -> Any:
+    terms = [value if factor == 1 else factor * value for factor, value in zip(row, u) if factor]
+    return sum(terms[1:], terms[0])
 
 
 def averaged(function: Function, matrix: Array, names: Sequence[str], order: int) -> Function:
     """Return the mean of a functional over u, S u, ..., S^(n-1) u, as a function of (t, u, p)."""
     state: Any = namedtuple("State", tuple(names))  # type: ignore[misc]  # noqa: PYI024
-    powers = [np.linalg.matrix_power(matrix, k) for k in range(order)]
-    images = (f"function(State({''.join(linear('u', row) + ', ' for row in power)}), p)" for power in powers)
-    source = f"def mean(t, u, p):\n    return ({' + '.join(images)}) / {order}"
-    return generated("mean", source, {"function": function, "State": state})
+    powers = [np.linalg.matrix_power(matrix, k).tolist() for k in range(order)]
+
+    def mean(t: Any, u: Any, p: Any) -> Any:
+        values = [function(state(*image(power, u)), p) for power in powers]
+        return sum(values[1:], values[0]) / order
+
+    return mean

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
+from contin.functions.signature import Arguments
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.cycle import ROUNDS
 
@@ -56,6 +57,10 @@ class MapProblem(AlgebraicProblem):
         if self.equation_size != len(self.state_names):
             names = ", ".join(self.state_names)
             raise ProblemError(f"map returns {self.equation_size} values for the {len(self.state_names)} states {names}")
+
+    def signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        return {"map": self._signature.arguments, "functionals": self._signature.arguments}
 
     def _compiled(self, name: str) -> Batch:
         return super()._compiled("residual" if name == "map" else name)

@@ -8,7 +8,7 @@ their ends, so elimination treats them one by one (`contin.linalg.layout`).
 from __future__ import annotations
 
 from collections import Counter, namedtuple
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -17,10 +17,10 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import ProblemError
-from contin.functions.signature import Signature, argument_count, result_count
+from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
 from contin.problems.boundary_value import BoundaryValueProblem
-from contin.problems.statement import check_statement
-from contin.problems.vector_field import generated, of_parameters
+from contin.problems.statement import check_statement, portable
+from contin.problems.vector_field import of_parameters
 
 #: A number, the name of a parameter, or a function of the parameters.
 Quantity = float | str | Function
@@ -57,6 +57,14 @@ class Segment:
     length: Quantity = 1.0
     begin: Quantity | None = None
     functionals: Mapping[str, Function] = field(default_factory=dict)
+
+    def portable(self, names: tuple[str, ...], parameters: tuple[str, ...]) -> Segment:
+        """Return the segment with recordings in the place of functions that no other process finds by name."""
+        inside: Arguments = [None, names, parameters]
+        return Segment(
+            portable(self.rhs, inside), self.states, portable(self.length, [parameters]), portable(self.begin, [parameters]),
+            portable(self.functionals, inside),
+        )  # fmt: skip
 
 
 class Piece(NamedTuple):
@@ -125,6 +133,26 @@ class SegmentedProblem(BoundaryValueProblem):
             functionals=_sums(given, pieces),
         )  # fmt: skip
 
+    def signatures(self) -> Mapping[str, Any]:
+        """Return the arguments of the functions."""
+        names, parameters = [piece.names for piece in self.pieces], tuple(self.parameters)
+        found: dict[str, Any] = {"boundary": [names, names, parameters]}
+        for number, piece in enumerate(self.pieces):
+            found |= {f"rhs {number}": [None, piece.names, parameters], f"functionals {number}": [None, piece.names, parameters]}
+            found |= {f"length {number}": [parameters], f"begin {number}": [parameters]}
+        return found
+
+    def _compared(self) -> dict[str, Any]:
+        parts = ("rhs", "states", "length", "begin", "functionals")
+        segments = {f"{part} {i}": getattr(segment, part) for i, segment in enumerate(self.segments) for part in parts}
+        return {name: value for name, value in self._stated.items() if name != "segments"} | segments
+
+    def __reduce__(self) -> Any:
+        """Carry the functions of segments as recordings, too, where no other process finds them by name."""
+        make, (kind, stated) = super().__reduce__()
+        segments = [segment.portable(piece.names, tuple(self.parameters)) for segment, piece in zip(self.segments, self.pieces)]
+        return make, (kind, {**stated, "segments": segments})
+
     def extent(self, index: int, parameters: Mapping[str, float]) -> tuple[float, float]:
         """Return the coordinates of both ends of a segment."""
         values = namedtuple("P", tuple(parameters))(**parameters)  # noqa: PYI024
@@ -169,13 +197,21 @@ def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tup
         if segment.begin is not None:
             begin = of_parameters(f"{what}begin", segment.begin, parameters)
         elif pieces:
-            begin = generated("begin", "def begin(p):\n    return start(p) + length(p)\n",
-                              {"start": pieces[-1].begin, "length": pieces[-1].length})  # fmt: skip
+            begin = _behind(pieces[-1])
         else:
             begin = of_parameters(f"{what}begin", 0.0, parameters)
         at = pieces[-1].at.stop if pieces else 0
         pieces.append(Piece(names, slice(at, at + len(names)), length, begin))
     return tuple(pieces)
+
+
+def _behind(piece: Piece) -> Function:
+    """Return the end of a segment as a function of p."""
+
+    def begin(p: Any) -> Any:
+        return piece.begin(p) + piece.length(p)
+
+    return begin
 
 
 def _check_function(what: str, function: Function, signature: Signature, count: int) -> None:
@@ -193,49 +229,49 @@ def _names(pieces: Sequence[Piece]) -> tuple[str, ...]:
     return tuple(f"{name}_{i}" if count[name] > 1 else name for i, piece in enumerate(pieces) for name in piece.names)
 
 
-# --- generated functions: compiled code has tuples of fixed sizes ---------------------------------------------------------
+# --- functions of all states ----------------------------------------------------------------------------------------------
 
 
-def _scope(pieces: Sequence[Piece], functions: Iterable[Function | None] = ()) -> dict[str, Any]:
-    """Return the names that generated functions refer to; the number of the segment stands behind each."""
-    scope: dict[str, Any] = {}
-    for i, piece in enumerate(pieces):
-        scope |= {f"U{i}": namedtuple("U", piece.names), f"length{i}": piece.length, f"begin{i}": piece.begin}  # noqa: PYI024
-    return scope | {f"f{i}": function for i, function in enumerate(functions) if function is not None}
-
-
-def _states(piece: Piece, number: int, of: str = "u") -> str:
-    """Return the text of the states of a segment as a named tuple."""
-    return f"U{number}({', '.join(f'{of}[{at}]' for at in range(piece.at.start, piece.at.stop))})"
+def _states(pieces: Sequence[Piece], u: Sequence[Any]) -> list[Any]:
+    """Return the states of each segment as a named tuple."""
+    return [named_values(piece.names)(*list(u)[piece.at]) for piece in pieces]
 
 
 def _side_by_side(functions: Sequence[Function], pieces: Sequence[Piece]) -> Function:
     """Return the right-hand side of all states on [0, 1]."""
-    lines, values = [], []
-    for i, piece in enumerate(pieces):
-        lines += [f"    l{i} = length{i}(p)", f"    r{i} = f{i}(begin{i}(p) + l{i} * t, {_states(piece, i)}, p)"]
-        values += [f"l{i} * r{i}[{k}]" for k in range(len(piece.names))]
-    source = "\n".join(["def rhs(t, u, p):", *lines, f"    return ({', '.join(values)},)", ""])
-    return generated("rhs", source, _scope(pieces, functions))
+
+    def rhs(t: Any, u: Any, p: Any) -> Any:
+        values: list[Any] = []
+        for function, piece, own in zip(functions, pieces, _states(pieces, u)):
+            length = piece.length(p)
+            values += [length * rate for rate in function(piece.begin(p) + length * t, own, p)]
+        return values
+
+    return rhs
 
 
 def _between(boundary: Function, pieces: Sequence[Piece]) -> Function:
     """Return the conditions as a function of all states at both ends."""
-    ends = ["".join(f"{_states(piece, i, of)}, " for i, piece in enumerate(pieces)) for of in ("a", "b")]
-    source = f"def boundary(a, b, p):\n    return given(({ends[0]}), ({ends[1]}), p)\n"
-    return generated("boundary", source, {**_scope(pieces), "given": boundary})
+
+    def conditions(a: Any, b: Any, p: Any) -> Any:
+        return boundary(tuple(_states(pieces, a)), tuple(_states(pieces, b)), p)
+
+    return conditions
 
 
 def _sums(segments: Sequence[Segment], pieces: Sequence[Piece]) -> dict[str, Function]:
     """Return the functionals: sums over the segments that have them."""
-    found = {}
-    for name in dict.fromkeys(name for segment in segments for name in segment.functionals):
-        functions = [segment.functionals.get(name) for segment in segments]
-        terms = [
-            f"length{i}(p) * f{i}(begin{i}(p) + length{i}(p) * t, {_states(piece, i)}, p)"
-            for i, (piece, function) in enumerate(zip(pieces, functions))
-            if function is not None
-        ]
-        source = f"def functional(t, u, p):\n    return {' + '.join(terms)}\n"
-        found[name] = generated("functional", source, _scope(pieces, functions))
-    return found
+    names = dict.fromkeys(name for segment in segments for name in segment.functionals)
+    return {name: _sum(name, segments, pieces) for name in names}
+
+
+def _sum(name: str, segments: Sequence[Segment], pieces: Sequence[Piece]) -> Function:
+    def functional(t: Any, u: Any, p: Any) -> Any:
+        total = 0.0
+        for segment, piece, own in zip(segments, pieces, _states(pieces, u)):
+            if name in segment.functionals:
+                length = piece.length(p)
+                total = total + length * segment.functionals[name](piece.begin(p) + length * t, own, p)
+        return total
+
+    return functional

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import keyword
 import math
-from collections.abc import Mapping, Sequence
+import pickle
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,6 +15,10 @@ from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
+from contin.functions.recorded_function import RecordedFunction
+from contin.functions.recording import function_of
+from contin.functions.signature import Arguments
+from contin.functions.tape import Unrecordable
 
 #: Bounds on numbers that a user gives, so that a slip of the keyboard is a sentence and not a full memory.
 _MOST_STATES = 10_000
@@ -43,22 +49,89 @@ class Statement(Protocol):
 
 
 class Restated:
-    """A statement that survives pickling: it is stated again with its arguments, and compiled code comes from the cache."""
+    """A statement that can be pickled and compared: it is data.
 
-    _stated: tuple[tuple[Any, ...], dict[str, Any]]
+    Functions that other processes can import are pickled by name, all others as recordings. Two problems are equal if they are
+    stated with equal values and functions, recorded.
+    """
+
+    _stated: dict[str, Any]
 
     def __new__(cls, *arguments: Any, **options: Any) -> Any:
         """Note the arguments."""
         made = super().__new__(cls)
-        object.__setattr__(made, "_stated", (arguments, options))
+        names = list(inspect.signature(cls.__init__).parameters)[1:]
+        object.__setattr__(made, "_stated", {**dict(zip(names, arguments)), **options})
         return made
 
+    def signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions that the problem is stated with, by the name of the field."""
+        return {}
+
     def __reduce__(self) -> Any:
-        return _restated, (type(self), *self._stated)
+        signatures = self.signatures()
+        stated = {name: portable(value, signatures.get(name)) for name, value in self._stated.items()}
+        return _restated, (type(self), stated)
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if not isinstance(other, Restated) or type(self) is not type(other):
+            return False
+        ours, theirs, signatures = self._compared(), other._compared(), self.signatures()
+        return ours.keys() == theirs.keys() and all(_equal(ours[name], theirs[name], signatures.get(name)) for name in ours)
+
+    def __hash__(self) -> int:
+        return hash((type(self), tuple(self._stated)))
+
+    def _compared(self) -> dict[str, Any]:
+        """Return what decides whether two problems are equal, by name."""
+        return self._stated
 
 
-def _restated(kind: Any, arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
-    return kind(*arguments, **options)
+def _restated(kind: Any, stated: dict[str, Any]) -> Any:
+    return kind(**stated)
+
+
+def portable(value: Any, arguments: Arguments | None) -> Any:
+    """Return a value with recordings in the place of functions that no other process finds by their names."""
+    return _carried(value, arguments, _importable)
+
+
+def _importable(function: Any) -> bool:
+    """Return whether another process finds a function by its name."""
+    try:
+        pickle.dumps(function)
+    except Exception:  # whatever pickling it raises
+        return False
+    return True
+
+
+def _carried(value: Any, arguments: Arguments | None, keep: Callable[[Any], bool]) -> Any:
+    """Return a value with recordings in the place of functions, except of those to keep and of those that cannot be recorded."""
+    if isinstance(value, Mapping):
+        return {name: _carried(each, arguments, keep) for name, each in value.items()}
+    if arguments is None or not callable(value) or keep(value):
+        return value
+    try:
+        return function_of(value, arguments)
+    except (Unrecordable, ProblemError):
+        return value
+
+
+def _equal(a: Any, b: Any, arguments: Arguments | None) -> bool:
+    """Return whether two values that a problem is stated with are equal, functions by what they compute."""
+    if a is b:
+        return True
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return list(a) == list(b) and all(_equal(a[name], b[name], arguments) for name in a)
+    if callable(a) and callable(b) and arguments is not None:
+        a, b = (_carried(each, arguments, lambda function: isinstance(function, RecordedFunction)) for each in (a, b))
+        return bool(a == b)
+    try:
+        return bool(np.array_equal(a, b))
+    except Exception:  # things of any kind may be compared here
+        return False
 
 
 def forget_changed(problem: Any) -> bool:

@@ -12,7 +12,7 @@ from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.canonical import Canonical, Variation, canonical
-from contin.functions.signature import argument_count
+from contin.functions.signature import Arguments, argument_count
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
 
@@ -137,6 +137,16 @@ class VariationalProblem(BoundaryValueProblem):
             derived.rhs, derived.boundary, (*names, *(f"lam_{name}" for name in names)),
             {**parameters, **dict.fromkeys(self.multipliers, 0.0)}, derived.integrals, domain, derived.functionals,
         )  # fmt: skip
+
+    def signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        v = self.variation
+        inside: Arguments = [None, v.states, v.controls, v.parameters]
+        ends: Arguments = [v.states, v.states, v.parameters]
+        return {
+            **dict.fromkeys(("energy", "kinematics", "integrals", "functionals"), inside), "ends": ends, "end_energy": ends,
+            "hamiltonian": [None, v.states, v.states, v.parameters],
+        }  # fmt: skip
 
     @property
     def multipliers(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Functions generated from those of users; checks of vector fields u' = F(u, p), for orbits of all kinds."""
+"""Functions made from those of users; checks of vector fields u' = F(u, p), for orbits of all kinds."""
 
 from __future__ import annotations
 
@@ -25,14 +25,6 @@ def check_field(field: Function, signature: Signature, wrong: str) -> None:
         raise ProblemError(f"field returns {count} values for the {len(names)} states {', '.join(names)}")
 
 
-def generated(name: str, source: str, names: Mapping[str, Any]) -> Function:
-    """Return a function from its text, which is generated because compiled code has tuples of fixed sizes."""
-    scope: dict[str, Any] = {**names, "__name__": __name__}
-    exec(source, scope)
-    found: Function = scope[name]
-    return found
-
-
 def of_parameters(
     what: str, value: float | str | Function, parameters: Mapping[str, float], positive: bool = False
 ) -> Function:
@@ -46,20 +38,37 @@ def of_parameters(
     if isinstance(value, str):
         if value not in parameters:
             raise ProblemError(f"{what}: {checks.shown(value)} is no parameter; there are {', '.join(parameters) or 'none'}")
-        return generated("quantity", f"def quantity(p):\n    return p.{value}\n", {})
+        return _named(value)
     if callable(value):
         if argument_count(value) != 1:
             raise ProblemError(f"{what}: must be a function of p alone")
         return value
     checks.number(what, value, *([0] if positive else []))
-    return generated("quantity", f"def quantity(p):\n    return {float(value)!r}\n", {})
+    return _constant(float(value))
 
 
-def scaled(field: Function, by: str, count: int, parts: int = 1) -> Function:
+def _named(name: str) -> Function:
+    def quantity(p: Any) -> Any:
+        return getattr(p, name)
+
+    return quantity
+
+
+def _constant(value: float) -> Function:
+    def quantity(p: Any) -> Any:
+        return value
+
+    return quantity
+
+
+def scaled(field: Function, by: str, parts: int = 1) -> Function:
     """Return the right-hand side that is the field times a parameter, divided by a number of parts."""
-    part = f" / {parts}" if parts > 1 else ""
-    values = "".join(f"p.{by}{part} * r[{i}], " for i in range(count))
-    return generated("rhs", f"def rhs(t, u, p):\n    r = field(u, p)\n    return ({values})", {"field": field})
+
+    def rhs(t: Any, u: Any, p: Any) -> Any:
+        factor = getattr(p, by) / parts if parts > 1 else getattr(p, by)
+        return [factor * rate for rate in field(u, p)]
+
+    return rhs
 
 
 def found_elsewhere(u: Any, p: Any) -> Any:
