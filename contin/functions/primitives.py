@@ -91,6 +91,14 @@ def _simple_sub(tape: Any, places: tuple[int, ...]) -> int | None:
 
 
 def _simple_mul(tape: Any, places: tuple[int, ...]) -> int | None:
+    return _simple_times(tape, places, "mul")
+
+
+def _simple_product(tape: Any, places: tuple[int, ...]) -> int | None:
+    return _simple_times(tape, places, "product")
+
+
+def _simple_times(tape: Any, places: tuple[int, ...], name: str) -> int | None:
     for one, other in (places, places[::-1]):
         value, operation = tape.value(one), tape.operations[one]
         if value == 0:
@@ -100,7 +108,7 @@ def _simple_mul(tape: Any, places: tuple[int, ...]) -> int | None:
         if value == -1:
             return int(tape.at("neg", (other,)))
         if operation.name == "neg":
-            return int(tape.at("neg", (tape.at("mul", (operation.operands[0], other)),)))
+            return int(tape.at("neg", (tape.at(name, (operation.operands[0], other)),)))
     return None
 
 
@@ -256,7 +264,7 @@ TABLE: dict[str, Primitive] = {
     "select": _primitive(lambda c, a, b: a if c != 0 else b, _of_select, simplify=_simple_select, selects=True),
     # a product that is 0 where one of its factors is, also if the other one is nan or inf
     "product": _primitive(
-        lambda x, y: 0.0 if x == 0 or y == 0 else x * y, _of_product, simplify=_simple_mul, commutes=True, selects=True
+        lambda x, y: 0.0 if x == 0 or y == 0 else x * y, _of_product, simplify=_simple_product, commutes=True, selects=True
     ),
     "abs": _primitive(np.absolute, lambda tape, data, xs, r: (tape.apply("select", xs[0] < 0, -1.0, 1.0),)),
     "sign": _primitive(np.sign, _none),

@@ -355,7 +355,7 @@ class _Stretch:
         operands = operation.operands
         other = operands[1] if operands[0] == product else operands[0]
         a, b = self.operations[product].operands
-        if a in self.scalar or b in self.scalar:
+        if operation.name == "add" and (a in self.scalar) != (b in self.scalar):
             factor, scalar = (b, a) if a in self.scalar else (a, b)
             return "mul s add", [self._register(factor), self.scalar[scalar], self._register(other)]
         kind = "mul add" if operation.name == "add" else ("mul sub" if operands[0] == product else "sub mul")

@@ -415,6 +415,7 @@ def _cross(a: Any, b: Any) -> Any:
 
 
 def _polyval(p: Any, x: Any) -> Any:
+    x = numbers(_plain(x)) if isinstance(x, (list, tuple)) else x
     result = 0.0 * x
     for coefficient in list(p):
         result = result * x + coefficient

@@ -97,7 +97,7 @@ def _recorded(
 
     def call(copy: Any) -> Sequence[Any]:
         found = _called(copy, fills, size, signature, time, inputs)
-        return list(found) if count else [found]
+        return list(found) if count or fills else [found]
 
     places = recorded_paths(tape, function, call)
     if len(places) != size:
