@@ -39,8 +39,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
         the opposite way. By default the one that it was found on, with ``direction`` that of the primary parameter.
     progress : bool, optional
-        Show one line on standard error while the run is under way, and clear it at the end: by default where standard error is
-        a terminal.
+        Show one line on standard error while the run is under way: by default where standard error is a terminal.
 
     Raises
     ------

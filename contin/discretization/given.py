@@ -43,9 +43,33 @@ def check_given(problem: AlgebraicProblem, u: Array, p: Array) -> None:
             break
     else:
         return  # nothing to compare with: Newton's method will say that there are no values
+    if problem.jacobian is None and problem.batch("residual").recording is not None:
+        _check_entries(problem, matrix)
+        return
     excess = np.abs(matrix @ direction - wanted) - _SAFE * error - _LEAST * (terms + np.abs(wanted))
     if np.any(excess > 0):
         raise ProblemError(_wrong_entry(problem, (here, p), matrix, int(np.argmax(excess))))
+
+
+def _check_entries(problem: AlgebraicProblem, matrix: Any) -> None:
+    """Compare a pattern with the entries of the exact Jacobian at one place, those of zeros left out.
+
+    Raises
+    ------
+    ProblemError
+        An entry is missing.
+    """
+    entries = matrix.tocoo()
+    given = set(zip(*(side.tolist() for side in problem.entries)))
+    for row, column, value in zip(entries.row.tolist(), entries.col.tolist(), entries.data.tolist()):
+        if value != 0 and (row, column) not in given:
+            raise ProblemError(_missing(problem, row, column))
+
+
+def _missing(problem: AlgebraicProblem, row: int, column: int) -> str:
+    """Return the sentence that names an entry that a pattern lacks."""
+    name = problem.state_names[column]
+    return f"pattern: equation {row} depends on {name}, so the pattern must have the entry ({row}, {column})"
 
 
 def _matrix(problem: AlgebraicProblem, u: Array, p: Array) -> Any:
@@ -88,6 +112,6 @@ def _wrong_entry(problem: AlgebraicProblem, place: tuple[Array, Array], matrix: 
     column = int(np.argmax(differs))
     name = problem.state_names[column]
     if problem.jacobian is None:
-        return f"pattern: equation {row} depends on {name}, so the pattern must have the entry ({row}, {column})"
+        return _missing(problem, row, column)
     numbers = f"{given[column]:.6g}, must be {known[column]:.6g}"
     return f"jacobian: the derivative of equation {row} by {name} is {numbers} (by differences of the residual)"

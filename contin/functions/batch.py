@@ -6,6 +6,7 @@ be recorded is evaluated in Python (`contin.functions.interpreted`); a warning s
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from contin.arrays import Array, Function, Indices, Pattern
 from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.interpreted import Interpreted
-from contin.functions.interpreter import LANES, evaluate
+from contin.functions.interpreter import LANES, run
 from contin.functions.program import TIME, Inputs, Program, Slope, program
 from contin.functions.recording import Recording, checked, record
 from contin.functions.signature import Signature, named_values, takes_arrays
@@ -173,7 +174,7 @@ class Batch:
             rows, places = (np.array([entry[side] for entry in entries], dtype=np.int64) for side in (0, 1))
         return Columns(np.array(inputs, dtype=np.int64), rows, places)
 
-    @property
+    @functools.cached_property
     def depends(self) -> Pattern:
         """Sparsity pattern: which values depend on which of u, v (with ``ends``), p; shape (count, inputs)."""
         pattern = np.zeros((self.count, self.signature.inputs), dtype=bool)
@@ -342,29 +343,21 @@ class Batch:
         """Run a program for all points, in several threads where one took long before."""
         count, kind = len(u), len(found.code)
         if count < _MANY:
-            _evaluate(found, t, u, v, p, out, jac)
+            run(found, (t, u, v), p, out, jac)
             return
         if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
-            threads.each(lambda part: _evaluate(*part), _divided(found, t, u, v, p, out, jac))
+            threads.each(lambda part: run(*part), _divided(found, t, u, v, p, out, jac))
             return
         began = time.perf_counter()
-        _evaluate(found, t, u, v, p, out, jac)
+        run(found, (t, u, v), p, out, jac)
         self._seconds[kind] = (time.perf_counter() - began) / count
 
 
-def _evaluate(found: Program, t: Array, u: Array, v: Array, p: Array, out: Array, jac: Array) -> None:
-    """Run a program for some points."""
-    scalars = found.scalars.copy()
-    scalars[found.parameters : found.parameters + len(p)] = p
-    work, scratch = np.empty(found.registers * LANES), np.empty((max(found.unknowns, 1), found.unknowns + 1))
-    evaluate(found.code, found.first, found.last, found.lists, scalars, found.tables, t, u, v, work, scratch, out, jac)
-
-
 def _divided(found: Program, t: Array, u: Array, v: Array, p: Array, out: Array, jac: Array) -> list[tuple[Any, ...]]:
-    """Return the arguments of `_evaluate` for all points, in parts that begin with a block."""
+    """Return the arguments of `run` for all points, in parts that begin with a block."""
     blocks = -(-len(u) // LANES)
     ends = [min(len(u), LANES * (blocks * part // _PARTS)) for part in range(_PARTS)] + [len(u)]
-    return [(found, t[a:b], u[a:b], v[a:b], p, out[a:b], jac[a:b]) for a, b in zip(ends, ends[1:])]
+    return [(found, (t[a:b], u[a:b], v[a:b]), p, out[a:b], jac[a:b]) for a, b in zip(ends, ends[1:])]
 
 
 def _filling(function: Function, count: int, signature: Signature) -> Function:

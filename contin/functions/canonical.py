@@ -24,6 +24,7 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.iteration import operands_of, search_of, solved
+from contin.functions.recorded_arrays import NUMPY
 from contin.functions.recorded_function import RecordedFunction
 from contin.functions.recording import recorded_paths
 from contin.functions.tape import Number, Tape, Unrecordable
@@ -118,8 +119,10 @@ def _called(tape: Tape, what: str, function: Function, arguments: Sequence[Any],
     if count is not None and len(found) != count:
         raise ProblemError(f"{what} returns {len(found)} values, must return {count}")
     for value in found:
-        if value.known is not None and not math.isfinite(value.known):
-            raise ProblemError(f"{what} has no finite real value: {value.known}")
+        for place in tape.needed([value.place]):
+            known = tape.value(place)
+            if known is not None and not math.isfinite(known):
+                raise ProblemError(f"{what} has no finite real value: it contains {known}")
     return found
 
 
@@ -127,7 +130,7 @@ class _Inside:
     """Equations between the ends: operations on one tape, whose inputs are t, x, lambda and all parameters."""
 
     def __init__(self, variation: Variation, sigmas: int) -> None:
-        self.variation, self.tape = variation, Tape()
+        self.variation, self.tape = variation, Tape(NUMPY)
         v, tape = variation, self.tape
         n = len(v.states)
         self.t = tape.input("t")
@@ -291,7 +294,7 @@ class _Ends:
     """Conditions at the ends: operations on one tape, whose inputs are x and lambda at both ends, and all parameters."""
 
     def __init__(self, variation: Variation) -> None:
-        self.variation, self.tape = variation, Tape()
+        self.variation, self.tape = variation, Tape(NUMPY)
         v, tape = variation, self.tape
         n = len(v.states)
         self.a, self.b = ([tape.input(slot + 2 * n * end) for slot in range(2 * n)] for end in range(2))

@@ -8,6 +8,7 @@ from typing import Any
 
 from contin.errors import ProblemError
 from contin.functions import derivatives
+from contin.functions.recorded_arrays import NUMPY
 from contin.functions.recorded_function import RecordedFunction
 from contin.functions.recording import recorded_paths
 from contin.functions.tape import Tape, Unrecordable
@@ -37,7 +38,7 @@ def gradient(function: Callable[..., float], by: Sequence[str]) -> Callable[...,
     (18.0, 12.0, 9.0)
     """
     arguments = list(inspect.signature(function).parameters)
-    tape = Tape()
+    tape = Tape(NUMPY)
     inputs = [tape.input(name) for name in arguments]
     try:
         (value,) = recorded_paths(tape, function, lambda copy: [copy(*inputs)])

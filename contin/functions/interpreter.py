@@ -17,8 +17,10 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 from llvmlite import ir
 
+from contin.arrays import Array
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import (
     IndexMatrix,
@@ -32,7 +34,7 @@ from contin.functions.kernel_parts import (
     variable,
 )
 from contin.functions.primitives import TABLE
-from contin.functions.program import CODES
+from contin.functions.program import CODES, Program
 
 #: Points of a block. With 64 registers of many functions no longer fit into the first cache; with 16 instructions are read
 #: twice as often.
@@ -40,10 +42,18 @@ LANES = 32
 #: Numbers that arithmetic takes together: a vector register of AVX-512.
 _GROUP = 8
 
-_DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
+#: LLVM's type of floating-point numbers.
+_DOUBLE = ir.DoubleType()
+#: LLVM's type of whole numbers.
+_WORD = ir.IntType(64)
+#: LLVM's type of a group.
 _VECTOR = ir.VectorType(_DOUBLE, _GROUP)
-#: Bytes of a register, of a group, of an instruction.
-_REGISTER, _BYTES, _ROW = 8 * LANES, 8 * _GROUP, 40
+#: Bytes of a register.
+_REGISTER = 8 * LANES
+#: Bytes of a group.
+_BYTES = 8 * _GROUP
+#: Bytes of an instruction.
+_ROW = 40
 
 
 class Memory(NamedTuple):
@@ -479,16 +489,41 @@ def _address(array, offset):
     return array.ctypes.data + offset
 
 
+class Instructions(NamedTuple):
+    """A program as the kernel takes it; see `contin.functions.program.Program`."""
+
+    code: IndexMatrix
+    lists: IndexVector
+    scalars: Vector
+    tables: Vector
+
+
+class Points(NamedTuple):
+    """Points: ``t`` (K,), ``u`` (K, n), ``v`` (K, m), or (0, m) if no instruction reads it."""
+
+    t: Vector
+    u: Matrix
+    v: Matrix
+
+
+class Room(NamedTuple):
+    """The registers, and a small linear system."""
+
+    work: Vector
+    scratch: Matrix
+
+
 @kernel(reorder=False)
 def evaluate(
-    code: IndexMatrix, first: int, last: int, lists: IndexVector, scalars: Vector, tables: Vector, t: Vector, u: Matrix,
-    v: Matrix, work: Vector, scratch: Matrix, out: Matrix, jac: Stack,
-) -> None:  # fmt: skip
+    instructions: Instructions, first: int, last: int, points: Points, room: Room, out: Matrix, jac: Stack
+) -> None:
     """Run a program: its first stretch once, its second, up to the instruction ``last``, for each block of points.
 
-    ``t`` (K,), ``u`` (K, n) and ``v`` (K, n or 0) are the points; ``out`` (K, values) and ``jac`` (K, values, columns) are
-    filled where instructions store something. ``work`` holds the registers, ``scratch`` a small linear system.
+    ``out`` (K, values) and ``jac`` (K, values, columns) are filled where instructions store something.
     """
+    code, lists, scalars, tables = instructions.code, instructions.lists, instructions.scalars, instructions.tables
+    t, u, v = points.t, points.u, points.v
+    work, scratch = room.work, room.scratch
     widths = Widths(8 * u.shape[1], 8 * v.shape[1], 8 * out.shape[1], 8 * jac.shape[1] * jac.shape[2])
     count = u.shape[0]
     for block in range(-1, (count + LANES - 1) // LANES):
@@ -521,6 +556,14 @@ def evaluate(
                 if moving:
                     _give_up(work, lists, row, lanes)
             now += 1
+
+
+def run(program: Program, points: tuple[Array, Array, Array], p: Array, out: Array, jac: Array) -> None:
+    """Run a program at points (t, u, v) with parameters p; see `evaluate`."""
+    scalars = program.scalars.copy()
+    scalars[program.parameters : program.parameters + len(p)] = p
+    room = np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1))
+    evaluate((program.code, program.lists, scalars, program.tables), program.first, program.last, points, room, out, jac)
 
 
 #: Codes of the operations that are written in Python.

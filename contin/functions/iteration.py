@@ -16,7 +16,7 @@ import numpy as np
 
 from contin.errors import ProblemError
 from contin.functions import derivatives
-from contin.functions.recorded_arrays import recorded, select
+from contin.functions.recorded_arrays import NUMPY, recorded, select
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Number, Tape, Unrecordable
 
@@ -94,9 +94,9 @@ class Search:
             columns.append(solved(matrix, right, self.minimum))
         return columns
 
-    def evaluate(self, index: int, operands: Sequence[float]) -> float:
-        """Raise: an unknown is evaluated with its tape (`Tape.evaluate`)."""
-        raise NotImplementedError
+    def newton(self, tape: Tape, values: Mapping[Any, float]) -> list[float]:
+        """Return the unknowns in Python, for ``values`` of the inputs by slot."""
+        return newton(tape, self, dict(values))
 
 
 def solved(matrix: Sequence[Sequence[Any]], right: Sequence[Any], symmetric: bool) -> list[Any]:
@@ -147,7 +147,7 @@ def minimum(potential: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, .
     --------
     >>> from contin import minimum
     >>> minimum(lambda w: (w[0] - 3) ** 2 + w[0] ** 4 / 4, [0.0])
-    (1.2134116627622296,)
+    (1.4561642461359086,)
     """
     return _found(potential, start, True)
 
@@ -204,7 +204,7 @@ def _tape_of(function: Callable[..., Any], starts: Sequence[Any]) -> Tape | None
     known = recorded(starts)
     if known is not None:
         return known.tape
-    tape = Tape()
+    tape = Tape(NUMPY)
     try:
         result = function(tuple(tape.input(("probe", i)) for i in range(len(starts))))
     except Unrecordable:
@@ -280,7 +280,7 @@ def operands_of(tape: Tape, search: Search) -> list[Number]:
 
 def _in_python(function: Callable[..., Any], starts: Sequence[float], minimal: bool) -> tuple[float, ...]:
     """Return the unknowns for ordinary numbers."""
-    tape = Tape()
+    tape = Tape(NUMPY)
     try:
         search, _ = recorded_search(tape, function, starts, minimal)
     except Unrecordable as reason:

@@ -62,7 +62,7 @@ def _quiet(function: Callable[..., Any]) -> Callable[..., float]:
     return evaluate
 
 
-# --- simplifications: the value is the same for all finite operands -------------------------------------------------------------
+# --- simplifications: the value is the same; zero times a number only where it is finite, so not of what a user wrote -------------------------------------------------------------
 
 
 def _simple_add(tape: Any, places: tuple[int, ...]) -> int | None:
@@ -84,7 +84,7 @@ def _simple_sub(tape: Any, places: tuple[int, ...]) -> int | None:
         return a
     if tape.value(a) == 0:
         return int(tape.at("neg", (b,)))
-    if a == b:
+    if a == b and tape.decide is None:
         return int(tape.constant(0.0))
     operation = tape.operations[b]
     return int(tape.at("add", (a, operation.operands[0]))) if operation.name == "neg" else None
@@ -101,7 +101,7 @@ def _simple_product(tape: Any, places: tuple[int, ...]) -> int | None:
 def _simple_times(tape: Any, places: tuple[int, ...], name: str) -> int | None:
     for one, other in (places, places[::-1]):
         value, operation = tape.value(one), tape.operations[one]
-        if value == 0:
+        if value == 0 and tape.decide is None:
             return int(tape.constant(0.0))
         if value == 1:
             return other
@@ -116,7 +116,7 @@ def _simple_div(tape: Any, places: tuple[int, ...]) -> int | None:
     a, b = places
     if tape.value(b) == 1:
         return a
-    if tape.value(a) == 0:
+    if tape.value(a) == 0 and tape.decide is None:
         return int(tape.constant(0.0))
     operation = tape.operations[a]
     return int(tape.at("neg", (tape.at("div", (operation.operands[0], b)),))) if operation.name == "neg" else None
@@ -139,10 +139,8 @@ def _simple_select(tape: Any, places: tuple[int, ...]) -> int | None:
 
 
 def _of_pow(tape: Any, data: Any, operands: Any, result: Any) -> tuple[Any, Any]:
-    from contin.functions.tape import power
-
     x, y = operands
-    return y * power(x, y - 1.0), tape.apply("product", result, tape.apply("log", x))
+    return y * x ** (y - 1.0), tape.apply("product", result, tape.apply("log", x))
 
 
 def _of_select(tape: Any, data: Any, operands: Any, result: Any) -> tuple[Any, Any, Any]:
@@ -317,7 +315,7 @@ TABLE: dict[str, Primitive] = {
     # a piecewise polynomial; an unknown that is found by iteration
     "table": Primitive(lambda data, x: data.evaluate(x), _of_table, constant=lambda data, x: data.evaluate(x)),
     "root": Primitive(
-        lambda data, *operands: data[0].evaluate(data[1], operands),
+        lambda data, *operands: math.nan,  # `Tape.evaluate` finds it
         lambda tape, data, xs, r: data[0].partials(tape, data[1], xs),
     ),
 }  # fmt: skip

@@ -399,14 +399,3 @@ class _Stretch:
             if other.name == "root" and other.data[0] == search and other.operands == operation.operands:
                 self.registers[each] = at + other.data[1]
                 self.given.add(each)  # its register is not used again
-
-
-def evaluated(found: Program, points: Array, count: int) -> Array:
-    """Return the values of a program without parameters at points, shape (points, count)."""
-    from contin.functions.interpreter import LANES, evaluate  # that module needs this one
-
-    out, none = np.empty((len(points), count)), np.empty((0, 0))
-    work, scratch = np.empty(found.registers * LANES), np.empty((max(found.unknowns, 1), found.unknowns + 1))
-    given = np.zeros(len(points)), points, none, work, scratch, out, np.empty((0, 0, 0))
-    evaluate(found.code, found.first, found.last, found.lists, found.scalars.copy(), found.tables, *given)
-    return out

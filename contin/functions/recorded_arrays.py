@@ -453,3 +453,13 @@ FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.any: _reduction("logical_or"), np.all: _reduction("logical_and"),
     np.real: lambda a: a, np.imag: lambda a: 0.0 * a, np.asarray: lambda a, *_, **__: numbers(_plain(a)),
 }  # fmt: skip
+
+
+class NumPy:
+    """NumPy for recorded numbers, as a `Tape` has it."""
+
+    universal = staticmethod(ufunc_of_numbers)
+    function = staticmethod(function_of_numbers)
+
+
+NUMPY = NumPy()

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from contin.functions.recorded_arrays import recorded
+from contin.functions.interpreter import run
+from contin.functions.program import Inputs, program
+from contin.functions.recorded_arrays import NUMPY, recorded
 from contin.functions.signature import Arguments
 from contin.functions.tape import Tape
 
@@ -63,7 +65,12 @@ class RecordedFunction:
         for argument in arguments:
             values += _flat(argument)
         slots = [self._tape.operations[place].data for place in self._inputs]
-        return tuple(self._tape.evaluate_arrays(self._results, dict(zip(slots, np.broadcast_arrays(*values)))))
+        columns = [np.asarray(value, dtype=float) for value in np.broadcast_arrays(*values)]
+        found = program(self._tape, list(zip(self._results, range(len(self._results)))), Inputs(dict(zip(slots, range(len(slots)))), {}, {}))
+        u = np.ascontiguousarray(np.stack([column.ravel() for column in columns], axis=1))
+        out, none = np.empty((len(u), len(self._results))), np.empty((0, 0))
+        run(found, (np.zeros(len(u)), u, none), none.ravel(), out, np.empty((0, 0, 0)))
+        return tuple(np.ascontiguousarray(out.T).reshape(-1, *columns[0].shape))
 
     def text(self) -> str:
         """Return the operations as lines of Python."""
@@ -77,7 +84,7 @@ class RecordedFunction:
 
     def compact(self) -> RecordedFunction:
         """Return the same function on a tape of its own, which has what it needs and nothing else."""
-        tape = Tape()
+        tape = Tape(NUMPY)
         inputs = {place: tape.input(self._tape.operations[place].data) for place in self._inputs}
         results = [number.place for number in tape.replay(self._tape, self._results, inputs)]
         places = [inputs[place].place for place in self._inputs]

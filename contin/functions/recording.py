@@ -17,7 +17,7 @@ import numpy as np
 from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.program import TIME
-from contin.functions.recorded_arrays import _plain, numbers
+from contin.functions.recorded_arrays import NUMPY, _plain, numbers
 from contin.functions.recorded_function import RecordedFunction
 from contin.functions.signature import Arguments, Signature, argument_count, named_values, takes_arrays
 from contin.functions.stand_ins import prepared
@@ -62,7 +62,7 @@ def record(functions: Sequence[Function], counts: Sequence[int], signature: Sign
     ------
     Unrecordable
     """
-    tape = Tape()
+    tape = Tape(NUMPY)
     time = tape.input(TIME)
     inputs = [tape.input(slot) for slot in range(signature.inputs)]
     results: list[int] = []
@@ -268,7 +268,7 @@ def function_of(function: Function, arguments: Arguments, count: int | None = No
     ------
     Unrecordable
     """
-    tape, single = Tape(), True
+    tape, single = Tape(NUMPY), True
     places: list[int] = []
 
     def inputs(names: Any) -> Any:

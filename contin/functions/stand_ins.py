@@ -348,6 +348,7 @@ def _hypot(*values: Any) -> Any:
     return operation("hypot")(*values) if len(values) == 2 else operation("sqrt")(scalar_product(values, values))
 
 
+#: What stands for functions that take ordinary numbers only.
 _STAND_INS: dict[Any, Any] = {getattr(math, name): _of_math(name) for name in _OF_MATH if hasattr(math, name)}
 _STAND_INS |= {
     math.log: _unless_recorded(math.log, _log), math.hypot: _unless_recorded(math.hypot, _hypot),

@@ -45,6 +45,8 @@ class Tape:
     Attributes
     ----------
     operations : list of Operation
+    arrays : optional
+        NumPy for recorded numbers, `contin.functions.recorded_arrays.NUMPY`: ``arrays.universal(...)``, ``arrays.function(...)``.
     decide : callable, optional
         ``decide(condition)`` returns the outcome that the present recording assumes where a function asks for the truth of a
         number. Without it such a question raises `Unrecordable`.
@@ -58,8 +60,9 @@ class Tape:
     ['input', 'constant', 'add', 'mul']
     """
 
-    def __init__(self) -> None:
+    def __init__(self, arrays: Any = None) -> None:
         self.operations: list[Operation] = []
+        self.arrays = arrays
         self.decide: Callable[[int], bool] | None = None
         self.searches = 0  # in the present recording: names their unknowns
         self._known: dict[Any, int] = {}
@@ -222,27 +225,15 @@ class Tape:
                 found[place] = evaluate(operation.data, *(found[operand] for operand in operation.operands))
         return [float(found[place]) for place in places]
 
-    def evaluate_arrays(self, places: Sequence[int], values: Mapping[Any, Any]) -> list[Any]:
-        """Return the values of operations for arrays of the inputs by slot, all of one shape."""
-        from contin.functions.program import Inputs, evaluated, program  # that module needs this one
-
-        slots = {slot: column for column, slot in enumerate(values)}
-        found = program(self, list(zip(places, range(len(places)))), Inputs(slots, {}, {}))
-        arrays = [np.asarray(value, dtype=float) for value in values.values()]
-        points = np.ascontiguousarray(np.stack([array.ravel() for array in arrays], axis=1))
-        columns = evaluated(found, points, len(places))
-        return [columns[:, column].reshape(arrays[0].shape) for column in range(len(places))]
-
     def lines(self, places: Sequence[int], labels: Mapping[int, str]) -> list[str]:
         """Return operations as lines of text, with ``labels`` of inputs by place; what is used once stands where it is used."""
         return _Printer(self, places, labels).lines()
 
     def _unknown(self, operation: Operation, values: Mapping[Any, float]) -> float:
         """Return an unknown that is found by iteration."""
-        from contin.functions.iteration import newton  # that module needs this one
-
         search, index = operation.data
-        return newton(self, search, dict(values))[index]
+        found: float = search.newton(self, values)[index]
+        return found
 
 
 class Number:
@@ -387,14 +378,16 @@ class Number:
         return self.tape.apply("ceil", self)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
-        from contin.functions.recorded_arrays import ufunc_of_numbers  # that module needs this one
-
-        return ufunc_of_numbers(ufunc, method, inputs, options)
+        return self._arrays.universal(ufunc, method, inputs, options)
 
     def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
-        from contin.functions.recorded_arrays import function_of_numbers
+        return self._arrays.function(function, inputs, options)
 
-        return function_of_numbers(function, inputs, options)
+    @property
+    def _arrays(self) -> Any:
+        if self.tape.arrays is None:
+            raise Unrecordable("it calls NumPy where only arithmetic is recorded")
+        return self.tape.arrays
 
 
 def _is_scalar(value: Any) -> bool:

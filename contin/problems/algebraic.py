@@ -89,7 +89,7 @@ class AlgebraicProblem(Restated):
         """Names of the states: ``states``, also where a number was given."""
         return cast(tuple[str, ...], self.states)
 
-    def signatures(self) -> Mapping[str, Arguments]:
+    def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         return {"residual": self._signature.arguments, "functionals": self._signature.arguments}
 
@@ -147,10 +147,21 @@ class AlgebraicProblem(Restated):
         count, states, parameters = self.equation_size, len(self.state_names), len(self.parameters)
         if self.pattern is None and self.jacobian is None:
             return None
-        equations, inputs = _entries(self.pattern, (count, states))
+        equations, inputs = self.entries
         by_parameters = np.repeat(states + np.arange(parameters), count)
         equations = np.concatenate([equations, np.tile(np.arange(count), parameters)])
         return equations, np.concatenate([inputs, by_parameters])
+
+    @functools.cached_property
+    def entries(self) -> tuple[Indices, Indices]:
+        """Equations and states of the entries of the given pattern; none without one.
+
+        Raises
+        ------
+        ProblemError
+            The pattern does not fit.
+        """
+        return _entries(self.pattern, (self.equation_size, len(self.state_names)))
 
     @functools.cached_property
     def compared(self) -> list[bool]:

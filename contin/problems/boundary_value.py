@@ -112,7 +112,7 @@ class BoundaryValueProblem(Restated):
             self._batches[name] = self._compiled(name)
         return self._batches[name]
 
-    def signatures(self) -> Mapping[str, Arguments]:
+    def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         point = self._of_point.arguments
         return {"rhs": point, "boundary": self._of_ends.arguments, "integrals": point, "functionals": point}

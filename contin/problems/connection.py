@@ -96,7 +96,7 @@ class ConnectionProblem(BoundaryValueProblem):
         super().__init__(rhs, boundary, names, {**parameters, TIME: 1.0, **dict.fromkeys(own[1:], 0.0)})
         object.__setattr__(self, "functionals", {"gap": found_elsewhere})
 
-    def signatures(self) -> Mapping[str, Arguments]:
+    def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         return {"field": Signature(self.state_names, tuple(self.parameters), times=False).arguments}
 

@@ -122,7 +122,7 @@ class CycleProblem(BoundaryValueProblem):
         columns = [*extremes, PERIOD] if forced else extremes
         object.__setattr__(self, "functionals", {**dict.fromkeys(columns, found_elsewhere), **means})
 
-    def signatures(self) -> Mapping[str, Arguments]:
+    def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         states, own = self.state_names, (PERIOD, ROUNDS)
         parameters = tuple(name for name in self.parameters if name not in own)

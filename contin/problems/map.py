@@ -58,7 +58,7 @@ class MapProblem(AlgebraicProblem):
             names = ", ".join(self.state_names)
             raise ProblemError(f"map returns {self.equation_size} values for the {len(self.state_names)} states {names}")
 
-    def signatures(self) -> Mapping[str, Arguments]:
+    def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         return {"map": self._signature.arguments, "functionals": self._signature.arguments}
 

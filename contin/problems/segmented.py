@@ -133,7 +133,7 @@ class SegmentedProblem(BoundaryValueProblem):
             functionals=_sums(given, pieces),
         )  # fmt: skip
 
-    def signatures(self) -> Mapping[str, Any]:
+    def _signatures(self) -> Mapping[str, Any]:
         """Return the arguments of the functions."""
         names, parameters = [piece.names for piece in self.pieces], tuple(self.parameters)
         found: dict[str, Any] = {"boundary": [names, names, parameters]}

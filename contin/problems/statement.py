@@ -64,12 +64,12 @@ class Restated:
         object.__setattr__(made, "_stated", {**dict(zip(names, arguments)), **options})
         return made
 
-    def signatures(self) -> Mapping[str, Arguments]:
+    def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions that the problem is stated with, by the name of the field."""
         return {}
 
     def __reduce__(self) -> Any:
-        signatures = self.signatures()
+        signatures = self._signatures()
         stated = {name: portable(value, signatures.get(name)) for name, value in self._stated.items()}
         return _restated, (type(self), stated)
 
@@ -78,7 +78,7 @@ class Restated:
             return True
         if not isinstance(other, Restated) or type(self) is not type(other):
             return False
-        ours, theirs, signatures = self._compared(), other._compared(), self.signatures()
+        ours, theirs, signatures = self._compared(), other._compared(), self._signatures()
         return ours.keys() == theirs.keys() and all(_equal(ours[name], theirs[name], signatures.get(name)) for name in ours)
 
     def __hash__(self) -> int:

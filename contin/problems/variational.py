@@ -138,7 +138,7 @@ class VariationalProblem(BoundaryValueProblem):
             {**parameters, **dict.fromkeys(self.multipliers, 0.0)}, derived.integrals, domain, derived.functionals,
         )  # fmt: skip
 
-    def signatures(self) -> Mapping[str, Arguments]:
+    def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         v = self.variation
         inside: Arguments = [None, v.states, v.controls, v.parameters]

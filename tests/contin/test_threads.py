@@ -128,11 +128,11 @@ def test_a_branch_has_the_same_bits(use):
 # --- users' functions --------------------------------------------------------------------------------------------------
 
 
-def overflow_then_division(t, u, p):
-    """Python's exceptions, the division at later places than the overflow."""
-    if u.x.real > 40:
+def raises(t, u, p):
+    """Python's errors of arithmetic beyond 20 and 40: there is no value there."""
+    if u.x > 40:
         raise ZeroDivisionError("too large")
-    if u.x.real > 20:
+    if u.x > 20:
         raise OverflowError("large")
     return (u.x * p.a,)
 
@@ -141,9 +141,9 @@ def quotient(t, u, p):
     return (p.a / (u.x - 30.0),)
 
 
-@pytest.mark.parametrize(("function", "order"), [(overflow_then_division, 1), (overflow_then_division, -1), (quotient, 1)])
-def test_what_functions_raise_is_the_same(function, order, use):
-    u, none, p = np.arange(50.0)[::order, None].copy(), np.empty((0, 1)), np.array([2.0])
+@pytest.mark.parametrize("function", [raises, quotient])
+def test_where_functions_have_no_value_is_the_same(function, use):
+    u, none, p = np.arange(500.0)[:, None].copy(), np.empty((0, 1)), np.array([2.0])
     known = None
     for count in SOME:
         use(count)
@@ -152,9 +152,7 @@ def test_what_functions_raise_is_the_same(function, order, use):
             found = [outcome(evaluate, batch, u, none, p) for evaluate in (values, jacobian)]
             known = known or found
             assert found == known
-    assert function is quotient or known[0] == (
-        (OverflowError, ("large",)) if order > 0 else (ZeroDivisionError, ("too large",))
-    )
+    assert function is quotient or known[0][20:22] == [[40.0], [-1.0]]
 
 
 def outcome(evaluate, *given):

@@ -1,4 +1,4 @@
-"""Compiled functions: values, exact derivatives, and what is said of functions that cannot be compiled."""
+"""Functions of a point, recorded: values and exact derivatives."""
 
 import math
 
@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from contin import BoundaryValueProblem, ProblemError
-from contin.errors import InterpretedWarning
 from contin.functions.batch import Batch
 
 
@@ -101,8 +100,8 @@ def test_states_and_parameters_may_have_the_names_of_globals():
     assert values[0].tolist() == [6.0, 2.0]
 
 
-def test_what_numba_itself_does_not_expect_is_a_sentence():
-    """numba asserts that a nested list has numbers of one kind."""
+def test_a_matrix_made_inside():
+    """A list of lists of whole and other numbers."""
 
     def rhs(t, u, p, out):
         matrix = np.array([[1.0, 2], [0, 1]])
@@ -110,8 +109,7 @@ def test_what_numba_itself_does_not_expect_is_a_sentence():
         out[1] = u[0]
 
     batch = Batch([rhs], [2], ["a", "b"], ["k"])
-    with pytest.warns(InterpretedWarning, match="'rhs' cannot be compiled.*0.0, not 0"):
-        jacobian = batch.jacobian(np.zeros(1), np.zeros((1, 2)), np.empty((0, 2)), np.zeros(1), batch.columns([]))[1]
+    jacobian = batch.jacobian(np.zeros(1), np.zeros((1, 2)), np.empty((0, 2)), np.zeros(1), batch.columns([]))[1]
     assert jacobian.tolist() == [[[0.0, 2.0], [1.0, 0.0]]]
 
 
@@ -130,28 +128,3 @@ def test_one_function_of_other_states_is_another_batch():
     for parameters, b in ((["a", "b"], 2.0), (["b", "a"], 1.0)):
         batch = Batch([lambda t, u, p: p.b], [0], ["x"], parameters)
         assert batch.values(np.zeros(1), np.zeros((1, 1)), np.empty((0, 1)), np.array([1.0, 2.0])).tolist() == [[b]]
-
-
-def test_parameters_that_are_not_read():
-    """Functions that read the same parameters have one compiled code; the columns of the others are zero."""
-    given = {"states": ["x"], "reads": ["a", "c"]}
-
-    def rate(t, u, p):
-        return (p.a * u.x + p.c,)
-
-    first = Batch([rate], [1], parameters=["a", "b", "c"], **given)
-    second = Batch([rate], [1], parameters=["d", "c", "a"], **given)
-    assert first._evaluate is second._evaluate
-    place = np.zeros(1), np.array([[2.0]]), np.empty((0, 1))
-    for batch, p in ((first, [3.0, 5.0, 7.0]), (second, [5.0, 7.0, 3.0])):
-        values, jacobian = batch.jacobian(*place, np.array(p), batch.columns([0, 1, 2]))
-        assert values[0, 0] == batch.values(*place, np.array(p))[0, 0] == 13.0
-        by_name = dict(zip(["x", *(["a", "b", "c"] if batch is first else ["d", "c", "a"])], jacobian[0, 0]))
-        assert by_name == {"x": 3.0, "a": 2.0, "c": 1.0, ("b" if batch is first else "d"): 0.0}
-
-
-def test_a_batch_without_derivatives():
-    batch = Batch([lambda t, u, p: u.x**2], [0], ["x"], [], derivatives=False)
-    assert batch.values(np.zeros(1), np.array([[3.0]]), np.empty((0, 1)), np.empty(0))[0, 0] == 9.0
-    with pytest.raises(ProblemError, match="without them"):
-        batch.columns([])
