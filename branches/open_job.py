@@ -20,6 +20,7 @@ from branches.config import ConfigError, dump
 from branches.job import Interruption, is_done, writing
 from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
+from branches.open_errors import errors_of
 from branches.store import BranchWriter, Kind, read_kept, read_state
 from contin import (
     Branch,
@@ -33,12 +34,16 @@ from contin import (
     Stop,
     exact_text,
     load,
+    point_of,
     save,
 )  # fmt: skip
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, angles_of
 from ribbon_model.open_strip import REACTIONS, OpenStrip
 
+#: A stage may start outside its limits by this part of them: it may start where another one has stopped. Points at limits are
+#: located to 1e-12; ten times larger, starts that are outside by that are taken for starts at the limit.
+_SLACK = 1e-9
 #: A state keeps a symmetry that moves it by less than this.
 _KEEPS = 1e-6
 #: Directions of reactions and their ends, in words.
@@ -150,9 +155,11 @@ def writer_of(config: OpenConfig, path: Path | None, image: bytes | None = None)
     columns += tuple((name, "f8", text) for name, text in meaning.items())
     columns += (("F_roller", "f8", "force of the roller on the strip"),) if config.roller else ()
     length = "1" if config.dimensions is None else f"1 ({exact_text(config.dimensions.length)} m)"
-    modulus = "1" if config.dimensions is None else f"1 ({config.dimensions.modulus:.12g} N m^2)"
+    modulus = "1" if config.dimensions is None else f"1 ({config.modulus:.12g} N m^2)"
     table = Table.of(config)
-    kind = Kind(OPEN, f"bending modulus B = {modulus}, length L = {length}", columns, _Row(config, table))
+    row, units = _Row(config, table), f"bending modulus B = {modulus}, length L = {length}"
+    uncertain = (*table.functionals, "potential", *REACTIONS, *(("F_roller",) if config.roller else ()))
+    kind = Kind(OPEN, units, columns, row, uncertain, row.errors)
     followed = list(dict.fromkeys(stage.follow for stage in config.stages))
     return BranchWriter(path, dump(config), table, followed, config.stride, image, Watch(config.strip()), kind)
 
@@ -194,6 +201,16 @@ class _Row:
             absent |= dict(zip(ANGLES, angles_of(states[-1, :4])))
         own = {"stage": self.stage, "potential": strip.potential(point), **strip.reactions_of(states)}
         return absent | own
+
+    def errors(self, point: Point) -> dict[str, float]:
+        """Return the errors of forces, moments, energies and places at a labelled point."""
+        return errors_of(point, self._found)
+
+    def _found(self, point: Point) -> dict[str, float]:
+        """Return the columns that are found, not prescribed."""
+        strip = self._config.strip(self.stage)
+        reactions = strip.reactions_of(point.system.states(point.x))
+        return {**point.functionals, "potential": strip.potential(point), **reactions}
 
 
 def first_state(config: OpenConfig) -> Point:
@@ -313,7 +330,28 @@ def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
 
 
 def _run(config: OpenConfig, number: int, origin: Point) -> Continuation:
-    """Return the run of a stage."""
+    """Return the run of a stage.
+
+    Raises
+    ------
+    ConfigError
+        The stage starts outside its limits, or not from this point.
+    """
+    run = _begun(config, number, origin)
+    start = point_of(run.state.system, run.state.x)
+    for name, (low, high) in run.settings.limits.items():
+        slack = _SLACK * max(abs(low), abs(high), high - low)
+        if not low - slack <= start[name] <= high + slack:
+            here, *ends = (f"{config.factor(name) * value:.10g}" for value in (start[name], low, high))
+            words, unit = " to ".join(ends), f" {config.unit(name)}".rstrip()
+            first = "stage 1: " if number == 1 else ""  # later ones are named by the caller
+            where = f"limits: {name} = {here}{unit} at the start of the stage is outside its limits, {words}{unit}"
+            raise ConfigError(f"{first}{where}; widen them, or start at another point")
+    return run
+
+
+def _begun(config: OpenConfig, number: int, origin: Point) -> Continuation:
+    """Return the run of a stage from a point."""
     stage, strip = config.stages[number - 1], config.strip(number)
     changed = origin.system.problem is not strip.problem or bool(stage.numbers)
     if stage.start_at is not None and stage.start_at.startswith("BP"):

@@ -44,7 +44,9 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
 
     Raises
     ------
-    ProblemError, ConvergenceError
+    ProblemError
+        The start lies outside the limits, is no branch point where ``branch`` is given, or does not fit otherwise.
+    ConvergenceError
 
     Examples
     --------
