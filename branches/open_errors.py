@@ -64,9 +64,9 @@ def _moved(point: Point, columns: Columns, here: Mapping[str, float]) -> dict[st
 
 
 def _round_off(point: Point, name: str, here: Mapping[str, float]) -> float:
-    """Return what Newton's method and round-off leave, relative to the column, or to the largest of all forces or moments."""
+    """Return what Newton's method and round-off leave, relative to 1, the column, the largest force or moment."""
     kind = [abs(value) for other, value in here.items() if _kind(other) == _kind(name)]
-    return (point.newton_error + _UNITS * float(np.finfo(float).eps)) * max(kind)
+    return (point.newton_error + _UNITS * float(np.finfo(float).eps)) * max(1.0, *kind)
 
 
 def _kind(name: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import itertools
 import math
 import tempfile
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from branches.advice import no_state, reached
 from branches.config import ConfigError, dump
 from branches.job import Interruption, is_done, writing
 from branches.layout import OPEN
@@ -27,6 +29,7 @@ from contin import (
     BranchPoint,
     ContinError,
     Continuation,
+    ConvergenceError,
     MeshControl,
     Point,
     ProblemError,
@@ -290,7 +293,7 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
     (display, interruption), number = others, len(labelled)
     writer.kind.values.stage = number
     display.stage(config, number)
-    for point in run:
+    for point in (_named(config, point) for point in run):
         display.stage_point(config, config.stages[number - 1], point, writer.count)
         writer.append(point)
         labelled[-1] += [point] if point.label else []
@@ -304,12 +307,38 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
         if writer.due():
             writer.checkpoint(run.start, "running")
     writer.flush()
-    if run.stop.reason == "no convergence" or run.stop.message.startswith("met "):
-        why = config.strip(number).explained(run)
-        stop = dataclasses.replace(run.stop, message=f"stage {number}: {why}", advice="")
+    stop = _told(config, number, run, labelled[-1][-1])
+    if stop.reason in ("no convergence", "event"):
+        stop = dataclasses.replace(stop, message=f"stage {number}: {stop.message}")
         writer.checkpoint(run.start, "lost", stop)
         return "lost", stop
+    run.stop = stop
     return None
+
+
+def _told(config: OpenConfig, number: int, run: Continuation, last: Point) -> Stop:
+    """Return why a stage ended, in the fields and units of the scene."""
+    name = config.stages[number - 1].follow
+    law = config.strip(number).explained(run) if run.stop.reason in ("no convergence", "event") else None
+    if law is not None:
+        return Stop(run.stop.reason, law)
+    if run.stop.reason == "no convergence":
+        here = run.state.system.parameter(run.state.x, name)
+        return no_state(run, _shown(config, name, here))
+    return reached(run.stop, last, run, functools.partial(_shown, config))
+
+
+def _shown(config: OpenConfig, name: str, value: float) -> str:
+    """Return a number as a scene states it, with its unit."""
+    return f"{name} = {value * config.factor(name):.10g} {config.unit(name)}".rstrip()
+
+
+def _named(config: OpenConfig, point: Point) -> Point:
+    """Return a point at a value of a column with the value in the units of the scene."""
+    name, equals, _ = point.name.partition(" = ")
+    if not equals or config.dimensions is None or name not in (*point.parameters, *point.functionals):
+        return point
+    return dataclasses.replace(point, name=f"{name} = {point[name] * config.factor(name):.6g} {config.unit(name)}".rstrip())
 
 
 def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
@@ -337,7 +366,14 @@ def _run(config: OpenConfig, number: int, origin: Point) -> Continuation:
     ConfigError
         The stage starts outside its limits, or not from this point.
     """
-    run = _begun(config, number, origin)
+    try:
+        run = _begun(config, number, origin)
+    except ConvergenceError as error:
+        followed = config.stages[number - 1].follow
+        raise ConfigError(
+            f"follow: {followed!r}: the state at the start of the stage was not found again with this number free; follow "
+            "another one first, or refine the mesh (mesh.intervals, mesh.tolerance)"
+        ) from error
     start = point_of(run.state.system, run.state.x)
     for name, (low, high) in run.settings.limits.items():
         slack = _SLACK * max(abs(low), abs(high), high - low)
@@ -365,8 +401,12 @@ def _begun(config: OpenConfig, number: int, origin: Point) -> Continuation:
         return Continuation(system, x, _settings(config, number, system.parameter(x, stage.follow)))
     except ValueError as error:
         raise ConfigError(f"start, finish: {error}") from error
+    except ConvergenceError as error:
+        given = ", ".join(f"{name} = {exact_text(value)}" for name, value in stage.numbers.items())
+        where = f"near the one before{f' with {given}' if given else ' with these ends'}"
+        raise ConfigError(f"numbers: no state was found {where}; follow the changes in stages") from error
     except ContinError as error:
-        raise ConfigError(f"numbers: no state was found near the one before ({error}); follow them in a stage") from error
+        raise ConfigError(f"numbers: {error}") from error
 
 
 def _switched(config: OpenConfig, number: int, origin: Point, changed: bool) -> tuple[Settings, np.ndarray]:

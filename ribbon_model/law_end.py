@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from contin import Collocation, TestFunction, Trial
+from contin import Collocation, Continuation, TestFunction, Trial
 from ribbon_model.equilibrium import moment_on_directors
 from ribbon_model.laws import FINITE_WIDTH, RIBBON
 from ribbon_model.material import Material
@@ -18,10 +18,8 @@ Strains = Callable[[Collocation, np.ndarray], np.ndarray]
 
 #: Why a run ends where its law does.
 _REASONS = {
-    RIBBON.name: "the end of the law 'ribbon', which has no value where the bending or the twisting modulus vanishes; the "
-    "law 'finite width' goes on",
-    FINITE_WIDTH.name: "the end of the law 'finite width', whose energy is not convex at larger twist; the law 'flat rod' "
-    "goes on",
+    RIBBON.name: "which has no value where the bending or the twisting modulus vanishes; the law 'finite width' goes on",
+    FINITE_WIDTH.name: "whose energy is not convex at larger twist; the law 'flat rod' goes on",
 }
 #: A run that fails with a smaller margin of its law has met the end of it. The margin falls like a square root there.
 _NEARLY_ENDED = 0.1
@@ -50,16 +48,16 @@ def tests(material: Material, strains: Strains) -> list[TestFunction]:
         RIBBON.name: functools.partial(_ribbon_margin, material),
         FINITE_WIDTH.name: functools.partial(_convexity, material, strains),
     }[law.name]
-    return [TestFunction("EP", _REASONS[law.name], margin, terminal=True)]
+    return [TestFunction("EP", f"the end of the law {law.name!r}", margin, terminal=True)]
 
 
-def explained(material: Material, strains: Strains, run) -> str:
-    """Return why a run failed: the end of the law where its state is near it, else the run's own reason."""
+def explained(material: Material, strains: Strains, run: Continuation) -> str | None:
+    """Return that a run met the end of the law, or failed near it, in a sentence; None for a run that stopped elsewhere."""
     for test in tests(material, strains):
-        state = run.state
-        if test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
-            return test.name
-    return str(run.stop)
+        state, met = run.state, run.stop is not None and run.stop.message == f"met {test.name}"
+        if met or test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
+            return f"{test.name}, {_REASONS[material.law]}"
+    return None
 
 
 def _ribbon_margin(material: Material, trial: Trial) -> float:
