@@ -44,9 +44,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
 
     Raises
     ------
-    ProblemError
-        The start lies outside the limits, is no branch point where ``branch`` is given, or does not fit otherwise.
-    ConvergenceError
+    ProblemError, ConvergenceError
 
     Examples
     --------
