@@ -295,7 +295,8 @@ def _in_order(graph, edges) -> list[dict]:
 def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = None) -> list[dict]:
     """Return all equilibria of the diagram at a natural curvature: planar circles and points on branches, by energy.
 
-    Values between computed points come from a cubic spline over arclength.
+    Values between computed points come from a cubic spline over arclength; `branches.at_value` solves them. States on branches
+    have the number of their ``edge`` and their ``arclength`` on it.
     """
     found = []
     materials = {family[:2] for family in families(graph) if law in (None, family[0]) and nu in (None, family[1])}
@@ -303,11 +304,16 @@ def states_at(graph, kappa_n: float, law: str | None = None, nu: float | None = 
     for law_, nu_, m in sorted({(data["law"], data["nu"], data["covering"]) for data in nodes}):
         if (law_, nu_) in materials:
             found.append({"law": law_, "nu": nu_, "circle": m, **_planar(law_, nu_, m, kappa_n)})
-    edges = [data for *_, data in graph.edges(data=True) if law in (None, data["law"]) and nu in (None, data["nu"])]
-    for number, place in places(edges, "kappa_n", kappa_n, COLUMNS[2:]):
-        data = edges[number]
+    edges = [
+        (edge, data)
+        for edge, (*_, data) in enumerate(graph.edges(data=True))
+        if law in (None, data["law"]) and nu in (None, data["nu"])
+    ]
+    for number, place in places([data for _, data in edges], "kappa_n", kappa_n, ("arclength", *COLUMNS[2:])):
+        edge, data = edges[number]
         left = {"origin": data["origin"]} if "origin" in data else {}
-        found.append({"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **left, **place})
+        about = {"law": data["law"], "nu": data["nu"], "branch": (data["m"], data["n"]), **left}
+        found.append({**about, "kappa_n": kappa_n, "edge": edge, **place})
     return sorted(found, key=lambda state: (state["law"], state["nu"], state["energy"]))
 
 

@@ -224,13 +224,30 @@ def _describe_stage(config, event) -> str:
     name = config.stages[event["stage"] - 1].follow
     label, error = event["label"].decode(), event[f"error_{name}"] * config.factor(name)
     found = label in ("LP", "BP") and not math.isnan(error)
+    others = "".join(f", {text}" for text in (_with_error(config, event, column) for column in _shown(name)) if text)
     place = f"{name} = {event[name] * config.factor(name):.10g}" + (f" (± {error:.0e})" if found else "")
     what = event["name"].decode()
     change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
     broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""
     shown = what if "=" not in what and (label not in ("LP", "BP") or "kernel" in what) else ""  # not the value once more
     kind = f" ({shown})" if shown else ""
-    return f"stage {event['stage']}: {label_of(label).word}{kind} at {place}{change}{broken}"
+    return f"stage {event['stage']}: {label_of(label).word}{kind} at {place}{others}{change}{broken}"
+
+
+def _shown(name: str) -> tuple[str, ...]:
+    """Return the columns that a labelled point is shown with: the energy, and what is conjugate to the followed number."""
+    from branches.open_branch import CONJUGATE  # not for --help
+
+    return tuple(dict.fromkeys(("energy", CONJUGATE.get(name, "energy"))))
+
+
+def _with_error(config, event, column: str) -> str:
+    """Return a column of a labelled point with its error, '' where it has none."""
+    if f"error_{column}" not in event.dtype.names or math.isnan(event[f"error_{column}"]):
+        return ""
+    value, error = (event[field] * config.factor(column) for field in (column, f"error_{column}"))
+    unit = config.unit(column)
+    return f"{column} = {value:.10g}{f' {unit}' if unit else ''} (± {error:.0e})"
 
 
 def _describe(config, event) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from branches.draw_branch import choose, letters
@@ -80,7 +82,7 @@ def centred(shape: Shape, up) -> Shape:
     """Return the shape with this direction upwards, in the middle of the picture."""
     shape = standing(shape, up)
     middle = (shape.centreline.max(axis=0) + shape.centreline.min(axis=0)) / 2
-    return Shape(shape.arclength, shape.centreline - middle, shape.directors, shape.eta)
+    return replace(shape, centreline=shape.centreline - middle)
 
 
 def width_of(branch, strips, asked: float | None) -> float:

@@ -55,7 +55,7 @@ def standing(shape: Shape, up: tuple[float, float, float] = DIRECTIONS["normal"]
     x = np.array(ahead) - z * (z @ ahead)
     x /= np.linalg.norm(x)
     axes = np.array([x, np.cross(z, x), z])
-    return Shape(shape.arclength, shape.centreline @ axes.T, shape.directors @ axes.T, shape.eta)
+    return replace(shape, centreline=shape.centreline @ axes.T, directors=shape.directors @ axes.T)
 
 
 def steady(strips: dict) -> dict:
@@ -132,7 +132,7 @@ def _samples(shape, width: float, scale: float) -> tuple[np.ndarray, np.ndarray,
     s, keep = np.unique(shape.arclength, return_index=True)
     edges = np.linalg.norm(np.diff(shape.surface(width), axis=0), axis=2).sum(axis=0).max()
     fine = np.linspace(s[0], s[-1], math.ceil(1.05 * edges * scale * _DENSE) + 2)
-    ruling = shape.directors[:, 0] + shape.eta[:, None] * shape.directors[:, 2]
+    ruling = shape.rulings()
     middle = CubicHermiteSpline(s, shape.centreline[keep], shape.directors[keep, 2])(fine)  # the tangent is d3
     ruling, normal = CubicSpline(s, np.stack([ruling, shape.directors[:, 1]], axis=1)[keep])(fine).transpose(1, 0, 2)
     count = math.ceil(width * np.linalg.norm(ruling, axis=1).max() * scale * _DENSE) + 2

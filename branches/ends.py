@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from branches.advice import no_state
 from branches.config import Config
 from contin import Continuation, Point, Stop
 from ribbon_model import convexity
@@ -57,16 +58,15 @@ def is_threshold(config: Config, index: int, kappa_n: float, error: float) -> bo
 
 
 def _explained(run: Continuation, config: Config) -> Stop | None:
-    """Return why a run failed: its own reason, or the end of the law."""
+    """Return why a run failed: the end of the law, or that no state was found, with what to change."""
     margin, state, stop = convexity.margin(LAWS[config.law]), run.state, run.stop
-    if margin is None or stop is None or stop.reason != "no convergence":
-        return stop
-    if np.all(np.isfinite(state.system.residual(run.predicted(run.settings.min_step)))):
-        return stop
-    left = margin(state.system, state.x)
-    if left > _NEARLY_CONVEX:
+    if stop is None or stop.reason != "no convergence":
         return stop
     value = Solution.at(state.system, state.x).parameters["kappa_n"]
+    finite = np.all(np.isfinite(state.system.residual(run.predicted(run.settings.min_step))))
+    left = math.inf if margin is None or finite else margin(state.system, state.x)
+    if left > _NEARLY_CONVEX:
+        return no_state(run, f"kappa_n = {value:.6g}")
     return Stop(
         "no convergence",
         f"the law has no response beyond kappa_n = {value:.6g}: its strain energy loses its convexity close by "

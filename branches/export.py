@@ -25,6 +25,9 @@ EXIT_BAD_INPUT = 2
 SURFACES, MOVIES = (".stl", ".obj", ".glb", ".gltf", ".vtk", ".vtu"), (".gif", ".mp4")
 #: Least and largest number of frames: fewer than 2 show no motion; more than 2000 take minutes and hundreds of megabytes.
 _FRAMES = (2, 2000)
+#: Least number of cells along an open strip. Flat cells lose (angle of a cell)**2/12 of the volume: 1e-6 of a strip that
+#: turns by 2 pi. Ten times more: 1e-8, and files ten times larger. (Closed strips have 900 cells and more.)
+_CELLS = 1800
 
 
 def arguments(argv=None):
@@ -44,8 +47,14 @@ def arguments(argv=None):
         help=f"file to write; may be repeated; the ending chooses the format: {', '.join((*SURFACES, '.csv'))}",
     )  # fmt: skip
     parser.add_argument("--movie", metavar="NAME", help="film of the folding, .gif or (with ffmpeg) .mp4")
-    parser.add_argument("--length", type=float, default=1.0, metavar="X", help="length of the strip in the files (default: 1)")
-    parser.add_argument("--width", type=float, metavar="X", help="width, in the unit of --length (without it: relative to L)")
+    parser.add_argument(
+        "--length", type=float, metavar="X", help="length of the strip in the files (default: that of the scene in m, or 1)"
+    )
+    parser.add_argument(
+        "--width", type=float, metavar="X",
+        help="width, in the unit of --length (default: that of the scene, in proportion to the length, if it has one); the "
+        "scene's width along the strip is relative to it",
+    )  # fmt: skip
     parser.add_argument("--thickness", type=float, metavar="X", help="thickness, in the unit of --length; makes a closed solid")
     parser.add_argument(
         "--frames", type=int, default=60, metavar="N", help="largest number of frames from end to end (default: 60)"
@@ -74,7 +83,7 @@ def _export(options) -> int:
         if options.movie:
             from branches.film import film
 
-            width = options.width / options.length * 2 * math.pi if options.width else None
+            width = options.width / (options.length or branch.length) * 2 * math.pi if options.width else None
             files[Path(options.movie)] = film(branch, Path(options.movie).suffix.lower(), options.frames, width)
         for path, data in files.items():
             write_bytes(path, data)
@@ -104,7 +113,7 @@ def check(options) -> None:
         value = getattr(options, name)
         if value is not None and not 1e-6 <= value <= 1e6:
             raise ConfigError(f"--{name} {value:g}: must be from 1e-6 to 1e6")
-    if options.width is not None and options.width > options.length:
+    if options.width is not None and options.length is not None and options.width > options.length:
         raise ConfigError(f"--width {options.width:g}: must not exceed the length, {options.length:g}")
     if not _FRAMES[0] <= options.frames <= _FRAMES[1]:
         raise ConfigError(f"--frames {options.frames}: must be from {_FRAMES[0]} to {_FRAMES[1]}")
@@ -152,9 +161,9 @@ def labelled_point(branch: StoredBranch, text: str) -> int:
 # --- the strip --------------------------------------------------------------------------------------------------------
 
 
-def placed(branch: StoredBranch, point: int, length: float) -> tuple[Shape, ndarray]:
+def placed(branch: StoredBranch, point: int, length: float, cells: int = 0) -> tuple[Shape, ndarray]:
     """Return the strip of a point at this length, and its strains (K, 3) in radians per unit of that length."""
-    return branch.placed(point, length)
+    return branch.placed(point, length, cells)
 
 
 def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
@@ -165,14 +174,19 @@ def _strip_files(branch: StoredBranch, options) -> dict[Path, bytes]:
     for ending in endings.values():
         if ending in SURFACES:
             library(ending)
-    shape, strains = placed(branch, labelled_point(branch, options.point), options.length)
+    point, length = labelled_point(branch, options.point), options.length or branch.length
     if ".csv" in endings.values():
-        table = _table(shape, strains)
+        table = _table(*placed(branch, point, length))
     if any(ending in SURFACES for ending in endings.values()):
-        mesh = _mesh(branch, shape, options)
-    fields = {"s": shape.arclength, "d1": shape.directors[:, 0], "d2": shape.directors[:, 1], "d3": shape.directors[:, 2]}
-    fields |= {f"omega_{i + 1}": strains[:, i] for i in range(3)}
+        shape, strains = placed(branch, point, length, _CELLS)
+        mesh, fields = _mesh(branch, shape, length, options), _fields(shape, strains)
     return {Path(name): table if end == ".csv" else encode(mesh, end, fields) for name, end in endings.items()}
+
+
+def _fields(shape: Shape, strains) -> dict[str, ndarray]:
+    """Return the values at the nodes of the centreline that VTK files hold."""
+    fields = {"s": shape.arclength, "d1": shape.directors[:, 0], "d2": shape.directors[:, 1], "d3": shape.directors[:, 2]}
+    return fields | {f"omega_{i + 1}": strains[:, i] for i in range(3)}
 
 
 def _table(shape: Shape, strains) -> bytes:
@@ -185,15 +199,19 @@ def _table(shape: Shape, strains) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _mesh(branch: StoredBranch, shape: Shape, options):
+def _mesh(branch: StoredBranch, shape: Shape, length: float, options):
     from branches import solid
     from branches.config import ConfigError
     from branches.draw_strip import ROOM, WIDTH
 
-    width, most = _width(branch, options), solid.widest(shape)
+    width, most = options.width, solid.widest(shape)
     if width is None:
-        width = min(WIDTH / (2 * math.pi) * options.length, ROOM * most)
-        write_output(f"width {width:.6g}: the default; change it with --width\n")
+        width = branch.width_at(length, options.thickness)
+        whose = "the scene's" if width is not None else "the default"
+        width = min(WIDTH / (2 * math.pi) * length, ROOM * most) if width is None else width
+        write_output(f"width {width:.6g}: {whose}; change it with --width\n")
+    if width > length:
+        raise ConfigError(f"--width {width:g}: must not exceed the length, {length:g}")
     if width >= most:
         raise ConfigError(f"--width {width:g}: must be below {most:.6g}, where generators of the surface begin to cross")
     if options.thickness is None:
@@ -204,14 +222,6 @@ def _mesh(branch: StoredBranch, shape: Shape, options):
             f"--thickness {options.thickness:g}: must be below {most:.6g}, the width or twice the smallest radius of curvature"
         )
     return solid.solid(shape, width, options.thickness)
-
-
-def _width(branch: StoredBranch, options) -> float | None:
-    """Return the given width, or that from the thickness and Gamma = w^2/(h L/2 pi) of the scene, or None."""
-    Gamma = branch.config.get("Gamma")
-    if options.width is not None or options.thickness is None or not Gamma:
-        return options.width
-    return math.sqrt(Gamma * options.thickness * options.length / (2 * math.pi))
 
 
 if __name__ == "__main__":

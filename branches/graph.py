@@ -80,11 +80,7 @@ def _answers(graph, options) -> Iterable[str]:
             if branch["family"][2:] == tuple(options.where):
                 yield f"  {diagram.describe_secondary(branch)}"
     if options.at is not None:
-        for state in diagram.states_at(graph, options.at):
-            what = f"{state['circle']}-covered circle" if "circle" in state else f"branch {state['branch']}"
-            what = f"secondary {what}, from {state['origin']:.6f}" if "origin" in state else what
-            values = f"kappa* = {state['kappa_star']:.8f}, energy = {state['energy']:.8f}"
-            yield f"{state['law']}, nu = {exact_text(state['nu'])}: {what}, {values}"
+        yield from _states(graph, options)
     if options.folds:
         for data in diagram.folds(graph, *options.folds):
             place = f"kappa_n = {data['kappa_n']:.10f}, kappa* = {data['kappa_star']:.8f}"
@@ -94,6 +90,19 @@ def _answers(graph, options) -> Iterable[str]:
         yield f"{len(found)} branches, {graph.number_of_nodes()} special points"
         for (law, nu, m, n), nodes in found:
             yield f"  {law}, nu = {exact_text(nu)}, ({m}, {n}): {diagram.describe(nodes)}"
+
+
+def _states(graph, options) -> Iterable[str]:
+    """Yield the states at a natural curvature."""
+    from branches.at_value import states_at  # Newton's method: not for other questions
+
+    folder = Path(options.folder)
+    for state in states_at(graph, options.at, folder if folder.is_dir() else folder.parent):
+        about = state.about
+        what = f"{about['circle']}-covered circle" if "circle" in about else f"branch {about['branch']}"
+        what = f"secondary {what}, from {about['origin']:.6f}" if "origin" in about else what
+        values = f"kappa* = {state.words('kappa_star')}, energy = {state.words('energy')}"
+        yield f"{about['law']}, nu = {exact_text(about['nu'])}: {what}, {values}"
 
 
 def _of_open_strips(graph, options) -> Iterable[str]:

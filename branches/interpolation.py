@@ -52,6 +52,36 @@ def places(pieces: Sequence[dict], column: str, value: float, wanted: Sequence[s
     return [(int(met[owner[i]]), dict(zip(wanted, row[1:].tolist()))) for i, row in zip(inside, found)]
 
 
+def uncertainty(piece: dict, s: float, column: str, wanted: Sequence[str]) -> dict[str, float]:
+    """Return estimated errors of wanted columns at the place s where a column is interpolated to have a value.
+
+    By the largest third difference of neighbouring points around s, as if parabolas had been used. The error of a cubic is
+    smaller, by a factor of about ten where the points are close enough to interpolate at all. In the intervals beside special
+    points it is the error of straight lines: their arclength is off by some percent of the interval, so a cubic gains nothing.
+    nan with fewer than four points.
+    """
+    arclength, keep = np.unique(piece["arclength"], return_index=True)
+    if len(arclength) < _FEWEST:
+        return dict.fromkeys(wanted, float("nan"))
+    i = int(np.clip(np.searchsorted(arclength, s, side="right") - 1, 0, len(arclength) - 2))
+    firsts = np.unique(np.clip([i - 2, i - 1, i], 0, len(arclength) - _FEWEST))
+    cubics, errors = {}, {}
+    for name in (column, *wanted):
+        rows, found = np.asarray(piece[name])[keep], []
+        for first in firsts:
+            at = arclength[first : first + _FEWEST] - s
+            cubic = np.linalg.solve(np.vander(at, increasing=True), rows[first : first + _FEWEST])
+            found.append((abs(cubic[3]) * (at[-1] - at[0]), cubic))
+        errors[name], cubics[name] = max(found, key=lambda pair: pair[0])
+        if i in (0, len(arclength) - 2):
+            errors[name] = max(errors[name], abs(cubics[name][2]))
+        errors[name] *= abs((arclength[i] - s) * (arclength[i + 1] - s))
+    _, slope, curvature, _ = abs(cubics[column])
+    room = np.sqrt(max(slope**2 - 4 * errors[column] * curvature, 0.0))  # beside a fold of the column the place moves further
+    moved = 2 * errors[column] / (slope + room) if slope + room else np.inf
+    return {name: float(errors[name] + moved * (abs(cubics[name][1]) + moved * abs(cubics[name][2]))) for name in wanted}
+
+
 def _joined(pieces: Sequence[dict], names: Sequence[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the arclengths (K,) and columns (K, names) of pieces one after the other, and the number of each point's piece."""
     parts = []

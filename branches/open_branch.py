@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 from scipy.interpolate import BarycentricInterpolator
@@ -17,7 +19,8 @@ from branches.open_config import OpenConfig
 from branches.read_closed import StoredBranch
 from ribbon_model.ends import DIRECTIONS
 from ribbon_model.equilibrium import strains_of
-from ribbon_model.shape import Shape, shape_of
+from ribbon_model.open_strip import OpenStrip
+from ribbon_model.shape import Shape, interpolated, shape_of
 
 #: What a person feels or sees where a number is followed: its conjugate, up to a sign. Others are shown with the energy.
 CONJUGATE = {
@@ -68,17 +71,37 @@ class OpenBranch(StoredBranch):
 
     def strains(self, point: int) -> np.ndarray:
         """Return omega_1, omega_2, omega_3 (K, 3) at a kept point, over 1/L."""
-        t, states = self.states_at(point)
-        problem = self.scene.strip(int(self.points["stage"][point])).problem
-        row, names = self.points[point], self.points.dtype.names
-        values = [float(row[name]) if name in names else 0.0 for name in problem.parameters]
+        return self._strains(point, *self.states_at(point))
+
+    def _strains(self, point: int, t: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Return the same for states (K, n) at places t (K,)."""
+        problem = self._strip(point).problem
+        values = [*self._numbers(point).values()]
         return strains_of(states[:, :4], problem.batch("field").values(t, states, states[:0], np.array(values)))
+
+    def _strip(self, point: int) -> OpenStrip:
+        """Return the strip of the stage of a point."""
+        return self.scene.strip(int(self.points["stage"][point]))
+
+    def _numbers(self, point: int) -> dict[str, float]:
+        """Return the values of all numbers of the strip at a point."""
+        row, names = self.points[point], self.points.dtype.names
+        return {name: float(row[name]) if name in names else 0.0 for name in self._strip(point).problem.parameters}
 
     def shape(self, point: int) -> Shape:
         """Return the strip at a kept point, of length 1, on the axes of its first end."""
-        t, states = self.states_at(point)
-        ruled = self.scene.strip().material.ruled
-        return shape_of(t, states, self.strains(point) if ruled else np.zeros((len(t), 3)))
+        return self._shape(point, *self.states_at(point))[0]
+
+    def _shape(self, point: int, t: np.ndarray, states: np.ndarray) -> tuple[Shape, np.ndarray]:
+        """Return shape and strains (K, 3) of states (K, n) at places t (K,)."""
+        material, numbers = self._strip(point).material, SimpleNamespace(**self._numbers(point))
+        strains = self._strains(point, t, states)
+        shape = shape_of(t, states, strains if material.ruled else np.zeros((len(t), 3)))
+        along = {
+            field: np.array([float(material.datum(name)(s, numbers)) for s in t])
+            for field, name in (("breadth", "width"), ("depth", "thickness")) if name in material.along
+        }  # fmt: skip
+        return replace(shape, **along), strains
 
     def solution(self, point: int):
         """Open strips have no `ribbon_model.solution.Solution`; raise StoreError."""
@@ -86,15 +109,42 @@ class OpenBranch(StoredBranch):
             "films and loops are of closed strips, and this result is of an open one (shape and strains give its states)"
         )
 
-    def placed(self, point: int, length: float) -> tuple[Shape, np.ndarray]:
+    def placed(self, point: int, length: float, cells: int = 0) -> tuple[Shape, np.ndarray]:
         """Return the strip of this length, its middle at the origin, and its strains (K, 3) in radians per unit of length.
 
-        The axes are tangent, width and normal of its first end, or the weight points downwards.
+        The axes are tangent, width and normal of its first end, or the weight points downwards. Between the nodes of the
+        solution, its polynomials are evaluated at further places until there are at least as many ``cells``.
         """
-        shape = standing(self.shape(point), self.up)
+        t, states = self.states_at(point)
+        pieces = -(-cells // (len(t) - 1))
+        if pieces > 1:
+            nodes, parts = t, np.arange(pieces) / pieces
+            t = np.append((t[:-1, None] + np.diff(t)[:, None] * parts).ravel(), t[-1])
+            states = interpolated(nodes, states, self._degree(point), t)
+        shape, strains = self._shape(point, t, states)
+        shape = standing(shape, self.up)
         middle = shape.centreline.mean(axis=0)
-        scaled = Shape(shape.arclength * length, (shape.centreline - middle) * length, shape.directors, shape.eta)
-        return scaled, self.strains(point) / length
+        return replace(
+            shape, arclength=shape.arclength * length, centreline=(shape.centreline - middle) * length
+        ), strains / length
+
+    def _degree(self, point: int) -> int:
+        return int(self.index["degree"][self.index["point"] == point][0])
+
+    @property
+    def length(self) -> float:
+        """The length of the scene's dimensions; 1 without them."""
+        return self.scene.dimensions.length if self.scene.dimensions else 1.0
+
+    def width_at(self, length: float, thickness: float | None) -> float | None:
+        """Return the width of the scene's dimensions, or that from a thickness and Gamma = w^2/(h L), or None.
+
+        It is that of the place where the width along the strip is 1.
+        """
+        if self.scene.dimensions:
+            return self.scene.dimensions.width / self.scene.dimensions.length * length
+        Gamma = self.scene.material.get("Gamma")
+        return math.sqrt(Gamma * thickness * length) if Gamma and thickness else None
 
     @property
     def up(self) -> tuple[float, float, float]:

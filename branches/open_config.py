@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from branches.fields import Interval, MeshConfig, StepConfig, Strict, show
 from contin import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
-from ribbon_model.laws import FINITE_WIDTH
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.material import Material
 from ribbon_model.plate import RIGIDITIES
 
@@ -51,6 +51,9 @@ MEANINGS = {
     "potential": "energy and the potential of dead loads at the last end: the one of which the index is",
     "stage": "stage of the scene, from 1",
 }  # fmt: skip
+
+#: Laws of a strip with dimensions; the first one if none is given.
+_OF_DIMENSIONS = (FINITE_WIDTH.name, FLAT_ROD.name, RIBBON.name)
 
 Direction = Annotated[tuple[float, float, float], BeforeValidator(lambda value: _direction(value))]
 
@@ -278,7 +281,15 @@ class OpenConfig(Strict):
         if self.dimensions is None:
             return 1.0
         length, modulus, _ = _unit_of(name)
-        return self.dimensions.length**length * self.dimensions.modulus**modulus
+        return self.dimensions.length**length * self.modulus**modulus
+
+    @property
+    def modulus(self) -> float:
+        """The bending modulus that is 1 in the law, in N m^2; 1 without dimensions."""
+        if self.dimensions is None:
+            return 1.0
+        narrow = 1 - self.dimensions.poisson_ratio**2 if self.material.get("law") == FLAT_ROD.name else 1.0
+        return self.dimensions.modulus * narrow  # a narrow strip is free to bend across: E h^3 w/12
 
     def unit(self, name: str) -> str:
         """Return the unit of a number, '' without dimensions."""
@@ -290,10 +301,14 @@ class OpenConfig(Strict):
         if self.dimensions is not None:
             d = self.dimensions
             given = [name for name in ("nu", "Gamma", *RIGIDITIES) if name in values]
-            if given or law not in (None, FINITE_WIDTH.name):
-                raise ValueError(f"material: {(given or ['law'])[0]} must not be given together with dimensions")
-            law = FINITE_WIDTH.name
-            values |= {"nu": d.poisson_ratio, "Gamma": d.width**2 / (d.thickness * d.length)}
+            if given:
+                raise ValueError(f"material: {given[0]} must not be given together with dimensions")
+            law = FINITE_WIDTH.name if law is None else law
+            if law not in _OF_DIMENSIONS:
+                raise ValueError(f"material: law: {law!r} must be one of {', '.join(_OF_DIMENSIONS)} together with dimensions")
+            values["nu"] = d.poisson_ratio
+            if law == FINITE_WIDTH.name:
+                values["Gamma"] = d.width**2 / (d.thickness * d.length)
         if law is None:
             raise ValueError("material: the field 'law' is missing")
         numbers = {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import itertools
 import math
 import tempfile
@@ -16,16 +17,19 @@ from pathlib import Path
 
 import numpy as np
 
+from branches.advice import no_state, reached
 from branches.config import ConfigError, dump
 from branches.job import Interruption, is_done, writing
 from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
+from branches.open_errors import errors_of
 from branches.store import BranchWriter, Kind, read_kept, read_state
 from contin import (
     Branch,
     BranchPoint,
     ContinError,
     Continuation,
+    ConvergenceError,
     MeshControl,
     Point,
     ProblemError,
@@ -33,12 +37,16 @@ from contin import (
     Stop,
     exact_text,
     load,
+    point_of,
     save,
 )  # fmt: skip
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, angles_of
 from ribbon_model.open_strip import REACTIONS, OpenStrip
 
+#: A stage may start outside its limits by this part of them: it may start where another one has stopped. Points at limits are
+#: located to 1e-12; ten times larger, starts that are outside by that are taken for starts at the limit.
+_SLACK = 1e-9
 #: A state keeps a symmetry that moves it by less than this.
 _KEEPS = 1e-6
 #: Directions of reactions and their ends, in words.
@@ -150,9 +158,11 @@ def writer_of(config: OpenConfig, path: Path | None, image: bytes | None = None)
     columns += tuple((name, "f8", text) for name, text in meaning.items())
     columns += (("F_roller", "f8", "force of the roller on the strip"),) if config.roller else ()
     length = "1" if config.dimensions is None else f"1 ({exact_text(config.dimensions.length)} m)"
-    modulus = "1" if config.dimensions is None else f"1 ({config.dimensions.modulus:.12g} N m^2)"
+    modulus = "1" if config.dimensions is None else f"1 ({config.modulus:.12g} N m^2)"
     table = Table.of(config)
-    kind = Kind(OPEN, f"bending modulus B = {modulus}, length L = {length}", columns, _Row(config, table))
+    row, units = _Row(config, table), f"bending modulus B = {modulus}, length L = {length}"
+    uncertain = (*table.functionals, "potential", *REACTIONS, *(("F_roller",) if config.roller else ()))
+    kind = Kind(OPEN, units, columns, row, uncertain, row.errors)
     followed = list(dict.fromkeys(stage.follow for stage in config.stages))
     return BranchWriter(path, dump(config), table, followed, config.stride, image, Watch(config.strip()), kind)
 
@@ -194,6 +204,16 @@ class _Row:
             absent |= dict(zip(ANGLES, angles_of(states[-1, :4])))
         own = {"stage": self.stage, "potential": strip.potential(point), **strip.reactions_of(states)}
         return absent | own
+
+    def errors(self, point: Point) -> dict[str, float]:
+        """Return the errors of forces, moments, energies and places at a labelled point."""
+        return errors_of(point, self._found)
+
+    def _found(self, point: Point) -> dict[str, float]:
+        """Return the columns that are found, not prescribed."""
+        strip = self._config.strip(self.stage)
+        reactions = strip.reactions_of(point.system.states(point.x))
+        return {**point.functionals, "potential": strip.potential(point), **reactions}
 
 
 def first_state(config: OpenConfig) -> Point:
@@ -273,7 +293,7 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
     (display, interruption), number = others, len(labelled)
     writer.kind.values.stage = number
     display.stage(config, number)
-    for point in run:
+    for point in (_named(config, point) for point in run):
         display.stage_point(config, config.stages[number - 1], point, writer.count)
         writer.append(point)
         labelled[-1] += [point] if point.label else []
@@ -287,12 +307,38 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
         if writer.due():
             writer.checkpoint(run.start, "running")
     writer.flush()
-    if run.stop.reason == "no convergence" or run.stop.message.startswith("met "):
-        why = config.strip(number).explained(run)
-        stop = dataclasses.replace(run.stop, message=f"stage {number}: {why}", advice="")
+    stop = _told(config, number, run, labelled[-1][-1])
+    if stop.reason in ("no convergence", "event"):
+        stop = dataclasses.replace(stop, message=f"stage {number}: {stop.message}")
         writer.checkpoint(run.start, "lost", stop)
         return "lost", stop
+    run.stop = stop
     return None
+
+
+def _told(config: OpenConfig, number: int, run: Continuation, last: Point) -> Stop:
+    """Return why a stage ended, in the fields and units of the scene."""
+    name = config.stages[number - 1].follow
+    law = config.strip(number).explained(run) if run.stop.reason in ("no convergence", "event") else None
+    if law is not None:
+        return Stop(run.stop.reason, law)
+    if run.stop.reason == "no convergence":
+        here = run.state.system.parameter(run.state.x, name)
+        return no_state(run, _shown(config, name, here))
+    return reached(run.stop, last, run, functools.partial(_shown, config))
+
+
+def _shown(config: OpenConfig, name: str, value: float) -> str:
+    """Return a number as a scene states it, with its unit."""
+    return f"{name} = {value * config.factor(name):.10g} {config.unit(name)}".rstrip()
+
+
+def _named(config: OpenConfig, point: Point) -> Point:
+    """Return a point at a value of a column with the value in the units of the scene."""
+    name, equals, _ = point.name.partition(" = ")
+    if not equals or config.dimensions is None or name not in (*point.parameters, *point.functionals):
+        return point
+    return dataclasses.replace(point, name=f"{name} = {point[name] * config.factor(name):.6g} {config.unit(name)}".rstrip())
 
 
 def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
@@ -313,7 +359,35 @@ def _origin(stage: StageConfig, labelled: list[list[Point]]) -> Point:
 
 
 def _run(config: OpenConfig, number: int, origin: Point) -> Continuation:
-    """Return the run of a stage."""
+    """Return the run of a stage.
+
+    Raises
+    ------
+    ConfigError
+        The stage starts outside its limits, or not from this point.
+    """
+    try:
+        run = _begun(config, number, origin)
+    except ConvergenceError as error:
+        followed = config.stages[number - 1].follow
+        raise ConfigError(
+            f"follow: {followed!r}: the state at the start of the stage was not found again with this number free; follow "
+            "another one first, or refine the mesh (mesh.intervals, mesh.tolerance)"
+        ) from error
+    start = point_of(run.state.system, run.state.x)
+    for name, (low, high) in run.settings.limits.items():
+        slack = _SLACK * max(abs(low), abs(high), high - low)
+        if not low - slack <= start[name] <= high + slack:
+            here, *ends = (f"{config.factor(name) * value:.10g}" for value in (start[name], low, high))
+            words, unit = " to ".join(ends), f" {config.unit(name)}".rstrip()
+            first = "stage 1: " if number == 1 else ""  # later ones are named by the caller
+            where = f"limits: {name} = {here}{unit} at the start of the stage is outside its limits, {words}{unit}"
+            raise ConfigError(f"{first}{where}; widen them, or start at another point")
+    return run
+
+
+def _begun(config: OpenConfig, number: int, origin: Point) -> Continuation:
+    """Return the run of a stage from a point."""
     stage, strip = config.stages[number - 1], config.strip(number)
     changed = origin.system.problem is not strip.problem or bool(stage.numbers)
     if stage.start_at is not None and stage.start_at.startswith("BP"):
@@ -327,8 +401,12 @@ def _run(config: OpenConfig, number: int, origin: Point) -> Continuation:
         return Continuation(system, x, _settings(config, number, system.parameter(x, stage.follow)))
     except ValueError as error:
         raise ConfigError(f"start, finish: {error}") from error
+    except ConvergenceError as error:
+        given = ", ".join(f"{name} = {exact_text(value)}" for name, value in stage.numbers.items())
+        where = f"near the one before{f' with {given}' if given else ' with these ends'}"
+        raise ConfigError(f"numbers: no state was found {where}; follow the changes in stages") from error
     except ContinError as error:
-        raise ConfigError(f"numbers: no state was found near the one before ({error}); follow them in a stage") from error
+        raise ConfigError(f"numbers: {error}") from error
 
 
 def _switched(config: OpenConfig, number: int, origin: Point, changed: bool) -> tuple[Settings, np.ndarray]:

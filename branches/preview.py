@@ -32,8 +32,9 @@ def preview(config: Config | DiagramConfig, step: float = 0.2):
     Returns
     -------
     networkx.MultiGraph
-        As from `branches.diagram.run_diagram`. The arclength of its edges is that in the plane of the quadrature's unknowns. A
-        branch whose quadrature fails is listed, with the reason, in ``graph.graph["failed"]``.
+        As from `branches.diagram.run_diagram`. The arclength of its edges is that in the plane of the quadrature's unknowns;
+        ``exact`` holds the points of the quadrature. A branch whose quadrature fails is listed, with the reason, in
+        ``graph.graph["failed"]``.
     """
     single = isinstance(config, Config)
     graph, failed = diagram.new_graph(config.title), {}
@@ -59,7 +60,10 @@ def _add(graph, family, points):
     columns |= {name: np.array([getattr(point, name) for point in points]) for name in ("kappa_n", "kappa_star", "energy")}
     special = [i for i, point in enumerate(points) if point.label]
     nodes = [_node(family, points[i], i) for i in special]
-    pieces = [{name: values[a : b + 1].tolist() for name, values in columns.items()} for a, b in pairwise(special)]
+    pieces = [
+        {**{name: values[a : b + 1].tolist() for name, values in columns.items()}, "exact": points[a : b + 1]}
+        for a, b in pairwise(special)
+    ]
     diagram.connect(graph, family, nodes, pieces)
 
 

@@ -81,11 +81,27 @@ class StoredBranch:
         """Return the closed strip at a kept point; see `solution`."""
         return self.solution(point).shape()
 
-    def placed(self, point: int, length: float) -> tuple[Shape, np.ndarray]:
-        """Return the closed strip of a point, scaled and upright, and its strains (K, 3) in radians per unit of that length."""
+    def placed(self, point: int, length: float, cells: int = 0) -> tuple[Shape, np.ndarray]:
+        """Return the closed strip of a point, scaled and upright, and its strains (K, 3) in radians per unit of that length.
+
+        ``cells`` is for open strips; the nodes of a closed one are always many.
+        """
         solution = self.solution(point).on(LOOP)
         shape = flat_across(solution.shape(), solution.law).placed(length)
         return shape, solution.strains() * (2 * math.pi / length)
+
+    @property
+    def length(self) -> float:
+        """The length of the scene's strip; 1 without one."""
+        strip = self.config.get("strip")
+        return strip["length"] if strip else 1.0
+
+    def width_at(self, length: float, thickness: float | None) -> float | None:
+        """Return the width of the scene's strip, or that from a thickness and Gamma = w^2/(h L/2 pi), or None."""
+        strip, Gamma = self.config.get("strip"), self.config.get("Gamma")
+        if strip:
+            return strip["width"] / strip["length"] * length
+        return math.sqrt(Gamma * thickness * length / (2 * math.pi)) if Gamma and thickness else None
 
     def to_pandas(self):
         """Return the table of points as a ``pandas.DataFrame``; ImportError says what to install if pandas is missing."""

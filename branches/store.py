@@ -75,13 +75,14 @@ def _versions() -> str:
     return json.dumps(result)
 
 
-def _columns(problem, free, watched: bool, more: tuple = ()) -> dict[str, tuple]:
-    """Return name, type and meaning of the columns of both tables; ``more`` are further ones."""
+def _columns(problem, free, watched: bool, more: tuple = (), uncertain: tuple = ()) -> dict[str, tuple]:
+    """Return name, type and meaning of the columns of both tables; ``more`` are further ones, ``uncertain`` have errors."""
     watch = [("index", "i4", "number of negative directions of the energy; -1 where one is neutral (undecided)")] * watched
     hidden = getattr(problem, "multipliers", ())
     shown = [name for name in (*problem.parameters, *problem.functionals) if name not in hidden]
     values = [*((name, "f8", MEANINGS.get(name, name)) for name in shown), *more]
     errors = [(f"error_{name}", "f8", f"estimated discretization error of {name}") for name in free]
+    errors += [(f"error_{name}", "f8", f"estimated error of {name}") for name in uncertain if name not in free]
     named = [("name", "S64", "the subject of the label")]
     changes = [
         ("index_before", "i4", "the index just before this point, at LP and SB; otherwise -1"),
@@ -99,12 +100,17 @@ def _kind(columns) -> np.dtype:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of strip: its name and units in the file, its own columns (name, type, meaning), and their values at a point."""
+    """A kind of strip: its name and units in the file, its own columns (name, type, meaning), and their values at a point.
+
+    ``uncertain`` are the columns whose errors ``errors`` returns for a labelled point, by name.
+    """
 
     name: str
     units: str
     columns: tuple[tuple[str, str, str], ...] = ()
     values: Callable[[Point], dict] = lambda point: {}
+    uncertain: tuple[str, ...] = ()
+    errors: Callable[[Point], dict] = lambda point: {}
 
 
 @functools.lru_cache(maxsize=32)  # making it takes 8 ms; the branches of a diagram differ in their text only
@@ -116,7 +122,7 @@ def _empty_file(problem, free: tuple[str, ...], watched: bool, kind: Kind) -> by
             "kind": kind.name, "units": kind.units, "platform": platform.platform(),
             "versions": _versions(), "states": list(problem.states), "free_parameters": list(free),
         })  # fmt: skip
-        for table, columns in _columns(problem, free, watched, kind.columns).items():
+        for table, columns in _columns(problem, free, watched, kind.columns, kind.uncertain).items():
             data = file.create_dataset(table, (0,), _kind(columns), maxshape=(None,), chunks=(256,), fletcher32=True)
             for name, _, meaning in columns:
                 data.attrs[name] = meaning
@@ -268,6 +274,12 @@ class BranchWriter:
             "iterations": point.iterations, "newton_error": point.newton_error,
             **{f"error_{name}": point.errors.get(name, np.nan) for name in self._free}, **self.kind.values(point),
         }  # fmt: skip
+        if table == "events" and self.kind.uncertain:
+            values = (
+                dict.fromkeys((f"error_{name}" for name in self.kind.uncertain), np.nan)
+                | {f"error_{name}": error for name, error in self.kind.errors(point).items()}
+                | values
+            )
         if self._watch is not None:
             values["index"] = self._watch.index(point)
             if table == "events":
@@ -298,7 +310,8 @@ class BranchWriter:
 
         Later points are computed again: a limit that ended the run need not end the resumed run.
         """
-        for table, columns in _columns(problem, self._free, self._watch is not None, self.kind.columns).items():
+        kind, watched = self.kind, self._watch is not None
+        for table, columns in _columns(problem, self._free, watched, kind.columns, kind.uncertain).items():
             if self._file[table].dtype != _kind(columns):
                 raise StoreError(
                     f"cannot resume {str(self.path)!r}: this version or scene has other columns; run it again without --resume"

@@ -39,6 +39,9 @@ _FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "sqrt", "sinh", "cosh", "tanh",
 #: Longest expression. A longer one is a table that should be shorter: each is compiled as one formula.
 _LONGEST = 2000
 
+#: The ribbon's twisting modulus counts as lost where M1 + (1 - nu) kappa_n < -_STEEP |M3|, that is at |omega_3/omega_1| > 2
+#: _STEEP. Exact in the plane. Round-off in M3 (1e-13 beside branch points) moves the stop by 1e-10; 10 times larger: by 1e-9.
+_STEEP = 1e3
 #: Places at which data along the strip are checked, less one.
 _STEPS = 40
 
@@ -281,13 +284,35 @@ class Material:
         Gamma = p.Gamma * self.datum("width")(t, p) ** 2 / self.datum("thickness")(t, p)
         return plate.wide_section_of(*rigidities, Gamma) if self.orthotropic else isotropic(p.nu, Gamma)
 
-    def other_side(self, p) -> float:
-        """Return k of a ribbon, for which bending to the other side lowers the energy where M1 + k kappa_n < 0.
+    def ribbon_margin(self, t: float, M1: float, M3: float, p) -> float:
+        """Return a number that is positive where the law of the ribbon holds: omega_1 > 0, and no other strain is preferred.
 
-        There the H of omega_1 of either sign are equal. For an orthotropic plate that holds without kappa_n, or where D12 +
-        2 D66 = sqrt(D11 D22); otherwise it is an estimate.
+        With p, a and c of `ribbon_model.laws.ribbon_hamiltonian`, omega_1 = c/(1 + eta**2) and p = a (1 - eta**2). The law
+        ends in two ways (nu kappa_n > 0: the first one comes first in the plane; nu kappa_n < 0: the second one):
+
+        - a = 0, where M3 = 0 and p = M1 + (1 - nu) kappa_n = 0: the twisting modulus 2 a/omega_1 vanishes. For smaller p
+          with M3 = 0, omega_1 = 0 and the generators run along the strip (eta is infinite).
+        - p + 2 nu kappa_n = M1 + (1 + nu) kappa_n = 0, at any M3: the two roots a belong to omega_1 of either sign, and their
+          H differ by sqrt(p**2 + M3**2) (p + 2 nu kappa_n)/2. Where that is negative, the strain of the other sign has less
+          energy at this moment (Weierstrass' condition).
         """
-        return p.D11 + math.sqrt(p.D11 / p.D22) * p.D12 if self.orthotropic else 1 + p.nu
+        f, kappa_n, (near, far) = self._factor()(t, p), self.datum("kappa_n")(t, p), self._sides(p)
+        return M1 / f + near * kappa_n + min(_STEEP * abs(M3 / f), (far - near) * kappa_n)
+
+    def _sides(self, p) -> tuple[float, float]:
+        """Return k of M1 + k kappa_n where a ribbon loses its twisting modulus, and where it bends to the other side.
+
+        For an orthotropic plate, with s = D12 + 2 D66 and r = sqrt(D11 D22): without M3, M1 omega_1 - U is a quadratic function
+        of omega_1 and k2 = omega_3**2/omega_1. Its maximum leaves k2 = 0 where t = 0 (s < r), or jumps to omega_1 = 0 before
+        (s > r). (A plate with s <= 0 has no end of this kind: it twists however far it is bent.) The second k is exact without
+        kappa_n, or where s = r; otherwise it is an estimate.
+        """
+        if not self.orthotropic:
+            return 1 - p.nu, 1 + p.nu
+        root = math.sqrt(p.D11 * p.D22)
+        twisting = p.D12 + 2 * p.D66
+        least = min(twisting, root) if twisting > 0 else root
+        return p.D11 * (1 - p.D12 / least), p.D11 * (1 + p.D12 / root)
 
     def curvatures(self, t: float, w1: float, w3: float, p) -> tuple[float, float, float]:
         """Return U_11, U_13 and U_33 of the law of finite width at a place, up to a factor."""

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from contin import Collocation, ContinError, Point, ProblemError, TestFunction, VariationalProblem, solve
+from contin import Collocation, ContinError, Continuation, Point, ProblemError, TestFunction, VariationalProblem, solve
 from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of
@@ -267,12 +267,32 @@ class OpenStrip:
     def _reason(self, error: Exception) -> str:
         text = str(error)
         if text.startswith(_NO_CONVERGENCE):
-            return NOT_FOUND
+            return self._not_found()
         if "repeat or contradict" in text:
             return UNDETERMINED
         if "vanishes along a mode" in text:
             return UNHELD
         return text
+
+    def _not_found(self) -> str:
+        """Return that no first state was found, and which numbers may be nearer to where one is known."""
+        natural = natural_state.end_numbers(self.material)
+        far = [name for name, value in natural.items() if abs(self.parameters.get(name, value) - value) > LOOSE]
+        loads = [name for name in LOADS if self.parameters.get(name, 0.0) != 0]
+        nearer = [f"smaller loads ({', '.join(loads)})"] if loads else []
+        nearer += [f"{', '.join(far)} nearer to the natural state"] if far else []
+        if self._closed:  # its place and turn are what makes it closed
+            stiff = "a softness (1, say)" if self.material.constrained else "B2 nearer to B1"
+            nearer = [*nearer[: len(loads) > 0], stiff]
+        first = f"begin with {' and '.join(nearer)}, and follow them in a stage; or " if nearer else ""
+        return f"no equilibrium was found near the first guess; {first}begin with another first state"
+
+    @property
+    def _closed(self) -> bool:
+        """Whether the last end is clamped where the first one is."""
+        return all(end.rotation == CLAMPED and len(end.held) == 3 for end in (self.start, self.finish)) and all(
+            self.parameters.get(name) == 0 for name in PLACE
+        )
 
     def check_determined(self, point: Point) -> None:
         """Raise ProblemError where something can move without a change of energy, or reactions are not determined."""
@@ -307,8 +327,8 @@ class OpenStrip:
         """Return the test function that ends a run where the law ends; none for a law that is regular everywhere."""
         return law_end.tests(self.material, self.strains)
 
-    def explained(self, run) -> str:
-        """Return why a run failed: the end of the law where its state is near it, else the run's own reason."""
+    def explained(self, run: Continuation) -> str | None:
+        """Return that a run met the end of the law, or failed near it; None for a run that stopped elsewhere."""
         return law_end.explained(self.material, self.strains, run)
 
     # --- what a state is ----------------------------------------------------------------------------------------------
@@ -361,12 +381,8 @@ UNDETERMINED = (
     "its full length, or does not bend in its plane and is held sideways at both ends); begin with an arch, a twist or a "
     "softness, or hold less"
 )
-#: How `contin.solve` begins to say that no state was found, and what that means here.
+#: How `contin.solve` begins to say that no state was found.
 _NO_CONVERGENCE = "Newton did not converge"
-NOT_FOUND = (
-    "no equilibrium was found near the first guess; begin with smaller loads, or nearer to the natural state, and follow these "
-    "numbers in a stage, or begin with another first state"
-)
 #: States of the last end, as the potential of its loads takes them.
 _LastEnd = namedtuple("_LastEnd", (*FRAME, *CENTRELINE))
 #: Place of the last end from the first one, as integrals over the strip.

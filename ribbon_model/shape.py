@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from contin import basis
+from contin import basis, interpolation
 from ribbon_model.equilibrium import directors
 
 
@@ -24,12 +24,16 @@ class Shape:
         Rows d1, d2, d3.
     eta : ndarray, shape (K,)
         omega_3 / omega_1.
+    breadth, depth : float or ndarray, shape (K,)
+        Width and thickness along the strip, over the ones that are asked for.
     """
 
     arclength: np.ndarray
     centreline: np.ndarray
     directors: np.ndarray
     eta: np.ndarray
+    breadth: float | np.ndarray = 1.0
+    depth: float | np.ndarray = 1.0
 
     def closure(self) -> float:
         """Return the largest difference between the two ends, in position and directors."""
@@ -38,8 +42,11 @@ class Shape:
 
     def surface(self, width: float, across: int = 2) -> np.ndarray:
         """Points of the strip, shape (K, across, 3), ruled along d1 + eta d3 (equation (6a)) up to half the width."""
-        ruling = self.directors[:, 0] + self.eta[:, None] * self.directors[:, 2]
-        return self.centreline[:, None] + np.linspace(-0.5, 0.5, across)[:, None] * width * ruling[:, None]
+        return self.centreline[:, None] + np.linspace(-0.5, 0.5, across)[:, None] * width * self.rulings()[:, None]
+
+    def rulings(self) -> np.ndarray:
+        """Return d1 + eta d3 times the breadth, shape (K, 3): the surface is ruled along it, from -1/2 to 1/2 of the width."""
+        return np.reshape(self.breadth, (-1, 1)) * (self.directors[:, 0] + self.eta[:, None] * self.directors[:, 2])
 
     def upright(self) -> np.ndarray:
         """Return the rotation, shape (3, 3), from the lab axes to axes on which the strip stands upright and looks to one side.
@@ -91,7 +98,7 @@ class Shape:
         return result
 
     def _joined(self, other: Shape) -> Shape:
-        pairs = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(Shape))
+        pairs = ((getattr(self, name), getattr(other, name)) for name in ("arclength", "centreline", "directors", "eta"))
         return Shape(*map(np.concatenate, pairs))
 
 
@@ -148,6 +155,14 @@ def quadrature_centreline(t, states, degree: int, length: float) -> np.ndarray:
     inside = length * h[:, None, None] * np.einsum("ij,ejk->eik", _integrals(degree), d3)
     inside[1:] += np.cumsum(inside[:, -1], axis=0)[:-1, None]
     return np.concatenate([np.zeros((1, 3)), inside.reshape(-1, 3)])
+
+
+def interpolated(nodes: np.ndarray, values: np.ndarray, degree: int, t: np.ndarray) -> np.ndarray:
+    """Return the values (L, n) at places t (L,) of the piecewise polynomials with values (K, n) at the nodes (K,)."""
+    tables, mesh = basis(degree), nodes[::degree]
+    j = np.clip(np.searchsorted(mesh, t, side="right") - 1, 0, len(mesh) - 2)
+    matrix = interpolation(tables.nodes, tables.barycentric, (t - mesh[j]) / (mesh[j + 1] - mesh[j]))
+    return np.einsum("ij,ijk->ik", matrix, values[degree * j[:, None] + np.arange(degree + 1)])
 
 
 def shape_of(t: np.ndarray, states: np.ndarray, omega: np.ndarray) -> Shape:

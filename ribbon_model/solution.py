@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import Collocation, Point, basis, interpolation
+from contin import Collocation, Point
 from ribbon_model import stability
 from ribbon_model.domains import CELL, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH, on_directors
 from ribbon_model.laws import Law
 from ribbon_model.second_variation import Equilibrium, from_solution
-from ribbon_model.shape import Shape, frames, quadrature_centreline, quaternions
+from ribbon_model.shape import Shape, frames, interpolated, quadrature_centreline, quaternions
 from ribbon_model.stability import Stability
 
 
@@ -110,20 +110,13 @@ class Solution:
     def sampled(self, t: np.ndarray) -> np.ndarray:
         """Return quaternion and centreline at places t (K,) of the unit interval, shape (K, 7)."""
         if self.states.shape[1] > 4:
-            return self._interpolated(self.states, t)
+            return interpolated(self.t, self.states, self.degree, t)
         x = quadrature_centreline(self.t, self.states, self.degree, self.parameters["length"])
-        return self._interpolated(np.hstack([self.states, x]), t)
+        return interpolated(self.t, np.hstack([self.states, x]), self.degree, t)
 
     def on_nodes(self, t: np.ndarray) -> np.ndarray:
         """Return the states at places t (K,) of the unit interval, shape (K, n)."""
-        return self.states if np.array_equal(t, self.t) else self._interpolated(self.states, t)
-
-    def _interpolated(self, nodal: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Return the values at t of the piecewise polynomials with these values at the nodes."""
-        tables, mesh = basis(self.degree), self.t[:: self.degree]
-        j = np.clip(np.searchsorted(mesh, t, side="right") - 1, 0, len(mesh) - 2)
-        matrix = interpolation(tables.nodes, tables.barycentric, (t - mesh[j]) / (mesh[j + 1] - mesh[j]))
-        return np.einsum("ij,ijk->ik", matrix, nodal[self.degree * j[:, None] + np.arange(self.degree + 1)])
+        return self.states if np.array_equal(t, self.t) else interpolated(self.t, self.states, self.degree, t)
 
     def equilibrium(self) -> Equilibrium:
         """Return the equilibrium along the whole loop, for its second variation; raises as `from_solution`."""

@@ -79,11 +79,39 @@ class Branch {
     if (before > 0 && after > 0) {
       secant(i - 1, (factor * after) / (before + after));
       secant(i, (factor * before) / (before + after));
-    } else secant(after > 0 ? i : i - 1, factor);
+    } else this.endSlope(i, after > 0 ? 1 : -1, factor, secant);
+  }
+
+  /** The slope of the parabola through three points at the first or last one; of a line where two of them coincide. */
+  endSlope(i, inward, factor, secant) {
+    const a = this.abscissa,
+      [first, second] = inward > 0 ? [i, i + 1] : [i - 1, i - 2], // the numbers of the intervals, from the end
+      length = (k) => (k >= 0 && k + 1 < this.size ? a[k + 1] - a[k] : 0),
+      part = length(second) > 0 ? length(first) / (length(first) + length(second)) : 0;
+    secant(first, factor * (1 + part));
+    if (part > 0) secant(second, -factor * part);
   }
 
   value(name, s) {
     return this.weights(s).reduce((sum, [row, weight]) => sum + weight * this.columns[name][row], 0);
+  }
+
+  /** The estimated error of an interpolated value: that of parabolas, by the largest third difference of points around s; it
+   * exceeds the true one several times. 0 at computed points and on circles (whose columns are parabolas), NaN with too few points. */
+  uncertainty(name, s) {
+    if (this.circle || Math.abs(s - Math.round(s)) < 1e-9) return 0;
+    const a = this.abscissa,
+      y = this.columns[name],
+      i = Math.floor(s),
+      at = a[i] + (s - i) * (a[i + 1] - a[i]);
+    let largest = NaN;
+    for (let first = Math.max(i - 2, 0); first <= Math.min(i, this.size - 4); first++) {
+      const secants = [0, 1, 2].map((k) => (y[first + k + 1] - y[first + k]) / (a[first + k + 1] - a[first + k])),
+        bends = [0, 1].map((k) => (secants[k + 1] - secants[k]) / (a[first + k + 2] - a[first + k])),
+        change = Math.abs(bends[1] - bends[0]);
+      if (!(change <= largest)) largest = change;
+    }
+    return largest * Math.abs((at - a[i]) * (at - a[i + 1]));
   }
 
   /** The index at s: that of the piece between two labelled points; null where it is not known. */

@@ -79,11 +79,14 @@ function listBranches() {
   );
 }
 
+/** The place where a branch opens: a computed point about halfway. */
+const opening = (branch) => (branch.circle ? branch.fromWay(0.45) : Math.round(branch.fromWay(0.45)));
+
 async function chooseFamily(i, compare) {
   now.family = FAMILIES[i];
   $("family").value = String(i);
   now.branch = now.family.branches[0];
-  now.s = now.branch.fromWay(0.45);
+  now.s = opening(now.branch);
   [now.x, now.y] = [$("x").value, $("y").value];
   range = extent(false);
   listBranches();
@@ -137,7 +140,7 @@ function connect() {
   $("compare").onchange = $("nu").oninput = $("gamma").oninput = moveOverlay;
   $("branch").onchange = (event) => {
     const branch = now.family.branches[Number(event.target.value)];
-    go(branch, branch.fromWay(0.45));
+    go(branch, opening(branch));
   };
   $("whole").onclick = wholeOrPart;
   $("width").oninput = resized;
@@ -164,7 +167,7 @@ function keyPressed(event) {
   const branches = now.family.branches,
     other = (by) => {
       const branch = branches[(branches.indexOf(now.branch) + by + branches.length) % branches.length];
-      go(branch, branch.fromWay(0.45));
+      go(branch, opening(branch));
     };
   const actions = {
     ArrowRight: () => step(1, event.shiftKey),

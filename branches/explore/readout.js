@@ -9,7 +9,7 @@ function readOut() {
   const tag = `<span class="tag ${kind}">${word}</span>${index && kind === "unstable" ? `, index ${index}` : ""}`;
   const rows = [
     ["branch", escaped(nameOf(branch))],
-    ...COLUMNS.map((name) => [AXES.get(name).brief, digits(branch.value(name, s)), name]),
+    ...COLUMNS.map((name) => [AXES.get(name).brief, digitsAt(branch, name, s), name]),
     ...(STRIPS || branch.hasIndex ? [["stability", tag, "stability"]] : []),
     ...(STRIPS && branch.ruled && !branch.leftOut ? [["rulings cross beyond", percent(widest(shownStrip())), "widest"]] : []),
     ["point", pointName(branch, s), "point"],
@@ -24,7 +24,7 @@ function readOut() {
 
 function pointName(branch, s) {
   if (branch.circle) return "exact";
-  if (Math.abs(s - Math.round(s)) > 1e-9) return `${Math.floor(s)} – ${Math.ceil(s)}`;
+  if (Math.abs(s - Math.round(s)) > 1e-9) return `interpolated, ${Math.floor(s)} – ${Math.ceil(s)}`;
   const label = branch.labels[Math.round(s)];
   return `${Math.round(s)} of ${branch.size - 1}${label ? ` (${escaped(label)})` : ""}`;
 }
@@ -51,7 +51,7 @@ function drawStates() {
         button = item.appendChild(document.createElement("button")),
         [kind, word] = stability(one.branch, one.s);
       button.type = "button";
-      button.innerHTML = `<canvas aria-hidden="true"></canvas><b>${nameOf(one.branch)}</b><small>energy ${minus(one.energy.toFixed(5))}</small><span class="tag ${kind}">${word}</span>`;
+      button.innerHTML = `<canvas aria-hidden="true"></canvas><b>${nameOf(one.branch)}</b><small>energy ${digitsAt(one.branch, "energy", one.s, 5)}</small><span class="tag ${kind}">${word}</span>`;
       if (one.branch === now.branch && one.s === now.s) button.setAttribute("aria-current", "true");
       button.onclick = () => go(one.branch, one.s);
       return item;

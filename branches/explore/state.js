@@ -40,6 +40,14 @@ const short = (value) =>
       .replace(/\.$/, ""),
   );
 const digits = (value) => minus(Math.abs(value) < 1e6 ? value.toFixed(8) : value.toPrecision(9));
+/** A value at a place of a branch: between computed points those digits that hold, after a sign that it is interpolated. */
+function digitsAt(branch, name, s, most = 8) {
+  const value = branch.value(name, s),
+    error = branch.uncertainty(name, s);
+  if (error === 0) return most === 8 ? digits(value) : minus(value.toFixed(most));
+  if (!(error < Math.abs(value) || error < 1)) return `≈ ${minus(value.toPrecision(1))}`;
+  return `≈ ${minus(value.toFixed(Math.min(most, Math.max(0, Math.floor(-Math.log10(error))))))}`;
+}
 const escaped = (text) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
 const loopName = (m) => (m < 0 ? `${LOOPS[-m] || -m + "-fold"} loop, curled the wrong way` : `${LOOPS[m] || m + "-fold"} loop`);
 const percent = (width) => (width < 2 * Math.PI ? `${((100 * width) / (2 * Math.PI)).toPrecision(2)} % width` : "never");

@@ -9,6 +9,7 @@ from typing import TextIO
 
 from contin import checks
 from contin.continuation.run import Continuation
+from contin.errors import ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.state import Stop
@@ -77,6 +78,8 @@ def follow_until_interrupted(run: Continuation, progress: Progress) -> Branch:
     ------
     KeyboardInterrupt
         Ctrl-C before the first point.
+    ProblemError
+        The run starts outside its limits, which leaves it with its first point.
     """
     branch = Branch()
     try:
@@ -88,4 +91,6 @@ def follow_until_interrupted(run: Continuation, progress: Progress) -> Branch:
         run.stop = Stop("interrupted", f"interrupted after {len(branch.points)} points", "trace from the last one goes on")
         print(f"contin: {run.stop}", file=sys.stderr)
     branch.stop, branch.notes = run.stop, run.notes
+    if len(branch.points) == 1 and branch.stop is not None and branch.stop.reason == "limit":
+        raise ProblemError(f"limits: {branch.stop.message}; widen them, or start inside them")
     return branch

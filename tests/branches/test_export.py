@@ -106,20 +106,25 @@ def test_limits_of_width_and_thickness_are_those_of_a_regular_solid(results):
     shape, _ = export.placed(read_branch(results), _fold(results), 1.0)
     width = 0.95 * widest(shape)
     mesh = solid(shape, width, 0.95 * thickest(shape, width))
-    a, b, c, d = (mesh.vertices[mesh.quads[:, i]] for i in range(4))
-    d3 = shape.directors[mesh.stations[mesh.quads[:, 0]], 2]
-    assert np.einsum("ki,ki->k", d - a, d3).min() > 0 and np.einsum("ki,ki->k", c - b, d3).min() > 0
+    assert _along(mesh, shape).min() > 0
     wider = solid(shape, 1.05 * widest(shape), 1e-6)
-    step = wider.vertices[wider.quads[:, 3]] - wider.vertices[wider.quads[:, 0]]
-    assert np.einsum("ki,ki->k", step, shape.directors[wider.stations[wider.quads[:, 0]], 2]).min() < 0
+    assert _along(wider, shape).min() < 0
+
+
+def _along(mesh, shape):
+    """Return the components along d3 of the edges that lead from each node to the next one."""
+    nodes, edges = len(shape.arclength) - 1, np.concatenate([mesh.quads[:, [i, (i + 1) % 4]] for i in range(4)])
+    edges = edges[(mesh.stations[edges[:, 1]] - mesh.stations[edges[:, 0]]) % nodes == 1]
+    step = mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]]
+    return np.einsum("ki,ki->k", step, shape.directors[mesh.stations[edges[:, 0]], 2])
 
 
 def test_a_law_of_rods_has_straight_sections_and_Gamma_gives_a_width(results):
     branch = read_branch(results)
     options = export.arguments(["x.h5", "--point", "LP", "--out", "x.stl", "--length", "10", "--thickness", "0.02"])
     wide = type(branch)(**(vars(branch) | {"config": branch.config | {"Gamma": 4.0}}))
-    assert export._width(wide, options) == pytest.approx(math.sqrt(4.0 * 0.02 * 10 / (2 * math.pi)))
-    assert export._width(branch, options) is None
+    assert wide.width_at(10, options.thickness) == pytest.approx(math.sqrt(4.0 * 0.02 * 10 / (2 * math.pi)))
+    assert branch.width_at(10, options.thickness) is None
     rod = type(branch)(**(vars(branch) | {"config": branch.config | {"law": "flat rod"}}))
     assert not export.placed(rod, _fold(results), 1.0)[0].eta.any()
 
