@@ -104,9 +104,9 @@ class _Copies:
         if own is not None:
             return own
         value = getattr(value, "py_func", value)
-        if isinstance(value, functools._lru_cache_wrapper) and not value.__module__.startswith(_HERE):
+        if isinstance(value, functools._lru_cache_wrapper) and value.__module__ not in _READY:
             value = value.__wrapped__  # recorded numbers are no keys
-        if isinstance(value, (types.FunctionType, functools._lru_cache_wrapper)) and value.__module__.startswith(_HERE):
+        if isinstance(value, (types.FunctionType, functools._lru_cache_wrapper)) and value.__module__ in _READY:
             return value  # it takes recorded numbers
         if isinstance(value, (types.FunctionType, types.MethodType, functools.partial)):
             return self.function(value)
@@ -141,8 +141,10 @@ class _Module:
         return value if own is None else own
 
 
-#: Where functions are written for recorded numbers.
+#: The package whose objects are no user's.
 _HERE = __name__.rpartition(".")[0]
+#: Modules whose functions take recorded numbers as they are.
+_READY = tuple(f"{_HERE}.{name}" for name in ("gradient", "iteration", "recorded_arrays", "signature", "stand_ins"))
 #: Libraries whose functions stay what they are, if there is no stand-in for them.
 _FOREIGN = ("math", "numpy", "scipy", "cmath", "builtins")
 

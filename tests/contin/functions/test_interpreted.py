@@ -72,7 +72,7 @@ def test_a_product_with_a_matrix():
 
 
 def test_the_sentence_says_why_and_what_it_costs():
-    with pytest.warns(InterpretedWarning, match="is evaluated in Python, 10 to 1000 times.*by the complex step"):
+    with pytest.warns(InterpretedWarning, match="is evaluated in Python, 10 to 1000 times.*by differences"):
         solve(AlgebraicProblem(lambda u, p: np.fft.ifft(np.fft.fft(u)).real - p.a, ["x", "y"], {"a": 0.5}), [0.3, 0.3])
     with pytest.warns(InterpretedWarning, match=r"vectorize.* is evaluated.*is no plain Python function"):
         solve(AlgebraicProblem(Vectorized(), ["x"], {"a": 0.25}), [0.0])
