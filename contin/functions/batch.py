@@ -124,12 +124,27 @@ class Batch:
 
     def describe(self) -> str:
         """Return one line: how the functions are evaluated, and how many operations they have."""
-        names = ", ".join(getattr(function, "__name__", "function") for function in self._functions)
         if self.interpreted is not None:
-            return f"{names}: evaluated in Python, because {self.interpreted.reason}"
+            return f"evaluated in Python, because {self.interpreted.reason}"
         every = self.columns(range(len(self.signature.parameters)))
         both = self._slopes(tuple(every.inputs.tolist()))[0].operations
-        return f"{names}: recorded, {self._values_program().operations} operations, {both} with all first derivatives"
+        return f"recorded, {self._values_program().operations} operations, {both} with all first derivatives"
+
+    def text(self, labels: Sequence[str], time: str = "t") -> list[str]:
+        """Return the recorded operations as lines: what is used several times as ``z1 = ...``, then each value.
+
+        ``labels`` are those of u, v and p in order.
+
+        Raises
+        ------
+        ProblemError
+            The functions are evaluated in Python.
+        """
+        if self.recording is None:
+            raise ProblemError(f"there is no text: {self.describe()}")
+        recording = self.recording
+        places = {recording.time: time, **dict(zip(recording.inputs, labels))}
+        return recording.tape.lines(recording.results, places)
 
     # --- values and first derivatives --------------------------------------------------------------------------------
 

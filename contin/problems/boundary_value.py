@@ -112,6 +112,39 @@ class BoundaryValueProblem(Restated):
             self._batches[name] = self._compiled(name)
         return self._batches[name]
 
+    def _groups(self) -> list[str]:
+        return ["field", "boundary", *(["functionals"] if self.functionals else [])]
+
+    def equations(self) -> str:
+        """Return the equations and conditions as text, as they were recorded or derived.
+
+        Raises
+        ------
+        ProblemError
+            A function is evaluated in Python.
+
+        Examples
+        --------
+        >>> import math, contin
+        >>> elastica = contin.VariationalProblem(
+        ...     lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle), ["angle"], {"load": 1.0},
+        ...     ends=lambda a, b, p: (a.angle,),
+        ... )
+        >>> print(elastica.equations())
+        angle' = lam_angle
+        lam_angle' = -(load * sin(angle))
+        0 = angle(0)
+        0 = lam_angle(1)
+        """
+        u, p, (a, b) = self.state_names, tuple(self.parameters), self.domain
+        inside = self.batch("field").text([*u, *p])
+        ends = self.batch("boundary").text([*(f"{name}({a:g})" for name in u), *(f"{name}({b:g})" for name in u), *p])
+        left = [*(f"{name}'" for name in u), *["0 = integral of"] * self.integral_size]
+        shared, values = inside[: len(inside) - len(left)], inside[len(inside) - len(left) :]
+        lines = [*shared, *(f"{name} {value}" if name[0] == "0" else f"{name} = {value}" for name, value in zip(left, values))]
+        count = len(ends) - self.boundary_size
+        return "\n".join([*lines, *ends[:count], *(f"0 = {value}" for value in ends[count:])])
+
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         point = self._of_point.arguments

@@ -68,6 +68,25 @@ class Restated:
         """Return the arguments of the functions that the problem is stated with, by the name of the field."""
         return {}
 
+    def describe(self) -> str:
+        """Return a line for each group of functions: how it is evaluated and why, and how many operations it has.
+
+        Examples
+        --------
+        >>> import contin
+        >>> cubic = contin.AlgebraicProblem(lambda u, p: (p.a - u.x**3,), ["x"], {"a": 8.0})
+        >>> print(cubic.describe())
+        residual: recorded, 3 operations, 6 with all first derivatives
+        """
+        own: Any = self
+        return "\n".join(f"{name}: {own.batch(name).describe()}" for name in self._groups())
+
+    def _groups(self) -> list[str]:
+        """Return the names of the groups of functions."""
+        own: Any = self
+        functionals = ["functionals"] if own.functionals else []
+        return ["residual", *functionals]
+
     def __reduce__(self) -> Any:
         signatures = self._signatures()
         stated = {name: portable(value, signatures.get(name)) for name, value in self._stated.items()}
