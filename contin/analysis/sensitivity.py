@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,13 +10,11 @@ from contin import checks
 from contin.arrays import Array
 from contin.detection.bordered import BorderedMatrix
 from contin.detection.branch_point import BranchPoint
+from contin.discretization.differences import derivative
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.results.point import Point, system_of
 from contin.stepping.trial import Linearization, Trial
-
-#: Step of the central differences of fourth order: the fifth root of round-off, where their error and round-off are equal.
-_STEP = 1e-3
 
 
 def sensitivities(
@@ -88,50 +85,57 @@ def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[st
     return {name: {primary: float(-at[name] / at[primary])} for name in by}
 
 
-def _response(point: Point, name: str) -> Array:
-    """Return the derivative of x by a parameter at a fixed place along the tangent, shape (size,)."""
+def _response(point: Point, column: Array) -> Array:
+    """Return the derivative of x by a parameter at a fixed place along the tangent, shape (size,), from that of F."""
     system = system_of(point, "point")
-    column = system.parameter_columns(point.x, (name,))[:, 0]
     _, factors = system.linearize(point.x, (system.weights * point.tangent,))
     return factors.solve(np.append(-column, 0.0))
 
 
-def _slope(function: Callable[[float], Any]) -> Any:
-    """Return the derivative at 0 of a function of one number, by central differences of fourth order."""
-    h = _STEP
-    return (8 * (function(h) - function(-h)) - (function(2 * h) - function(-2 * h))) / (12 * h)
+def _with(point: Point, name: str) -> tuple[System, Array, Array, float]:
+    """Return the system with one more free parameter, x for it, the derivative of F by it as it is in x, and its size there."""
+    system = system_of(point, "point")
+    wide, x = system.with_free((*system.free, name), point.x)
+    return wide, x, system.parameter_columns(point.x, (name,))[:, 0], float(wide.free_scales[-1])
 
 
 def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) -> dict[str, float]:
     """Return the response, moved along the branch until the held quantity is what it was."""
-    system = system_of(point, "point")
+    system, (wide, x, column, size) = system_of(point, "point"), _with(point, name)
     if held is None:
         held = point.name.partition(" = ")[0] or system.free[0]
-    measure = held if callable(held) else (lambda trial: trial[held])
-    value = system.parameter(point.x, name)
-    response = _response(point, name)
-
-    def measured(x: Array, change: float = 0.0) -> float:
-        return measure(Trial(system.with_parameters({name: value + change}), x, Linearization(point.tangent, np.nan)))
-
-    across = _slope(lambda s: measured(point.x + s * response, s))
-    along = _slope(lambda s: measured(point.x + s * point.tangent))
-    moved = response - (across / along) * point.tangent
+    response = _response(point, column)
+    gradient = None if callable(held) else wide.column_gradient(x, held)
+    if gradient is not None:
+        across, along = (float(gradient @ np.append(v, end)) for v, end in ((response, 1.0), (point.tangent, 0.0)))
+    else:
+        across, along = (_slope_of(point, name, held, v, by) for v, by in ((response, size), (point.tangent, 0.0)))
+    moved = (response - (across / along) * point.tangent) / size
     return dict(zip(system.free, map(float, moved[system.state_size :] * system.free_scales)))
 
 
+def _slope_of(point: Point, name: str, held: str | Callable[[Trial], float], v: Array, change: float) -> float:
+    """Return the derivative of a quantity along v and a change of a parameter, by differences: it may be any function."""
+    system = system_of(point, "point")
+    value, linear = system.parameter(point.x, name), Linearization(point.tangent, np.nan)
+
+    def measured(s: float) -> float:
+        there = system.with_parameters({name: value + s * change}) if change else system
+        trial = Trial(there, point.x + s * v, linear)
+        return held(trial) if callable(held) else trial[held]
+
+    return float(derivative(measured)[0])
+
+
 def _of_branch_point(point: Point, name: str) -> dict[str, float]:
-    """Return the response with both g of the locating equations zero: a particular one, corrected along the kernel."""
-    system, found = system_of(point, "point"), point.details
+    """Return the response with both g of the locating equations zero: a particular one, corrected along the kernel.
+
+    Both g change by -w.F_xx v along the response and the parameter.
+    """
+    system, found, (wide, x, column, size) = system_of(point, "point"), point.details, _with(point, name)
     matrix = BorderedMatrix(system, point.x, found.kernel, found.left)
-    column = system.parameter_columns(point.x, (name,))[:, 0]
     response = matrix.factors.solve(np.concatenate([-column, [0.0, 0.0]]))[:-1]
-    value = system.parameter(point.x, name)
-
-    def gradient(s: float) -> Array:
-        changed = system.with_parameters({name: value + s})
-        return BorderedMatrix(changed, point.x + s * response, found.kernel, found.left).g
-
-    hessian = matrix.hessian(point.x)
-    moved = response - np.linalg.solve(hessian, _slope(gradient)) @ matrix.kernel
+    w, across = matrix.multipliers(), np.append(response, 1.0)
+    slopes = np.array([-w @ wide.along(x, [np.append(v, 0.0), across]) for v in matrix.kernel])
+    moved = (response - np.linalg.solve(matrix.hessian(point.x), slopes) @ matrix.kernel) / size
     return dict(zip(system.free, map(float, moved[system.state_size :] * system.free_scales)))

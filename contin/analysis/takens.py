@@ -20,15 +20,12 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.bends import bends
 from contin.discretization.connections import ConnectionCollocation
 from contin.errors import ProblemError
 from contin.problems.connection import TIME, ConnectionProblem
 
 #: First mesh, and half of the time in units of 1 / e: cut off there, the orbit ends at a distance of 2e-5 of its size.
 _INTERVALS, _DEGREE, _HALF = 40, 4, 7.0
-#: Length of central differences of derivatives by parameters, and of second differences of the residual.
-_DIFFERENCE, _SECOND = 1e-5, 1e-3
 
 
 class Takens:
@@ -68,16 +65,14 @@ class Takens:
         solution: Array = np.linalg.solve(self._bordered, np.append(right_side, 0.0))[:-1]
         return solution
 
-    def _along(self, v: Array) -> Array:
-        """Return B(v, .), the derivative of A along v."""
-        matrix: Array = bends(lambda states: self.base.jacobians(self.x, states), self.x[None, : self.n], v[None])[0][0, 0]
-        return matrix
+    def _along(self, v: Array, w: Array) -> Array:
+        """Return B(v, w), of directions of the states."""
+        return self.base.along(self.x, [np.append(direction, np.zeros(2)) for direction in (v, w)])
 
     def _coefficients(self) -> None:
         """Find a, b, and the terms of second order of the centre manifold, of w^2, w z and z^2."""
         (q0, q1), (p0, p1) = self.q, self.p
-        self.bends = self._along(q0), self._along(q1)
-        of_ww, of_wz, of_zz = self.bends[0] @ q0, self.bends[0] @ q1, self.bends[1] @ q1
+        of_ww, of_wz, of_zz = self._along(q0, q0), self._along(q0, q1), self._along(q1, q1)
         self.a, self.b = float(p1 @ of_ww) / 2, float(p0 @ of_ww + p1 @ of_wz)
         if not self.a or not self.b:
             raise ProblemError("kind: no homoclinic orbits are known to leave from a degenerate Bogdanov-Takens point")
@@ -87,32 +82,18 @@ class Takens:
 
     def _unfolding(self) -> None:
         """Find the columns h_i and k_i, and k."""
-        (p0, p1), n, base = self.p, self.n, self.base
-
-        def columns(v: Array) -> Array:
-            moved = self.x.copy()
-            moved[:n] += v
-            return base.parameter_columns(moved, base.free)
-
-        def change(v: Array) -> Array:
-            h = _DIFFERENCE * (1 + np.abs(self.x[:n]).max()) / np.abs(v).max()
-            result: Array = (columns(h * v) - columns(-h * v)) / (2 * h)
-            return result
-
-        by = [change(v) for v in self.q]
-        matrix = np.block([
-            [self.matrix, columns(np.zeros(n))],
-            [p1 @ self.bends[0], p1 @ by[0]],
-            [p0 @ self.bends[0] + p1 @ self.bends[1], p0 @ by[0] + p1 @ by[1]],
-        ])  # fmt: skip
+        (p0, p1), n, base, x = self.p, self.n, self.base, self.x
+        q0, q1 = (np.append(q, np.zeros(2)) for q in self.q)
+        matrix = np.zeros((n + 2, n + 2))  # A and the columns of both parameters; p1.B(q0, .), and of w z
+        matrix[:n] = np.column_stack([self.matrix, base.parameter_columns(x, base.free)])
+        matrix[n] = base.bent(x, p1, q0)
+        matrix[n + 1] = base.bent(x, p0, q0) + base.bent(x, p1, q1)
         _, wz, zz = self.second
         right_side = np.zeros((n + 2, 2))
         right_side[:, 0] = np.concatenate([self.q[1], [p1 @ wz, p0 @ wz + p1 @ zz]])
         right_side[-1, 1] = 1.0
         self.linear = np.linalg.solve(matrix, right_side)
-        h = _SECOND * (1 + np.abs(self.x).max()) / np.abs(self.linear[:, 1]).max()
-        ends = [base.residual(self.x + sign * h * self.linear[:, 1]) for sign in (1, -1)]
-        square = float(p1 @ (ends[0] + ends[1] - 2 * base.residual(self.x))) / h**2
+        square = float(p1 @ base.along(x, [self.linear[:, 1]] * 2))
         normal = p1 @ matrix[:n, n:]
         self.bent = -square * normal / (normal @ normal)
 

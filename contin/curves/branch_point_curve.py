@@ -17,9 +17,6 @@ from contin.detection.branch_point import locate_branch_point
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 
-#: As in `contin.curves.fold_curve`.
-_DIFFERENCE = 1e-5
-
 
 class BranchPointCurve(Extended):
     """F + beta psi = 0 with both g zero; unknowns [those of ``base`` | beta].
@@ -64,16 +61,14 @@ class BranchPointCurve(Extended):
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
     ) -> tuple[Array, Factors]:
-        """Return the residual and the factored bordered matrix; the gradients of g by differences of transposed products."""
+        """Return the residual and the factored bordered matrix, with the gradients of g, -w.F_xy v."""
         base, y = self.base, x[: self.base.size]
         _, _, matrix = self._bordered(x)
         w = matrix.multipliers()
         gradients = []
         for v in matrix.kernel:
             wide = np.append(v, 0.0)  # the second parameter does not move along the kernel
-            h = _DIFFERENCE / np.abs(v).max()
-            change = base.transposed_product(y + h * wide, w) - base.transposed_product(y - h * wide, w)
-            gradients.append(np.append(-change / (2 * h), 0.0))
+            gradients.append(np.append(-base.bent(y, w, wide), 0.0))
         rows, columns = self.shaped(rows, columns)
         top = np.hstack([np.array(gradients), columns[:, -2:].T])
         psi = self.borders[1]

@@ -14,7 +14,7 @@ Hopf points, the cosine of the angle at torus bifurcations):
 
 They stay regular where r passes zero and the pair becomes real (Bogdanov-Takens points, strong resonances). A curve has the
 unknowns [x | kappa] and the equations F = 0, g = 0. Where the critical multiplier is real, there is one copy of L and no
-kappa. The gradient of g_i is -w_i.(dL v), with w_i from the transposed matrix; as for folds, by differences.
+kappa. The gradient of g_i is -w_i.(dL v), with w_i from the transposed matrix.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from contin.curves.extended import Borders, Extended, cosine
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 
-#: Length of a central difference of Jacobians, and rounds that make borders, as in `contin.curves.fold_curve`.
-_DIFFERENCE, _ROUNDS = 1e-5, 3
+#: Rounds that make borders, as in `contin.curves.fold_curve`.
+_ROUNDS = 3
 #: Cosine between a border and the complex vector that it stands for, below which it is renewed: it is .7 at least when it is
 #: made, and 0 where the bordered matrix is singular. Ten times smaller, the curves of the tests are the same.
 _FITS = 0.5
@@ -166,12 +166,10 @@ class CriticalCurve(Extended):
         for copy, v in enumerate(right):
             wide = np.zeros(base.size)
             self._place(wide, v)
-            h = _DIFFERENCE / max(np.abs(v).max(), 1e-300)
             for i in range(self.copies):
                 w = np.zeros(base.equations)
                 w[: len(left[i, copy])] = left[i, copy]
-                change = base.transposed_product(y + h * wide, w) - base.transposed_product(y - h * wide, w)
-                result[i, : base.size] -= change / (2 * h)
+                result[i, : base.size] -= base.bent(y, w, wide)
         if self.copies == 2:
             result[:, -1] = -self.by_kappa(x, right, left) * self.kappa_size
         return result

@@ -7,8 +7,7 @@ With z all unknowns but the two parameters, the matrix
                                 [  c     0 ]  [ g ] = [ 1 ]
 
 is regular along the curve, and g = 0 exactly where F_z is singular (Griewank & Reddien 1984). The extended system is F = 0, g
-= 0. The gradient of g is -w.F_zy v, with w from the transposed matrix: one difference of transposed products, since w.F_yz v
-is the change of F_y^T w along v.
+= 0. The gradient of g is -w.F_zy v, with w from the transposed matrix.
 """
 
 from __future__ import annotations
@@ -32,9 +31,6 @@ from contin.linalg.factors import Factors
 from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
 
-#: Length of a central difference of Jacobians along v, as its largest component: the cube root of round-off, where the error of
-#: second order and round-off are equal.
-_DIFFERENCE = 1e-5
 #: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
 #: from those of the equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
 _SHRUNK = 0.1
@@ -104,10 +100,7 @@ class FoldCurve(Extended):
 
     def gradient(self, x: Array, v: Array, w: Array) -> Array:
         """Return dg/dx, shape (size,)."""
-        h = _DIFFERENCE / max(np.abs(v).max(), 1e-300)
-        change = self.base.transposed_product(x + h * v, w) - self.base.transposed_product(x - h * v, w)
-        gradient: Array = -change / (2 * h)
-        return gradient
+        return -self.base.bent(x, w, v)
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()

@@ -14,19 +14,10 @@ coordinates s. The branch point is where the gradient vanishes, and the Hessian 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from contin.arrays import Array
 from contin.discretization.protocol import Discretization
-
-#: Length of the differences for the Hessian, as the largest component of the change of x: their error of fourth order and
-#: round-off, which is divided by its square, are both about 1e-10 for derivatives of order one.
-_DIFFERENCE = 5e-3
-#: Differences of second and of fourth order that disagree by more than this part are too long for the equations: they are made
-#: shorter by the next factor, so often at most (to 5e-7, where round-off is 1e-3). At 1e-2 tangents could be wrong by 1e-4.
-_DISAGREE, _SHORTER, _SHORTEST = 1e-3, 0.1, 4
 
 
 class BorderedMatrix:
@@ -74,30 +65,8 @@ class BorderedMatrix:
     def hessian(self, x: Array) -> Array:
         """Return the Hessian of beta, -w.F_xx v_i v_j, shape (2, 2), at the x that the matrix was made at.
 
-        Second differences of fourth order along v_1, v_2 and v_1 + v_2, shorter where the equations bend on a smaller scale.
         F(x(s)) + beta(s) psi = 0 with Phi.x = s is differentiated twice and multiplied by w.
         """
-        w = self.multipliers()
-        here = float(w @ self._system.residual(x))
-        length = _DIFFERENCE
-        hessian, rough = self._differences(x, w, here, length)
-        for _ in range(_SHORTEST):
-            if np.abs(hessian - rough).max() <= _DISAGREE * np.abs(hessian).max():
-                break
-            length *= _SHORTER
-            hessian, rough = self._differences(x, w, here, length)
-        return hessian
-
-    def _differences(self, x: Array, w: Array, here: float, length: float) -> tuple[Array, Array]:
-        """Return the Hessian from differences of a length, of fourth order and of second."""
-
-        def bend(v: Array) -> Any:
-            h = length / np.abs(v).max()
-            near, far = (sum(w @ self._system.residual(x + s * k * h * v) for s in (1, -1)) for k in (1, 2))
-            return np.array([far - 16 * near + 30 * here, 12 * (2 * here - near)]) / (12 * h**2)
-
-        a, b = self.kernel
-        aa, bb = bend(a), bend(b)
-        ab = (bend(a + b) - aa - bb) / 2
-        fourth, second = (np.array([[aa[i], ab[i]], [ab[i], bb[i]]]) for i in (0, 1))
-        return fourth, second
+        w, (a, b) = self.multipliers(), self.kernel
+        aa, ab, bb = (float(-w @ self._system.along(x, pair)) for pair in ((a, a), (a, b), (b, b)))
+        return np.array([[aa, ab], [ab, bb]])

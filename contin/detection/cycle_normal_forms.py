@@ -27,14 +27,15 @@ absolute value is given; it vanishes at a cusp. With a forcing the time s goes o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.detection.lyapunov import Coefficient
-from contin.discretization.bends import bends
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.discretization.multilinear import of_complex
 from contin.discretization.round import Round
 from contin.problems.cycle import PERIOD
 
@@ -71,37 +72,29 @@ class NormalForms:
             v[: along.size] -= self._mean(v, along) / self._mean(along, along) * along
         v = v / np.sqrt(self._mean(v, v))
         here, alpha = self._at_points(v), (v[-1] / self.period if self.system.autonomous else 0.0)
-        w, first = w / self._product(w, here), self._bends(here)[0]
-        slope = 2 * alpha * self._apply(self.jacobian, here)
-        found = self._coefficient([[self._product(w, term) for term in (self._apply(b, here), slope)] for b in first], 2)
+        w = w / self._product(w, here)
+        found = self._coefficient(w, (self._along(here, here), 2 * alpha * self._apply(here)), 2)
         return Coefficient(abs(found.value), found.error, found.size)
 
     def period_doubling(self) -> Coefficient:
         """Return c."""
         v, here, w = self._critical(-1.0)
-        first, second = self._bends(here)
-        values = []
-        for b, c in zip(first, second):
-            h, change = self._periodic(self._apply(b, here))
-            a = -change / (2 * self.period)
-            terms = self._apply(c, here), 3 * self._apply(b, h), -6 * a * self._apply(self.jacobian, here)
-            values.append([self._product(w, term) for term in terms])
-        return self._coefficient(values, 6)
+        h, change = self._periodic(self._along(here, here))
+        a = -change / (2 * self.period)
+        return self._coefficient(w, (self._along(here, here, here), 3 * self._along(here, h), -6 * a * self._apply(here)), 6)
 
     def torus(self, angle: float) -> Coefficient:
         """Return the real part of d."""
         v, here, w = self._critical(np.exp(1j * angle))
-        (real_b, real_c), (imaginary_b, imaginary_c) = self._bends(here.real), self._bends(here.imag)
-        values = []
-        for order in (0, 1):
-            b, c = real_b[order] + 1j * imaginary_b[order], real_c[order] + imaginary_c[order]
-            h, change = self._periodic(self._apply(b, here.conj()).real)
-            a = -change / self.period
-            k = self._at_points(self.plain.solver(np.exp(2j * angle)).solve(self._right_side(self._apply(b, here), self.plain)))
-            slope = -2 * a * (self._apply(self.jacobian, here) - 1j * angle * here)
-            terms = self._apply(c, here), 2 * self._apply(b, h), self._apply(b.conj(), k), slope
-            values.append([self._product(w, term).real for term in terms])
-        return self._coefficient(values, 2)
+        h, change = self._periodic(self._along(here, here.conj()).real)
+        a = -change / self.period
+        twice = self._right_side(self._along(here, here), self.plain)
+        k = self._at_points(self.plain.solver(np.exp(2j * angle)).solve(twice))
+        terms = (
+            self._along(here, here, here.conj()), 2 * self._along(here, h), self._along(here.conj(), k),
+            -2 * a * (self._apply(here) - 1j * angle * here),
+        )  # fmt: skip
+        return self._coefficient(w, terms, 2)
 
     # --- solutions of the linear problems ------------------------------------------------------------------------
 
@@ -154,14 +147,16 @@ class NormalForms:
 
     # --- derivatives ---------------------------------------------------------------------------------------------
 
-    def _bends(self, v: Array) -> tuple[Array, Array]:
-        return bends(lambda states: self.system.rates_by_states(self.x, states), self.points, v)
+    def _along(self, *directions: Any) -> Any:
+        """Return B or C along directions at the Gauss points, real or complex."""
+        return of_complex(lambda parts: self.system.rates_along(self.x, parts), directions)
 
-    @staticmethod
-    def _apply(matrices: Array, v: Array) -> Array:
-        result: Array = np.einsum("kij,kj->ki", matrices, v)
+    def _apply(self, v: Array) -> Array:
+        """Return J v."""
+        result: Array = np.einsum("kij,kj->ki", self.jacobian, v)
         return result
 
-    def _coefficient(self, terms: list[list[Any]], factor: int) -> Coefficient:
-        """Return a coefficient per unit of time, from its terms by derivatives of sixth and of fourth order."""
-        return Coefficient.of(*np.array(terms) / (factor * self.system.unit_time(self.x)))
+    def _coefficient(self, w: Array, terms: Sequence[Array], factor: int) -> Coefficient:
+        """Return the real part of a coefficient per unit of time: the products of w with its terms, over the factor."""
+        products = np.array([self._product(w, term).real for term in terms])
+        return Coefficient.of(products / (factor * self.system.unit_time(self.x)), self.system.derivative_error)

@@ -8,7 +8,7 @@ that make the matrix regular,
                               [ Phi ]                           [   g    ]
 
 the numbers g = G_x V are these derivatives, and lambda are Lagrange's multipliers: F_x^T lambda + Phi^T g = G_x^T. The second
-derivatives are V^T (G_xx - lambda.F_xx) V. One difference of first derivatives along each column of V gives them.
+derivatives are V^T (G_xx - lambda.F_xx) V.
 """
 
 from __future__ import annotations
@@ -19,16 +19,11 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.discretization.differences import derivative
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.stepping.trial import TestFunction, Trial
-
-#: Length of a central difference of first derivatives along a tangent, as its largest component: the cube root of round-off,
-#: where the error of second order and round-off are equal.
-_DIFFERENCE = 1e-5
-#: Length of differences of a column along a tangent, where its derivatives are not known: the fifth root of round-off.
-_LONG = 1e-3
 
 
 class Stationarity:
@@ -75,26 +70,25 @@ class Stationarity:
         return np.array([self._bent(v) for v in self.kernel])
 
     def _bent(self, v: Array) -> Array:
-        h = _DIFFERENCE / max(np.abs(v).max(), 1e-300)
-        ahead, behind = (self._first_derivatives(self._x + s * h * v) for s in (1, -1))
-        bent: Array = (ahead - behind) / (2 * h)
-        return bent
-
-    def _first_derivatives(self, x: Array) -> Array:
-        """Return G_x - F_x^T lambda, shape (size,)."""
-        return gradient_of(self._system, x, self._column) - self._system.transposed_product(x, self.multipliers)
+        """Return the derivative of G_x - F_x^T lambda along v, shape (size,)."""
+        return self._system.column_bent(self._x, self._column, v) - self._system.bent(self._x, self.multipliers, v)
 
     def orthonormal(self) -> Array:
         """Return an orthonormal basis of the tangents, shape (j, size), in the inner product of the system."""
-        root = np.sqrt(self._system.weights)
-        basis: Array = np.asarray(np.linalg.qr((self.kernel * root).T)[0].T / root, dtype=float)
-        return basis
+        return orthonormal(self.kernel, self._system.weights)
 
     def curvatures(self) -> Array:
         """Return the eigenvalues of the second derivatives on orthonormal tangents, shape (j,)."""
         change = np.linalg.lstsq(self.kernel.T, self.orthonormal().T)[0]
         hessian = change.T @ (self.gradients() @ self.kernel.T) @ change
         return np.asarray(np.linalg.eigvalsh((hessian + hessian.T) / 2), dtype=float)
+
+
+def orthonormal(vectors: Array, weights: Array) -> Array:
+    """Return an orthonormal basis, as rows, of the space of some vectors (k, size), in the weighted inner product."""
+    root = np.sqrt(weights)
+    basis: Array = np.asarray(np.linalg.qr((vectors * root).T)[0].T / root, dtype=float)
+    return basis
 
 
 def gradient_of(system: System, x: Array, column: str) -> Array:
@@ -123,12 +117,9 @@ def extremum(column: str) -> TestFunction:
 
 
 def _difference(trial: Trial, column: str) -> float:
-    """Return the derivative of a column along the tangent by a difference of fourth order."""
-
-    def at(s: float) -> float:
-        return Trial(trial.system, trial.x + s * _LONG * trial.tangent, trial.linear)[column]
-
-    return (8 * (at(1) - at(-1)) - (at(2) - at(-2))) / (12 * _LONG)
+    """Return the derivative of a column along the tangent by differences: it has none that is known."""
+    tangent = trial.tangent
+    return float(derivative(lambda s: Trial(trial.system, trial.x + s * tangent, trial.linear)[column])[0])
 
 
 def curvatures(trial: Trial, column: str) -> dict[str, float] | None:

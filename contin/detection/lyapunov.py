@@ -11,17 +11,15 @@ the centre manifold. Where it is positive the bifurcation is subcritical.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.bends import bends
+from contin.discretization.multilinear import of_complex
 from contin.linalg.orientation import oriented
 
-#: An error is no smaller than this part of the terms: round-off, which second differences divide by the square of their length.
-_ROUND_OFF = 1e-13
 #: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
 #: tests are the same.
 _CANCELLED, _ZERO = 1e-6, 1e-9
@@ -83,10 +81,10 @@ class Coefficient(NamedTuple):
     size: float
 
     @classmethod
-    def of(cls, best: Array, rough: Array) -> Coefficient:
-        """Return the coefficient of terms that are computed in two ways."""
-        size = float(np.abs(best).sum())
-        return cls(float(best.sum()), float(abs(best.sum() - rough.sum())) + _ROUND_OFF * size, size)
+    def of(cls, terms: Array, error: float) -> Coefficient:
+        """Return the coefficient of some terms, with the relative error of their derivatives."""
+        size = float(np.abs(terms).sum())
+        return cls(float(terms.sum()), error * size, size)
 
     @property
     def vanishes(self) -> bool:
@@ -100,22 +98,19 @@ class Coefficient(NamedTuple):
 def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:
     """Return the first Lyapunov coefficient at a Hopf point; NaN where another eigenvalue is zero."""
     size = np.ones(system.state_size) if system.scales is None else system.scales.states
-    here, omega, q, w = system.states(x) / size, pair.frequency, pair.right / size, pair.left * size
+    field, omega, q, w = system.as_field(), pair.frequency, pair.right / size, pair.left * size
+    matrix = system.jacobian(x) * size / size[:, None]
 
-    def jacobian(states: Array) -> Array:
-        return system.jacobians(x, states * size) * size / size[:, None]
+    def along(*vectors: Any) -> Any:
+        """Return B or C along directions of the states, of unknowns divided by their sizes."""
+        return of_complex(lambda parts: field.along(x, [np.append(part, still) for part in parts]), vectors)
 
-    matrix = jacobian(here)[0]
-    (real_b, real_c), (imaginary_b, imaginary_c) = (bends(jacobian, here, part[None]) for part in (q.real, q.imag))
-    values = []
-    for order in (0, 1):
-        along_q = real_b[order, 0] + 1j * imaginary_b[order, 0]  # B(q, .)
-        along_both = real_c[order, 0] + imaginary_c[order, 0]  # C(q, q*, .)
-        try:
-            constant = np.linalg.solve(matrix, (along_q @ q.conj()).real)
-            twice = np.linalg.solve(2j * omega * np.eye(len(q)) - matrix, along_q @ q)
-        except np.linalg.LinAlgError:
-            return Coefficient(float("nan"), float("nan"), float("nan"))
-        terms = np.array([along_both @ q, -2 * along_q @ constant, along_q.conj() @ twice])
-        values.append((terms @ w).real / (2 * omega))
-    return Coefficient.of(*values)
+    still, shift = np.zeros(len(x) - len(q)), 2j * omega * np.eye(len(q))
+    try:
+        constant = np.linalg.solve(matrix, along(q, q.conj()).real)
+        twice = np.linalg.solve(shift - matrix, along(q, q))
+    except np.linalg.LinAlgError:
+        return Coefficient(float("nan"), float("nan"), float("nan"))
+    vectors = np.array([along(q, q, q.conj()), -2 * along(q, constant), along(q.conj(), twice)])
+    terms = (vectors * w).real / (2 * omega)
+    return Coefficient.of(terms, system.derivative_error)

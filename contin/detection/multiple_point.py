@@ -3,8 +3,13 @@
 With d columns Psi and 1 + d rows Phi the matrix M of `contin.detection.bordered` is regular there, too. It defines the
 manifold F(x) + Psi beta = 0 over the coordinates s = Phi.(x - x0): beta(s), of d components, with derivatives G from M. At the
 point beta and G vanish (d + d (1 + d) equations for 1 + d unknowns: Gauss-Newton, which converges where a symmetry makes them
-agree). Branches are the zeros of beta. Its terms of second and third order are fitted to G around the point, and their zeros on
-two small spheres are found from many directions; where they converge as the sphere shrinks they are tangents.
+agree). Branches are the zeros of beta. With v_i the derivatives of x, those of second and third order follow from
+
+    M [x_ij; beta_ij] = -[F_xx v_i v_j; 0],
+    M [x_ijk; beta_ijk] = -[F_xxx v_i v_j v_k + F_xx x_ij v_k + F_xx x_ik v_j + F_xx x_jk v_i; 0].
+
+The zeros of these terms on two small spheres are found from many directions; where they converge as the sphere shrinks they
+are tangents.
 """
 
 from __future__ import annotations
@@ -23,11 +28,6 @@ from contin.linalg.orientation import canonical_basis, ordered, oriented, orient
 from contin.linalg.singular import smallest_directions
 from contin.stepping.newton import Newton
 
-#: Step of the differences of G along s, and the radius on which its terms are fitted: small against one, the size of the
-#: unknowns, and large against the cube root of round-off.
-_DIFFERENCE, _RADIUS = 1e-4, 2e-2
-#: How often that radius is cut to a quarter where the coordinates do not reach as far.
-_SMALLER = 2
 #: Of a continuum of branches, G on each has a singular value of zero, found as 1e-10 and below; on a single one at the same
 #: distance it is the square of that, some 1e-4.
 _SINGULAR = 1e-7
@@ -38,7 +38,7 @@ _CONSISTENT = 1e-6
 #: Null vectors of an exactly singular matrix are taken this far along the branch, where it can be factored; they only border
 #: the equations, so a distance ten times larger does as well.
 _ASIDE = 1e-6
-#: An update below this is round-off of the differences.
+#: An update below this is the last one: the next would be its square.
 _ROUND_OFF = 1e-8
 #: Directions from which zeros on a sphere are sought: each of the at most 3^d lines is found many times.
 _DIRECTIONS = 300
@@ -116,11 +116,41 @@ class _Manifold:
             if change <= max(self.newton.tolerance, 1e-14) or (change >= last / 2 and change < _ROUND_OFF):
                 _, factors = system.linearize(z[:size], self.rows, self.psi)
                 unit = np.hstack([np.zeros((len(self.phi), system.equations)), np.eye(len(self.phi))])
+                self.factors, self.x = factors, z[:size]
                 solutions = factors.solve(unit)
                 self.vectors = solutions[:, :size]
                 return z[:size], z[size:], solutions[:, size:].T
             last = change
         raise ConvergenceError("the manifold around a multiple point was not found")
+
+    def _bent(self, right_side: Array) -> tuple[Array, Array]:
+        """Return the terms of x and of beta for derivatives of F of higher order, (equations,)."""
+        solution = self.factors.solve(np.append(-right_side, np.zeros(len(self.phi))))
+        return solution[: self.system.size], solution[self.system.size :]
+
+    def second(self) -> tuple[Array, Array]:
+        """Return x_ij and beta_ij at the last place, shapes (1 + d, 1 + d, size) and (d, 1 + d, 1 + d)."""
+        count = len(self.phi)
+        x, beta = np.empty((count, count, self.system.size)), np.empty((self.d, count, count))
+        for i, j in itertools.combinations_with_replacement(range(count), 2):
+            of_x, of_beta = self._bent(self.system.along(self.x, [self.vectors[i], self.vectors[j]]))
+            x[i, j] = x[j, i] = of_x
+            beta[:, i, j] = beta[:, j, i] = of_beta
+        return x, beta
+
+    def third(self, second: Array) -> Array:
+        """Return beta_ijk at the last place, shape (d, 1 + d, 1 + d, 1 + d), from x_ij."""
+        count, v, along = len(self.phi), self.vectors, self.system.along
+        beta = np.empty((self.d, count, count, count))
+        for places in itertools.combinations_with_replacement(range(count), 3):
+            right_side = along(self.x, [v[place] for place in places])
+            for one in range(3):
+                i, j = (place for at, place in enumerate(places) if at != one)
+                right_side = right_side + along(self.x, [second[i, j], v[places[one]]])
+            found = self._bent(right_side)[1]
+            for i, j, k in set(itertools.permutations(places)):
+                beta[:, i, j, k] = found
+        return beta
 
 
 def locate_multiple_point(
@@ -146,7 +176,7 @@ def locate_multiple_point(
         manifold, s = _bordered(system, x, row, dimension, newton), np.zeros(1 + dimension)
         for _ in range(_MOST_STEPS):
             _, beta, G = manifold.at(s)
-            slopes = _slopes(manifold, s)
+            slopes = manifold.second()[1]
             residual = np.append(beta, G.ravel())
             jacobian = np.vstack([G, slopes.reshape(-1, 1 + dimension)])
             update = np.linalg.lstsq(jacobian, residual, rcond=1e-8)[0]
@@ -179,15 +209,6 @@ def _orthonormal(system: Discretization, vectors: Array) -> Array:
     q, _ = np.linalg.qr((vectors * root).T)
     result: Array = q.T / root
     return result
-
-
-def _slopes(manifold: _Manifold, s: Array) -> Array:
-    """Return the derivatives of G by s, shape (d, 1 + d, 1 + d), by central differences."""
-    columns = []
-    for direction in np.eye(len(s)):
-        ahead, behind = (manifold.at(s + sign * _DIFFERENCE * direction)[2] for sign in (1, -1))
-        columns.append((ahead - behind) / (2 * _DIFFERENCE))
-    return np.stack(columns, axis=2)
 
 
 def _described(manifold: _Manifold, s: Array, row: Array) -> MultiplePoint:
@@ -225,7 +246,9 @@ def _of_cycles(system: CycleCollocation, x: Array) -> bool:
 def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool]:
     """Return the directions in s of the branches, one of each line, and whether they form a continuum."""
     count = len(s)
-    linear, quadratic = _fitted(manifold, s)
+    manifold.at(s)
+    second, linear = manifold.second()
+    quadratic = manifold.third(second) / 2
     random = np.random.default_rng(7)
     starts = random.standard_normal((_DIRECTIONS, count))
     starts = np.vstack([np.eye(count), starts / np.linalg.norm(starts, axis=1)[:, None]])
@@ -259,40 +282,6 @@ def _is_isolated(manifold: _Manifold, s: Array, direction: Array) -> bool:
     except ConvergenceError:
         pass
     return True
-
-
-def _fitted(manifold: _Manifold, s: Array) -> tuple[Array, Array]:
-    """Return the terms of G of first and second order around s: shapes (d, 1 + d, 1 + d), (d, 1 + d, 1 + d, 1 + d).
-
-    Raises
-    ------
-    ConvergenceError
-    """
-    radius = _RADIUS
-    for _ in range(_SMALLER):
-        try:
-            return _fit(manifold, s, radius)
-        except ConvergenceError:  # the coordinates do not reach as far
-            radius /= 4
-    return _fit(manifold, s, radius)
-
-
-def _fit(manifold: _Manifold, s: Array, radius: float) -> tuple[Array, Array]:
-    count = len(s)
-    pairs = list(itertools.combinations_with_replacement(range(count), 2))
-    random = np.random.default_rng(3)
-    places = random.standard_normal((2 * (count + len(pairs)), count))
-    places *= radius / np.linalg.norm(places, axis=1)[:, None]
-    places = np.vstack([places, -places])
-    values = np.array([manifold.at(s + place)[2] for place in places])
-    columns = np.hstack([places, np.array([[place[i] * place[j] for i, j in pairs] for place in places])])
-    fit = np.linalg.lstsq(columns, values.reshape(len(places), -1), rcond=None)[0].reshape(-1, *values.shape[1:])
-    linear = np.moveaxis(fit[:count], 0, 2)
-    quadratic = np.zeros((*values.shape[1:], count, count))
-    for (i, j), term in zip(pairs, fit[count:]):
-        quadratic[:, :, i, j] += term / 2
-        quadratic[:, :, j, i] += term / 2
-    return linear, quadratic
 
 
 def _zeros(linear: Array, quadratic: Array, radius: float, starts: Array) -> list[Array]:

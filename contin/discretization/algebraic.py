@@ -14,6 +14,7 @@ from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
+from contin.functions.batch import Batch
 from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
 from contin.linalg.rightmost import rightmost
@@ -164,6 +165,27 @@ class Algebraic(System):
         product: Array = self._jacobian(x)[1].T @ w
         return product
 
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (equations,)."""
+        u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
+        wide = [self._wide(v, v[None, :n]) for v in directions]
+        found: Array = self._residual.along(_NO_TIME, u, _none(n), p, wide)[0]
+        return found
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,)."""
+        if self.problem.batch("residual").interpreted is not None:
+            return super().bent(x, w, v)  # two Jacobians, given or with a given pattern, instead of one value for each entry
+        u, p, n, batch = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size, self._residual
+        wide = self._wide(v, v[None, :n])
+        found: Array = batch.bent(_NO_TIME, u, _none(n), p, w[None], wide, batch.columns(self._free))[0]
+        return found
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """The residual."""
+        return (self.problem.batch("residual"),)
+
     def jacobian(self, x: Array) -> Array:
         """Return F_u in the user's units, shape (equations, n)."""
         jacobian: Array = self.jacobians(x, self.states(x))[0]
@@ -224,6 +246,18 @@ class Algebraic(System):
             0, names.index(name)
         ]
         return gradient
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,)."""
+        names = tuple(self.problem.functionals)
+        if name not in names:
+            return super().column_bent(x, name, v)
+        batch, n = self._batch("functionals"), self.state_size
+        weights = np.zeros((1, len(names)))
+        weights[0, names.index(name)] = 1.0
+        given = _NO_TIME, x[:n].reshape(1, -1), _none(n), self._scaled_parameters(x)
+        found: Array = batch.bent(*given, weights, self._wide(v, v[None, :n]), batch.columns(self._free))[0]
+        return found
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Algebraic, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""

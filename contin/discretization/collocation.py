@@ -21,7 +21,7 @@ from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
 from contin.errors import ProblemError
-from contin.functions.batch import Columns
+from contin.functions.batch import Batch, Columns
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks, Layout, layout
@@ -254,6 +254,50 @@ class Collocation(System):
         result[self.state_size :] += inside[:, inner + 2 * n :].sum(axis=0) + corner.T @ w[conditions:]
         return result
 
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (equations,); the part with u' is linear."""
+        n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
+        inside = [self._wide(v, self.at_gauss_points(v)) for v in directions]
+        field = self._field.along(self._times, self.at_gauss_points(x), _NONE(n), p, inside)
+        ends = [self._wide(v, self._both_ends(v)) for v in directions]
+        boundary = self._boundary.along(_TIME, u[:1], u[-1:], p, ends)[0]
+        collocation = -(self._h_points * field[:, :n]).ravel()
+        return np.concatenate([collocation, boundary, self._quadrature @ field[:, n:]])
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,): that of each function at its place, taken back to the nodes."""
+        n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
+        inner = self._times.size * n
+        conditions = inner + self.problem.boundary_size
+        weights = np.empty((self._times.size, n + self.problem.integral_size))
+        weights[:, :n] = -self._h_points * w[:inner].reshape(-1, n)
+        weights[:, n:] = self._quadrature[:, None] * w[conditions : self._conditions]
+        given = self._times, self.at_gauss_points(x), _NONE(n), p, weights, self._wide(v, self.at_gauss_points(v))
+        result = self._to_nodes(self._field.bent(*given, self.problem.batch("field").columns(self._free)))
+        ends = self._wide(v, self._both_ends(v))
+        columns = self.problem.batch("boundary").columns(self._free)
+        at_ends = self._boundary.bent(_TIME, u[:1], u[-1:], p, w[None, inner:conditions], ends, columns)[0]
+        result[:n] += at_ends[:n]
+        result[self.state_size - n : self.state_size] += at_ends[n : 2 * n]
+        result[self.state_size :] += at_ends[2 * n :]
+        return result
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """Right-hand side with integrands, and boundary conditions."""
+        return self.problem.batch("field"), self.problem.batch("boundary")
+
+    def _both_ends(self, v: Array) -> Array:
+        """Return the states at both ends side by side, shape (1, 2 n)."""
+        return np.concatenate([v[: self._n], v[self.state_size - self._n : self.state_size]])[None]
+
+    def _to_nodes(self, slopes: Array) -> Array:
+        """Return derivatives by x, shape (size,), from those by states and free parameters at Gauss points, (N d, n + k)."""
+        by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
+        by_node = np.zeros((self.nodes.size, self._n))
+        np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
+        return np.append(by_node.ravel(), slopes[:, self._n :].sum(axis=0))
+
     def functionals(self, x: Array) -> Array:
         """Return the values of the problem's functionals, in their order, by the same quadrature."""
         if not self.problem.functionals:
@@ -275,10 +319,18 @@ class Collocation(System):
         batch, at = self._functional_derivatives, self._integrated.index(name)
         given = self._times, self.at_gauss_points(x), _NONE(self._n), self._scaled_parameters(x)
         slopes = self._quadrature[:, None] * batch.jacobian(*given, batch.columns(self._free))[1][:, at]
-        by_points = slopes[:, : self._n].reshape(self.intervals, self._d, self._n)
-        by_node = np.zeros((self.nodes.size, self._n))
-        np.add.at(by_node, self._by_interval, np.einsum("qm,jqa->jma", self.basis.value, by_points))
-        return np.append(by_node.ravel(), slopes[:, self._n :].sum(axis=0))
+        return self._to_nodes(slopes)
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
+        if name not in self._integrated:
+            return super().column_bent(x, name, v)
+        batch = self._functional_derivatives
+        weights = np.zeros((self._times.size, len(self._integrated)))
+        weights[:, self._integrated.index(name)] = self._quadrature
+        given = self._times, self.at_gauss_points(x), _NONE(self._n), self._scaled_parameters(x)
+        slopes = batch.bent(*given, weights, self._wide(v, self.at_gauss_points(v)), batch.columns(self._free))
+        return self._to_nodes(slopes)
 
     @functools.cached_property
     def _functional_derivatives(self) -> Any:

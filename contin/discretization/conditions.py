@@ -31,6 +31,14 @@ class Conditioned(Collocation):
     def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return their derivatives by any parameters, shape (q, len(names))."""
 
+    def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return their derivative along two or three directions, shape (q,); 0 where they are linear."""
+        return np.zeros(self.equations - self._conditions)
+
+    def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of their derivative along v, multiplied by w (q,), shape (size,); 0 where they are linear."""
+        return np.zeros(self.size)
+
     def residual(self, x: Array) -> Array:
         """Return the residual of the discrete equations at x, the further conditions last."""
         return np.concatenate([super().residual(x), self.condition_values(x)])
@@ -56,3 +64,11 @@ class Conditioned(Collocation):
         own = self.conditions_with_rows(x)[1]
         product: Array = super().transposed_product(x, w[: self._conditions]) + own.T @ w[self._conditions :]
         return product
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (equations,)."""
+        return np.concatenate([super().along(x, directions), self.conditions_along(x, directions)])
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,)."""
+        return super().bent(x, w, v) + self.conditions_bent(x, w[self._conditions :], v)

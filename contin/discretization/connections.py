@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Indices
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
 from contin.discretization.mesh import MeshControl, adapted_mesh
+from contin.discretization.multilinear import Numbers, shares, subsets
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
 from contin.errors import ConvergenceError
@@ -18,9 +19,6 @@ from contin.problems.connection import ConnectionProblem
 
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
 _MOVED = 1e-6
-#: Length of a central difference of invariant subspaces by a parameter, relative to 1 + its size. What it multiplies is the
-#: small distance of an end from its equilibrium.
-_DIFFERENCE = 1e-6
 
 
 class ConnectionCollocation(Conditioned):
@@ -59,7 +57,7 @@ class ConnectionCollocation(Conditioned):
         other.reference = np.array(x)
         other._phase = other.phase_row(other._scaled_states(x))
         other._target = float(other._phase @ x)
-        other._bases = tuple(_orthonormal(left) for left in other._left_vectors(other.all_parameters(x)[None], None)[0])
+        other._bases = tuple(_orthonormal(left) for left in other._left_vectors(other.all_parameters(x)))
         return other
 
     _phase: Array
@@ -85,48 +83,111 @@ class ConnectionCollocation(Conditioned):
         jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.columns([]))[1][0, :, :n]
         return jacobian * sizes / sizes[:, None]
 
-    def _left_vectors(self, p: Array, bases: Any) -> list[list[Array]]:
-        """Return [L, L'] for each of the values of all parameters, p of shape (m, number of names)."""
-        found = []
-        for values, *places in zip(p, *self._places(p)):
-            both = []
-            for end, (place, count) in enumerate(zip(places, self.problem.conditions)):
-                left = _left_subspace(self._jacobian_at(place, values), count, stable=end == 0)
-                both.append(left if bases is None else np.linalg.solve(left @ bases[end].T, left))
-            found.append(both)
+    def _left_vectors(self, p: Array) -> list[Array]:
+        """Return bases of the spaces of L and L' for values of all parameters, not normalized."""
+        places = self._places(p[None])
+        return [
+            _left_subspace(self._jacobian_at(place[0], p), count, stable=end == 0)
+            for end, (place, count) in enumerate(zip(places, self.problem.conditions))
+        ]
+
+    def _subspaces_along(self, p: Array, directions: Sequence[Array]) -> list[dict[Numbers, Array]]:
+        """Return L, and then L', with their derivatives along directions of all parameters, for all subsets of the directions.
+
+        L is where R = L A P vanishes, with P = I - Q^T L. The derivatives of the three factors are shared out in all ways. The
+        unknown one, X, comes twice, X A P - L A Q^T X, and X Q^T = 0: X = Y N^T with the orthonormal N of the complement of Q
+        leaves Sylvester's equation for Y.
+        """
+        from scipy.linalg import null_space, solve_sylvester  # type: ignore[import-untyped]  # .1 s; only this needs it
+
+        found: list[dict[Numbers, Array]] = []
+        n, sizes, numbers = self._n, self._sizes, subsets(len(directions))
+        batch, none = self.problem.batch("vector field"), np.empty((0, self._n))
+        for end, place in enumerate(self._places(p[None])):
+            moves = [np.append(self._places(v[None])[end][0], v)[None] for v in directions]
+            given = np.zeros(1), place, none, p, batch.columns([])
+            field: dict[Numbers, Array] = {
+                chosen: batch.jacobian_along(*given, [moves[i] for i in chosen])[0, :, :n] * sizes / sizes[:, None]
+                for chosen in numbers[1:]
+            }
+            A = field[()] = self._jacobian_at(place[0], p)
+            Q = self._bases[end]
+            left = _left_subspace(A, self.problem.conditions[end], stable=end == 0)
+            L = np.linalg.solve(left @ Q.T, left)
+            known: dict[Numbers, Array] = {(): L}
+            N = null_space(Q) if len(Q) else np.eye(n)
+            inside, own = N.T @ (A - A @ Q.T @ L) @ N, L @ A @ Q.T
+            for chosen in numbers[1:] if len(Q) else ():
+                right: Any = sum(known[u] @ field[v] for u, v in shares(chosen, 2) if u != chosen)
+                for u, v, w in shares(chosen, 3):
+                    if chosen not in (u, w):
+                        right = right - known[u] @ field[v] @ Q.T @ known[w]
+                known[chosen] = solve_sylvester(-own, inside, -right @ N) @ N.T
+            found.append(known if len(Q) else dict.fromkeys(numbers, L))
         return found
 
     def _conditions_at_ends(self, x: Array, names: Sequence[str]) -> tuple[Array, Array, Array]:
         """Return the projection and phase conditions, their derivatives by the states, and by parameters."""
-        p, n, places = self.all_parameters(x), self._n, self._indices(names)
-        sizes = self._sizes
-        steps = _DIFFERENCE * (1 + np.abs(p[places]))
-        varied = np.repeat(p[None], 1 + 2 * len(names), axis=0)
-        varied[1 + np.arange(len(names)), places] += steps
-        varied[1 + len(names) + np.arange(len(names)), places] -= steps
-        left = self._left_vectors(varied, self._bases)
-        rest = [place[0] / sizes for place in self._places(p[None])]
-        states = self._scaled_states(x)
+        p, places = self.all_parameters(x), self._indices(names)
         values, by_states = [], np.zeros((self._further, self.state_size))
         by_parameters = np.zeros((self._further, len(names)))
-        row = 0
-        for end, at in enumerate((0, self.state_size - n)):
-            apart = states[-end] - rest[end]
-            L = left[0][end]
-            here = slice(row, row + len(L))
-            values.append(L @ apart)
-            by_states[here, at : at + n] = L
-            for j, step in enumerate(steps):
-                change = (left[1 + j][end] - left[1 + len(names) + j][end]) / (2 * step)
-                by_parameters[here, j] = change @ apart
-            own = self.problem.multipliers[:n] if end == 0 else self.problem.multipliers[-n:]
-            for i, name in enumerate(own):
-                if name in names:
-                    by_parameters[here, list(names).index(name)] -= L[:, i] / sizes[i]
-            row += len(L)
+        for place, row in enumerate(self._unit_directions(places)):
+            moved = self._end_rows(x, self._subspaces_along(p, [row]), [np.zeros(self.state_size)], [row])
+            by_parameters[:-1, place] = moved
+        for end, (here, at, L) in enumerate(self._end_places(self._subspaces_along(p, []))):
+            values.append(L[()] @ self.apart(x)[end])
+            by_states[here, at : at + self._n] = L[()]
         values.append(np.array([self._phase @ x - self._target]))
         by_states[-1] = self._phase[: self.state_size]
         return np.concatenate(values), by_states, by_parameters
+
+    def _unit_directions(self, places: Indices) -> Array:
+        """Return directions of all parameters, one for each of some of them, shape (m, number of names)."""
+        units: Array = np.eye(len(self.parameters))[places]
+        return units
+
+    def _end_places(self, subspaces: list[dict[Numbers, Array]]) -> list[tuple[slice, int, dict[Numbers, Array]]]:
+        """Return of both ends the rows of the projection conditions, the place of the states in x, and L with derivatives."""
+        first, last = (len(known[()]) for known in subspaces)
+        rows = slice(0, first), slice(first, first + last)
+        return list(zip(rows, (0, self.state_size - self._n), subspaces))
+
+    def _end_rows(
+        self, x: Array, subspaces: list[dict[Numbers, Array]], states: Sequence[Array], parameters: Sequence[Array]
+    ) -> Array:
+        """Return the derivative of the projection conditions L (u - e) along directions of the states and of all parameters."""
+        every, result = tuple(range(len(states))), []
+        for end, (_, at, L) in enumerate(self._end_places(subspaces)):
+            value = L[every] @ self.apart(x)[end]
+            for i in every:
+                change = states[i][at : at + self._n] - self._places(parameters[i][None])[end][0] / self._sizes
+                value = value + L[every[:i] + every[i + 1 :]] @ change
+            result.append(value)
+        return np.concatenate(result)
+
+    def _directions_of(self, v: Array) -> tuple[Array, Array]:
+        """Return a direction of x as one of the states and one of all parameters, in the user's units."""
+        parameters = np.zeros(len(self.parameters))
+        parameters[self._free] = v[self.state_size :] * self.free_scales
+        return v[: self.state_size], parameters
+
+    def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of these conditions along several directions; the phase condition is linear."""
+        states, parameters = zip(*(self._directions_of(v) for v in directions))
+        subspaces = self._subspaces_along(self.all_parameters(x), parameters)
+        return np.append(self._end_rows(x, subspaces, states, parameters), 0.0)
+
+    def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(their derivative along v) by x: by the states at the ends, and by each free parameter."""
+        result, p, (states, along) = np.zeros(self.size), self.all_parameters(x), self._directions_of(v)
+        for here, at, L in self._end_places(self._subspaces_along(p, [along])):
+            result[at : at + self._n] += w[here] @ L[0,]
+        still = np.zeros(self.state_size)
+        for place, unit in enumerate(self._unit_directions(self._free)):
+            own = unit * self.free_scales[place]
+            rows = self._end_rows(x, self._subspaces_along(p, [along, own]), [states, still], [along, own])
+            result[self.state_size + place] = w[:-1] @ rows
+        return result
 
     def condition_values(self, x: Array) -> Array:
         """Return the projection and phase conditions."""
@@ -139,7 +200,8 @@ class ConnectionCollocation(Conditioned):
 
     def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of these conditions by any parameters."""
-        return self._conditions_at_ends(x, names)[2]
+        by_parameters = self._conditions_at_ends(x, names)[2]
+        return by_parameters if self.scales is None else by_parameters * self.scales.parameters[self._indices(names)]
 
     # --- for special points of homoclinic orbits -----------------------------------------------------------------
 
@@ -156,7 +218,7 @@ class ConnectionCollocation(Conditioned):
 
     def adjoint_at_ends(self, x: Array, w: Array) -> tuple[Array, Array]:
         """Return L^T w and L'^T w, of the entries of a left vector that belong to the projection conditions."""
-        first, last = self._left_vectors(self.all_parameters(x)[None], self._bases)[0]
+        first, last = (known[()] for known in self._subspaces_along(self.all_parameters(x), []))
         own = w[-self._further :]
         return first.T @ own[: len(first)], last.T @ own[len(first) : len(first) + len(last)]
 
@@ -209,7 +271,7 @@ def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:
     ConvergenceError
         The equilibrium has not so many.
     """
-    from scipy.linalg import schur  # type: ignore[import-untyped]  # .1 s; only this needs it
+    from scipy.linalg import schur  # .1 s; only this needs it
 
     if not np.all(np.isfinite(jacobian)):
         raise ConvergenceError("the Jacobian of the vector field at the equilibrium is not finite")

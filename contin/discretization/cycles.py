@@ -147,6 +147,14 @@ class PeriodicCollocation(Collocation):
         derivatives: Array = self._field.jacobian(times, points, none, p, columns)[1][:, :n, :n]
         return derivatives
 
+    def rates_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of T F at the Gauss points along directions of the states there, all scaled, (N d, n) each."""
+        still, none = np.zeros(self.size), np.empty((0, self._n))
+        wide = [self._wide(still, states) for states in directions]
+        points, p = self.at_gauss_points(x), self._scaled_parameters(x)
+        found: Array = self._field.along(self._times, points, none, p, wide)[:, : self._n]
+        return found
+
     def _jacobian_of_field(self, x: Array) -> Array:
         """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N d, n, n)."""
         return self.rates_by_states(x, self.at_gauss_points(x))

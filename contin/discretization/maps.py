@@ -10,7 +10,9 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import is_opposite
+from contin.discretization.multilinear import partitions, subsets
 from contin.discretization.scales import Scales
+from contin.functions.batch import Batch
 from contin.problems.cycle import ROUNDS, rounds_of
 from contin.problems.map import MapProblem
 
@@ -76,6 +78,54 @@ class MapSystem(Algebraic):
             total[:, n:] += jacobian[:, n:]
         total[:, :n] -= np.eye(n)
         return states[0] - x[:n], total
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several directions, shape (n,): the chain rule for every round.
+
+        The derivative of f(u) along some of them is the sum over all ways to divide them into groups, of the derivative of f
+        along those of u along each group.
+        """
+        batch, p, n = self.problem.batch("map"), self.all_parameters(x), self.state_size
+        time, none, numbers = np.zeros(1), np.empty((0, n)), subsets(len(directions))
+        of_states = {chosen: np.zeros((1, n)) for chosen in numbers}
+        of_states[()] = x[None, :n]
+        of_states |= {(i,): v[None, :n] for i, v in enumerate(directions)}
+        for _ in range(self.rounds):
+            still = np.zeros(self.size)
+            wide = {
+                chosen: self._wide(directions[chosen[0]] if len(chosen) == 1 else still, of_states[chosen])
+                for chosen in numbers[1:]
+            }
+            of_states = {
+                chosen: sum(
+                    batch.along(time, of_states[()], none, p, [wide[group] for group in groups])
+                    for groups in partitions(chosen)
+                )
+                for chosen in numbers
+            }
+        found: Array = of_states[numbers[-1]][0]
+        return found
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v), shape (size,): all rounds forwards, then back with multipliers of u and of v."""
+        batch, p, n = self.problem.batch("map"), self.all_parameters(x), self.state_size
+        columns, time, none = batch.columns(self._free), np.zeros(1), np.empty((0, n))
+        states, tangent, rounds = x[None, :n], np.array(v), []
+        for _ in range(self.rounds):
+            after, (jacobian,) = batch.jacobian(time, states, none, p, columns)
+            rounds.append((states, self._wide(tangent, tangent[None, :n]), jacobian))
+            states, tangent = after, np.append(jacobian @ tangent, tangent[n:])
+        of_state, of_tangent, by_parameters = np.zeros(n), np.array(w), np.zeros(self.size - n)
+        for here, wide, jacobian in reversed(rounds):
+            change = of_state @ jacobian + batch.bent(time, here, none, p, of_tangent[None], wide, columns)[0]
+            of_state, of_tangent = change[:n], of_tangent @ jacobian[:, :n]
+            by_parameters += change[n:]
+        return np.append(of_state, by_parameters)
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """The map."""
+        return (self.problem.batch("map"),)
 
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (n, len(names))."""

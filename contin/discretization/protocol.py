@@ -9,8 +9,12 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
+import numpy as np
+
 from contin.arrays import Array
+from contin.discretization.differences import derivative
 from contin.discretization.mesh import MeshControl
+from contin.discretization.multilinear import of_lines
 from contin.linalg.factors import Factors
 from contin.problems.statement import Statement
 
@@ -94,6 +98,18 @@ class Discretization(Equations, Protocol):
     @abstractmethod
     def functionals(self, x: Array) -> Array:
         """Return the values of the problem's functionals."""
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along two or three directions, F_xx[v1, v2] or F_xxx[v1, v2, v3], shape (equations,).
+
+        Kinds of system that state no derivatives of F of higher order have differences of the residual, along lines.
+        """
+
+        def bend(v: Array) -> Array:
+            found: Array = derivative(lambda s: self.residual(x + s * v), len(directions), 1 / np.abs(v).max())[0]
+            return found
+
+        return of_lines(bend, directions)
 
     @abstractmethod
     def carrier(self, other: Any) -> Carrier:

@@ -93,9 +93,7 @@ class ScaledBatch:
         along = [direction * self._inputs for direction in directions]
         return self._batch.along(*self._given(t, u, v, p), along) / self._values
 
-    def jacobian_along(
-        self, t: Array, u: Array, v: Array, p: Array, columns: Columns, directions: Sequence[Array]
-    ) -> Array:
+    def jacobian_along(self, t: Array, u: Array, v: Array, p: Array, columns: Columns, directions: Sequence[Array]) -> Array:
         """Return the derivative of the Jacobian along directions, as `Batch.jacobian_along`."""
         along = [direction * self._inputs for direction in directions]
         jacobian = self._batch.jacobian_along(*self._given(t, u, v, p), columns, along)

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Indices
+from contin.discretization.differences import derivative
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import ScaledBatch, Scales
 from contin.errors import ProblemError
+from contin.functions.batch import Batch
 from contin.problems.statement import Statement, with_multipliers
 
 
@@ -145,6 +147,43 @@ class System(Discretization):
     def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
 
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v) by x, the derivative of F_x^T w along v, shape (size,).
+
+        ``w`` has the shape (equations,), ``v`` (size,). Kinds of system that state no derivatives of F of higher order have
+        differences of `transposed_product`.
+        """
+        longest = np.abs(v).max(initial=0.0)
+        if not longest:
+            return np.zeros(self.size)
+        found: Array = derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / longest)[0]
+        return found
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
+        longest = np.abs(v).max(initial=0.0)
+        if name in self.problem.parameters or not longest:
+            return np.zeros(self.size)
+        found: Array = derivative(lambda s: self.column_gradient(x + s * v, name), 1, 1 / longest)[0]
+        return found
+
+    @property
+    def derivative_error(self) -> float:
+        """Estimated relative error of second and third derivatives: round-off, or that of differences."""
+        return max([_ROUND_OFF, *(batch.interpreted.error for batch in self._evaluated if batch.interpreted is not None)])
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """The functions that the equations are made of."""
+        return ()
+
+    def _wide(self, v: Array, states: Array) -> Array:
+        """Return directions in the space of all inputs of functions: of states (K, n), and of the free parameters in v."""
+        wide = np.zeros((len(states), states.shape[1] + len(self.parameters)))
+        wide[:, : states.shape[1]] = states
+        wide[:, states.shape[1] + self._free] = v[self.state_size :]
+        return wide
+
     @abstractmethod
     def refined(self) -> tuple[System, Carrier] | None:
         """Return the same problem with every interval halved, and the carrier; None without a mesh."""
@@ -164,3 +203,7 @@ class System(Discretization):
     @abstractmethod
     def with_free(self, free: Sequence[str], x: Array) -> tuple[System, Array]:
         """Return the same problem with other free parameters (values from x), and x for it."""
+
+
+#: Round-off of derivatives that are exact, relative to the sum of the absolute values of their terms.
+_ROUND_OFF = 1e-15

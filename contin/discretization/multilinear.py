@@ -1,0 +1,97 @@
+"""Multilinear forms: derivatives of a function along several directions, combined.
+
+Directions are numbered, and a derivative along some of them belongs to a tuple of their numbers, in order.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+
+#: Numbers of directions.
+Numbers = tuple[int, ...]
+
+
+def of_complex(form: Callable[[Sequence[Array]], Array], vectors: Sequence[Any]) -> Any:
+    """Return a real multilinear form of complex vectors, from its values at their real and imaginary parts.
+
+    Examples
+    --------
+    >>> print(of_complex(lambda v: v[0] * v[1], [np.array([1 + 2j]), np.array([3 - 1j])]).item())
+    (5+5j)
+    """
+    parts = [[(1.0, vector)] if np.isrealobj(vector) else [(1.0, vector.real), (1j, vector.imag)] for vector in vectors]
+    total: Any = 0.0
+    for chosen in itertools.product(*parts):
+        factor = np.prod([part[0] for part in chosen])
+        total = total + factor * form([np.ascontiguousarray(part[1]) for part in chosen])
+    return total
+
+
+def of_lines(form: Callable[[Array], Array], directions: Sequence[Array]) -> Array:
+    """Return a symmetric multilinear form of several directions, from its values ``form(v)`` with equal ones (polarization).
+
+    Examples
+    --------
+    >>> print(of_lines(lambda v: v[:1] * v[:1] * v[1:], [np.array([1.0, 0.0])] * 2 + [np.array([2.0, 5.0])]).round(6).item())
+    1.666667
+    """
+    sizes = [float(np.abs(direction).max(initial=0.0)) for direction in directions]
+    if not all(sizes):
+        return np.zeros_like(form(directions[0]))
+    units = [direction / size for direction, size in zip(directions, sizes)]
+    count = len(units)
+    total: Any = 0.0
+    for signs in itertools.product((1.0, -1.0), repeat=count - 1):
+        along = units[0] + sum(sign * unit for sign, unit in zip(signs, units[1:]))
+        if np.any(along):
+            total = total + np.prod(signs) * form(along)
+    result: Array = total * np.prod(sizes) / (2 ** (count - 1) * np.prod(np.arange(1, count + 1)))
+    return result
+
+
+def subsets(count: int) -> list[Numbers]:
+    """Return all subsets of the first numbers, small ones first.
+
+    Examples
+    --------
+    >>> subsets(2)
+    [(), (0,), (1,), (0, 1)]
+    """
+    return [chosen for size in range(count + 1) for chosen in itertools.combinations(range(count), size)]
+
+
+def shares(numbers: Numbers, parts: int) -> Iterator[tuple[Numbers, ...]]:
+    """Yield all ways to give the directions to the factors of a product (Leibniz's rule).
+
+    Examples
+    --------
+    >>> list(shares((0, 1), 2))
+    [((0, 1), ()), ((0,), (1,)), ((1,), (0,)), ((), (0, 1))]
+    """
+    for owners in itertools.product(range(parts), repeat=len(numbers)):
+        yield tuple(tuple(number for number, owner in zip(numbers, owners) if owner == part) for part in range(parts))
+
+
+def partitions(numbers: Numbers) -> Iterator[list[Numbers]]:
+    """Yield all ways to divide the directions into groups (the chain rule).
+
+    Examples
+    --------
+    >>> list(partitions((0, 1)))
+    [[(0, 1)], [(0,), (1,)]]
+    """
+    if not numbers:
+        yield []
+        return
+    first, rest = numbers[0], numbers[1:]
+    for size in range(len(rest), -1, -1):
+        for beside in itertools.combinations(rest, size):
+            others = tuple(number for number in rest if number not in beside)
+            for groups in partitions(others):
+                yield [(first, *beside), *groups]
