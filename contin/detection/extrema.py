@@ -87,8 +87,8 @@ class Stationarity:
 def orthonormal(vectors: Array, weights: Array) -> Array:
     """Return an orthonormal basis, as rows, of the space of some vectors (k, size), in the weighted inner product."""
     root = np.sqrt(weights)
-    basis: Array = np.asarray(np.linalg.qr((vectors * root).T)[0].T / root, dtype=float)
-    return basis
+    basis: Array = np.linalg.qr((vectors * root).T)[0].T / root
+    return np.ascontiguousarray(basis)
 
 
 def gradient_of(system: System, x: Array, column: str) -> Array:

@@ -157,7 +157,7 @@ class Collocation(System):
     def at_gauss_points(self, x: Array) -> Array:
         """Return the states divided by their sizes at the Gauss points, shape (N d, n)."""
         points = np.empty((self._times.size, self._n))
-        at_points(self.basis.value, x, points)
+        at_points(self.basis.value, np.ascontiguousarray(x), points)
         return points
 
     def states_at_gauss_points(self, x: Array) -> Array:

@@ -72,8 +72,8 @@ def derivative(function: Callable[[float], Any], order: int = 1, size: float = 1
     return (best if best.shape else float(best)), least
 
 
-#: The error of fourth order is estimated as this times the square of that of second order, relative: of sin(1 + x) it is up to 1.6
-#: times that. Ten times larger, differences are taken over shorter lengths than needed.
+#: The error of fourth order is estimated as this times the square of that of second order, relative: of sin(1 + x) it is 1.6
+#: times that at most. Ten times larger, differences are taken over shorter lengths than needed.
 _SAFE = 4.0
 #: Round-off of a function, relative to its value.
 _EPSILON = 1e-15
