@@ -194,7 +194,7 @@ def _at_fold(label: str, name: str) -> TestFunction:
 def _degenerate(label: str, name: str) -> TestFunction:
     """Return the test function of points where the coefficient of the normal form is zero."""
     return TestFunction(
-        label, name, lambda trial: _curve(trial).normal_form(trial.x).value,
+        label, name, lambda trial: _curve(trial).normal_form(trial.x).signed,
         confirm=lambda trial: _curve(trial).normal_form(trial.x).vanishes,
     )  # fmt: skip
 

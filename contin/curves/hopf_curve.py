@@ -91,7 +91,7 @@ def _of_hopf_curve(system: HopfCurve) -> list[TestFunction]:
         return curve(trial).kappa(trial.x) / curve(trial).kappa_size
 
     def lyapunov(trial: Trial) -> float:
-        return curve(trial).lyapunov(trial.x).value
+        return curve(trial).lyapunov(trial.x).signed
 
     def is_zero(trial: Trial) -> bool:
         return curve(trial).lyapunov(trial.x).vanishes

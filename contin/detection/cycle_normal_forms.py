@@ -27,16 +27,17 @@ absolute value is given; it vanishes at a cusp. With a forcing the time s goes o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.detection.lyapunov import Coefficient
+from contin.detection.lyapunov import Coefficient, moved
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.multilinear import of_complex
-from contin.discretization.round import Round
+from contin.discretization.round import Round, Solver
 from contin.problems.cycle import PERIOD
 
 #: Rounds of inverse iteration for null vectors, from random borders; the first leaves an error of the size of the multiplier's.
@@ -73,28 +74,37 @@ class NormalForms:
         v = v / np.sqrt(self._mean(v, v))
         here, alpha = self._at_points(v), (v[-1] / self.period if self.system.autonomous else 0.0)
         w = w / self._product(w, here)
-        found = self._coefficient(w, (self._along(here, here), 2 * alpha * self._apply(here)), 2)
+
+        def terms(u: Array) -> Sequence[Array]:
+            return self._along(u, u), 2 * alpha * self._apply(u)
+
+        found = self._coefficient(w, here, terms, 2)
         return Coefficient(abs(found.value), found.error, found.size)
 
     def period_doubling(self) -> Coefficient:
         """Return c."""
         v, here, w = self._critical(-1.0)
-        h, change = self._periodic(self._along(here, here))
-        a = -change / (2 * self.period)
-        return self._coefficient(w, (self._along(here, here, here), 3 * self._along(here, h), -6 * a * self._apply(here)), 6)
+
+        def terms(u: Array) -> Sequence[Array]:
+            h, change = self._periodic(self._along(u, u))
+            a = -change / (2 * self.period)
+            return self._along(u, u, u), 3 * self._along(u, h), -6 * a * self._apply(u)
+
+        return self._coefficient(w, here, terms, 6)
 
     def torus(self, angle: float) -> Coefficient:
         """Return the real part of d."""
         v, here, w = self._critical(np.exp(1j * angle))
-        h, change = self._periodic(self._along(here, here.conj()).real)
-        a = -change / self.period
-        twice = self._right_side(self._along(here, here), self.plain)
-        k = self._at_points(self.plain.solver(np.exp(2j * angle)).solve(twice))
-        terms = (
-            self._along(here, here, here.conj()), 2 * self._along(here, h), self._along(here.conj(), k),
-            -2 * a * (self._apply(here) - 1j * angle * here),
-        )  # fmt: skip
-        return self._coefficient(w, terms, 2)
+        twice = self.plain.solver(np.exp(2j * angle))
+
+        def terms(u: Array) -> Sequence[Array]:
+            h, change = self._periodic(self._along(u, u.conj()).real)
+            a = -change / self.period
+            k = self._at_points(twice.solve(self._right_side(self._along(u, u), self.plain)))
+            slope = -2 * a * (self._apply(u) - 1j * angle * u)
+            return self._along(u, u, u.conj()), 2 * self._along(u, h), self._along(u.conj(), k), slope
+
+        return self._coefficient(w, here, terms, 2)
 
     # --- solutions of the linear problems ------------------------------------------------------------------------
 
@@ -119,8 +129,12 @@ class NormalForms:
 
     def _periodic(self, right_side: Array) -> tuple[Array, float]:
         """Return the periodic h with L h = right side + change * F, at the Gauss points, and this change of the period."""
-        solution = self.phased.solver(np.eye(1)).solve(self._right_side(right_side, self.phased))
+        solution = self._periodic_solver.solve(self._right_side(right_side, self.phased))
         return self._at_points(solution), float(solution[-1]) if self.system.autonomous else 0.0
+
+    @functools.cached_property
+    def _periodic_solver(self) -> Solver:
+        return self.phased.solver(np.eye(1))
 
     def _right_side(self, values: Array, matrix: Round) -> Array:
         """Return values at the Gauss points as the right side of the discrete equations."""
@@ -156,7 +170,11 @@ class NormalForms:
         result: Array = np.einsum("kij,kj->ki", self.jacobian, v)
         return result
 
-    def _coefficient(self, w: Array, terms: Sequence[Array], factor: int) -> Coefficient:
+    def _coefficient(self, w: Array, here: Array, terms: Callable[[Array], Sequence[Array]], factor: float) -> Coefficient:
         """Return the real part of a coefficient per unit of time: the products of w with its terms, over the factor."""
-        products = np.array([self._product(w, term).real for term in terms])
-        return Coefficient.of(products / (factor * self.system.unit_time(self.x)), self.system.derivative_error)
+        factor = factor * self.system.unit_time(self.x)
+
+        def products(s: float) -> Array:
+            return np.array([self._product(w, term).real for term in terms(moved(here, s))]) / factor
+
+        return Coefficient.of(products, self.system.derivative_error)

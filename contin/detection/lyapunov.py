@@ -11,6 +11,7 @@ the centre manifold. Where it is positive the bifurcation is subcritical.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,9 @@ from contin.discretization.algebraic import Algebraic
 from contin.discretization.multilinear import of_complex
 from contin.linalg.orientation import oriented
 
+#: Critical vectors are moved by this part of their largest component for an error estimate: ten times their round-off, since one
+#: draw may hardly count. Ten times larger, errors are ten times as large.
+_MOVED = 1e-14
 #: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
 #: tests are the same.
 _CANCELLED, _ZERO = 1e-6, 1e-9
@@ -81,10 +85,20 @@ class Coefficient(NamedTuple):
     size: float
 
     @classmethod
-    def of(cls, terms: Array, error: float) -> Coefficient:
-        """Return the coefficient of some terms, with the relative error of their derivatives."""
-        size = float(np.abs(terms).sum())
-        return cls(float(terms.sum()), error * size, size)
+    def of(cls, terms: Callable[[float], Array], error: float) -> Coefficient:
+        """Return the coefficient of terms; ``terms(s)`` are those of critical vectors that are moved by the part s of their size.
+
+        ``error`` is the relative error of derivatives. The vectors are known to round-off only, which may be more than some of
+        their components, so the terms are computed again with moved ones.
+        """
+        best, moved = terms(0.0), terms(_MOVED)
+        size = float(np.abs(best).sum())
+        return cls(float(best.sum()), float(abs(best.sum() - moved.sum())) + error * size, size)
+
+    @property
+    def signed(self) -> float:
+        """The value for a test function: 0 where it is smaller than its error, as all along a curve of linear equations."""
+        return 0.0 if abs(self.value) <= self.error else self.value
 
     @property
     def vanishes(self) -> bool:
@@ -101,16 +115,26 @@ def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficie
     field, omega, q, w = system.as_field(), pair.frequency, pair.right / size, pair.left * size
     matrix = system.jacobian(x) * size / size[:, None]
 
+    still, one = np.zeros(len(x) - len(q)), np.eye(len(q))
+
     def along(*vectors: Any) -> Any:
         """Return B or C along directions of the states, of unknowns divided by their sizes."""
         return of_complex(lambda parts: field.along(x, [np.append(part, still) for part in parts]), vectors)
 
-    still, shift = np.zeros(len(x) - len(q)), 2j * omega * np.eye(len(q))
+    def terms(s: float) -> Array:
+        v = moved(q, s)
+        constant = np.linalg.solve(matrix, along(v, v.conj()).real)
+        twice = np.linalg.solve(2j * omega * one - matrix, along(v, v))
+        vectors = np.array([along(v, v, v.conj()), -2 * along(v, constant), along(v.conj(), twice)])
+        found: Array = (vectors @ w).real / (2 * omega)
+        return found
+
     try:
-        constant = np.linalg.solve(matrix, along(q, q.conj()).real)
-        twice = np.linalg.solve(shift - matrix, along(q, q))
+        return Coefficient.of(terms, system.derivative_error)
     except np.linalg.LinAlgError:
         return Coefficient(float("nan"), float("nan"), float("nan"))
-    vectors = np.array([along(q, q, q.conj()), -2 * along(q, constant), along(q.conj(), twice)])
-    terms = (vectors * w).real / (2 * omega)
-    return Coefficient.of(terms, system.derivative_error)
+
+
+def moved(vector: Array, s: float) -> Array:
+    """Return a vector moved by s times its largest component in a random direction."""
+    return vector + s * np.abs(vector).max() * np.random.default_rng(5).uniform(-1, 1, vector.shape) if s else vector
