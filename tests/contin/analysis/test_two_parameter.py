@@ -168,3 +168,19 @@ def test_bad_starts():
         curve(branch.points[1], "lam")
     with pytest.raises(ProblemError, match="'mu' must be a parameter that is not free"):
         curve(branch.labelled("LP")[0], "mu")
+
+
+@pytest.mark.parametrize("held", ["x", lambda trial: trial["x"]])
+def test_sensitivities_by_a_parameter_of_another_size(held):
+    """x = a + b, and b is of the size 1e6, so it is divided by 2^20 inside: at a fixed x, da/db = -1e-6."""
+    problem = AlgebraicProblem(lambda u, p: (u.x - p.a - 1e-6 * p.b,), ["x"], {"a": 1.0, "b": 3e6})
+    branch = trace(solve(problem, [4.0]), free=["a"], limits={"a": (-3, 3)}, zeros={"x": [5.0]})
+    (point,) = branch.labelled("UZ")
+    assert sensitivities(point, held=held)["b"]["a"] == pytest.approx(-1e-6, rel=1e-9)
+
+
+def test_sensitivities_of_a_branch_point_by_a_parameter_of_another_size():
+    """x (x - a + b / 1e6) has its branch point at a = b / 1e6."""
+    problem = AlgebraicProblem(lambda u, p: (u.x * (u.x - p.a + 1e-6 * p.b),), ["x"], {"a": 1.0, "b": 3e6})
+    (point,) = trace(solve(problem, [0.0]), free=["a"], limits={"a": (0, 5)}).labelled("BP")
+    assert sensitivities(point)["b"]["a"] == pytest.approx(1e-6, rel=1e-9)
