@@ -83,7 +83,7 @@ class Takens:
     def _unfolding(self) -> None:
         """Find the columns h_i and k_i, and k."""
         (p0, p1), n, base, x = self.p, self.n, self.base, self.x
-        q0, q1 = (np.append(q, np.zeros(2)) for q in self.q)
+        q0, q1 = (np.asarray(np.append(q, np.zeros(2)), dtype=float) for q in self.q)
         matrix = np.zeros((n + 2, n + 2))  # A and the columns of both parameters; p1.B(q0, .), and of w z
         matrix[:n] = np.column_stack([self.matrix, base.parameter_columns(x, base.free)])
         matrix[n] = base.bent(x, p1, q0)
@@ -93,7 +93,8 @@ class Takens:
         right_side[:, 0] = np.concatenate([self.q[1], [p1 @ wz, p0 @ wz + p1 @ zz]])
         right_side[-1, 1] = 1.0
         self.linear = np.linalg.solve(matrix, right_side)
-        square = float(p1 @ base.along(x, [self.linear[:, 1]] * 2))
+        second = np.asarray(self.linear[:, 1], dtype=float)
+        square = float(p1 @ base.along(x, [second, second]))
         normal = p1 @ matrix[:n, n:]
         self.bent = -square * normal / (normal @ normal)
 

@@ -135,6 +135,6 @@ def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficie
         return Coefficient(float("nan"), float("nan"), float("nan"))
 
 
-def moved(vector: Array, s: float) -> Array:
+def moved(vector: Any, s: float) -> Any:
     """Return a vector moved by s times its largest component in a random direction."""
     return vector + s * np.abs(vector).max() * np.random.default_rng(5).uniform(-1, 1, vector.shape) if s else vector

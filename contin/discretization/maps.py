@@ -97,9 +97,12 @@ class MapSystem(Algebraic):
                 for chosen in numbers[1:]
             }
             of_states = {
-                chosen: sum(
-                    batch.along(time, of_states[()], none, p, [wide[group] for group in groups])
-                    for groups in partitions(chosen)
+                chosen: np.sum(
+                    [
+                        batch.along(time, of_states[()], none, p, [wide[group] for group in groups])
+                        for groups in partitions(chosen)
+                    ],
+                    axis=0,
                 )
                 for chosen in numbers
             }
