@@ -17,6 +17,7 @@ import numpy as np
 from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.recorded_arrays import recorded, select
+from contin.functions.recording import recorded_paths
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Number, Tape, Unrecordable
 
@@ -78,8 +79,7 @@ class Search:
     def _implicit(self, tape: Tape, operands: Sequence[Number]) -> list[list[Any]]:
         """Return the derivatives of all unknowns by each operand."""
         k, places = len(self.unknowns), [operand.place for operand in operands]
-        solution = [tape.apply("root", *operands, data=(self, i)) for i in range(k)]
-        at = {unknown: number.place for unknown, number in zip(self.unknowns, solution)}
+        at = self.solution(tape, operands)
         by = derivatives.jacobian(tape, self.slopes, places)
         wanted = [self.entry(i, j) for i in range(k) for j in range(k)] + list(by.values())
         moved = tape.substitute(wanted, at)
@@ -93,6 +93,18 @@ class Search:
             right = [-Number(tape, entries[i, number]) if (i, number) in entries else 0.0 for i in range(k)]
             columns.append(solved(matrix, right, self.minimum))
         return columns
+
+    def solution(self, tape: Tape, operands: Sequence[Number]) -> dict[int, int]:
+        """Return the places of the values found, by the places of the unknowns."""
+        found = [tape.apply("root", *operands, data=(self, i)) for i in range(len(self.unknowns))]
+        return {unknown: number.place for unknown, number in zip(self.unknowns, found)}
+
+    def slopes_of_least(self, tape: Tape, operands: Sequence[Number]) -> list[Any]:
+        """Return the derivatives of the least value by what the potential reads: those at fixed unknowns, as it is stationary."""
+        by = derivatives.jacobian(tape, [self.potential], [operand.place for operand in operands])
+        moved = tape.substitute(list(by.values()), self.solution(tape, operands))
+        slopes = {number: Number(tape, place) for (_, number), place in zip(by, moved)}
+        return [slopes.get(number) for number in range(len(operands))]
 
     def evaluate(self, index: int, operands: Sequence[float]) -> float:
         """Raise: an unknown is evaluated with its tape (`Tape.evaluate`)."""
@@ -187,14 +199,59 @@ def root(residual: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, ...]:
     return _found(residual, start, False)
 
 
-def _found(function: Callable[..., Any], start: Sequence[Any], minimal: bool) -> tuple[Any, ...]:
+def least(potential: Callable[..., Any], start: Sequence[Any]) -> Any:
+    """Return the least value of ``potential(w)``, as `minimum` finds it.
+
+    Its derivatives are those of the potential at fixed w, since it is stationary there: a Legendre transform costs no more than
+    its strains. They are exact, and so are second and higher ones.
+
+    Parameters
+    ----------
+    potential : callable
+    start : sequence of float
+        As for `minimum`.
+
+    Returns
+    -------
+    float
+        nan where there is no minimum.
+
+    Raises
+    ------
+    ProblemError
+        No unknowns, or more than 16.
+
+    Examples
+    --------
+    The complementary energy of U = w**4/4 is 3 M**(4/3)/4, and its derivative the strain:
+
+    >>> from contin import gradient, least
+    >>> gradient(lambda M: -least(lambda w: w[0] ** 4 / 4 - M * w[0], [1.0]), ["M"])(8.0)
+    (12.0, 2.0)
+    """
+    starts, function, tape = _given(potential, start)
+    if tape is None:
+        scratch = Tape()
+        search, found = _in_python(scratch, function, starts, True)
+        return scratch.evaluate([search.potential], {("unknown", 0, i): value for i, value in enumerate(found)})[0]
+    search, operands = recorded_search(tape, function, starts, True)
+    (value,) = tape.substitute([search.potential], search.solution(tape, operands))
+    return tape.apply("least", Number(tape, value), *operands, data=(search,))
+
+
+def _given(function: Callable[..., Any], start: Sequence[Any]) -> tuple[list[Any], Callable[..., Any], Tape | None]:
+    """Return the starts, a function of recorded numbers, and the tape on which it is recorded (None for ordinary numbers)."""
     starts = list(start)
     if not 1 <= len(starts) <= _MOST:
         raise ProblemError(f"start: {len(starts)} unknowns, must be 1 to {_MOST}")
     function = prepared(function)
-    tape = _tape_of(function, starts)
+    return starts, function, _tape_of(function, starts)
+
+
+def _found(function: Callable[..., Any], start: Sequence[Any], minimal: bool) -> tuple[Any, ...]:
+    starts, function, tape = _given(function, start)
     if tape is None:
-        return _in_python(function, starts, minimal)
+        return tuple(_in_python(Tape(), function, starts, minimal)[1])
     search, operands = recorded_search(tape, function, starts, minimal)
     return tuple(tape.apply("root", *operands, data=(search, i)) for i in range(len(starts)))
 
@@ -232,8 +289,13 @@ def recorded_search(
     k = len(starts)
     unknowns = [tape.input(("unknown", tape.searches, i)) for i in range(k)]
     tape.searches += 1
-    result = function(tuple(unknowns))
-    values = [tape.number(value) for value in (result if isinstance(result, (tuple, list, np.ndarray)) else [result])]
+
+
+    def call(copy: Any) -> Sequence[Any]:
+        result = copy(tuple(unknowns))
+        return list(result) if isinstance(result, (tuple, list, np.ndarray)) else [result]
+
+    values = [Number(tape, place) for place in recorded_paths(tape, function, call)]
     if len(values) != (1 if minimal else k):
         raise ProblemError(f"{'potential' if minimal else 'residual'} returns {len(values)} values, must return {1 if minimal else k}")
     search = search_of(tape, [each.place for each in unknowns], [each.place for each in values], starts, minimal)
@@ -278,14 +340,15 @@ def operands_of(tape: Tape, search: Search) -> list[Number]:
     return [Number(tape, place) for place in operands if tape.value(place) is None]
 
 
-def _in_python(function: Callable[..., Any], starts: Sequence[float], minimal: bool) -> tuple[float, ...]:
-    """Return the unknowns for ordinary numbers."""
-    tape = Tape()
+def _in_python(
+    tape: Tape, function: Callable[..., Any], starts: Sequence[float], minimal: bool
+) -> tuple[Search, list[float]]:
+    """Return the search on an empty tape, and the unknowns for ordinary numbers."""
     try:
         search, _ = recorded_search(tape, function, starts, minimal)
     except Unrecordable as reason:
         raise ProblemError(f"{'potential' if minimal else 'residual'} cannot be differentiated: {reason}") from None
-    return tuple(newton(tape, search, {}))
+    return search, newton(tape, search, {})
 
 
 def newton(tape: Tape, search: Search, values: dict[Any, float]) -> list[float]:

@@ -306,11 +306,15 @@ TABLE: dict[str, Primitive] = {
     "mod": _primitive(
         _mod, lambda tape, data, xs, r: (1.0, -tape.apply("floor", xs[0] / xs[1])), "floored(fmod(x, y), y)", "fmod"
     ),
-    # a piecewise polynomial; an unknown that is found by iteration
+    # a piecewise polynomial; an unknown that is found by iteration; the first operand, as a minimum over such unknowns
     "table": Primitive(lambda data, x: data.evaluate(x), _of_table, constant=lambda data, x: data.evaluate(x)),
     "root": Primitive(
         lambda data, *operands: data[0].evaluate(data[1], operands),
         lambda tape, data, xs, r: data[0].partials(tape, data[1], xs),
+    ),
+    "least": Primitive(
+        lambda data, value, *operands: value,
+        lambda tape, data, xs, r: [None, *data[0].slopes_of_least(tape, xs[1:])],
     ),
 }  # fmt: skip
 
