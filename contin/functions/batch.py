@@ -345,7 +345,7 @@ class Batch:
             _evaluate(found, t, u, v, p, out, jac)
             return
         if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
-            threads.each(_evaluate, _divided(found, t, u, v, p, out, jac))
+            threads.each(lambda part: _evaluate(*part), _divided(found, t, u, v, p, out, jac))
             return
         began = time.perf_counter()
         _evaluate(found, t, u, v, p, out, jac)
