@@ -16,6 +16,7 @@ import numpy as np
 
 from contin.errors import ProblemError
 from contin.functions import derivatives
+from contin.functions.program import Inputs, Program, evaluated, program
 from contin.functions.recorded_arrays import recorded, select
 from contin.functions.recording import recorded_paths
 from contin.functions.stand_ins import prepared
@@ -23,9 +24,6 @@ from contin.functions.tape import Number, Tape, Unrecordable
 
 #: Largest number of unknowns that are found together. Their equations are solved with a dense matrix at every point.
 _MOST = 16
-#: Newton steps and halvings of each in Python, as in the interpreter.
-_NEWTON = 60
-_HALVINGS = 40
 
 
 @dataclass(frozen=True)
@@ -351,48 +349,20 @@ def _in_python(
     return search, newton(tape, search, {})
 
 
-def newton(tape: Tape, search: Search, values: dict[Any, float]) -> list[float]:
-    """Return the unknowns of a search in Python, as the interpreter finds them; nan where it does not arrive."""
-    k = len(search.unknowns)
-    slots = [tape.operations[place].data for place in search.unknowns]
-    w = np.array(tape.evaluate(search.starts, values))
+def newton(tape: Tape, search: Search, values: Mapping[Any, float]) -> list[float]:
+    """Return the unknowns of a search, found by the interpreter at one point; nan where it does not arrive.
 
-    def at(w: Any) -> tuple[float, Any, Any]:
-        found = tape.evaluate(search.results, {**values, **dict(zip(slots, w.tolist()))})
-        by_place = dict(zip(search.results, found))
-        G = np.array([by_place[place] for place in search.slopes])
-        A = np.array([[by_place[search.entry(i, j)] for j in range(k)] for i in range(k)])
-        return (by_place[search.potential] if search.minimum else float(G @ G) / 2), G, A
-
-    with np.errstate(all="ignore"):
-        value, G, A = at(w)
-        for _ in range(_NEWTON):
-            step = _step(A, G, search.minimum)
-            if np.all(step * step <= 1e-18 * (1.0 + w * w)):
-                return (w + step).tolist()
-            slope, part = (float(G @ step) if search.minimum else -float(G @ G)), 1.0
-            for _ in range(_HALVINGS):
-                trial, new_G, new_A = at(w + part * step)
-                if trial <= value + 1e-4 * part * slope + 1e-14 * (np.hypot(1.0, value) if search.minimum else value):
-                    break
-                part /= 2
-            w, value, G, A = w + part * step, trial, new_G, new_A
-    return [float("nan")] * k
+    ``values`` are those of the inputs by slot.
+    """
+    slots, found = tape.kept(("search", search), lambda: _program(tape, search))
+    point = np.array([[values[slot] for slot in slots]], dtype=float)
+    result: list[float] = evaluated(found, point, len(search.unknowns))[0].tolist()
+    return result
 
 
-def _step(A: Any, G: Any, minimal: bool) -> Any:
-    if not minimal:
-        try:
-            return np.linalg.solve(A, -G)
-        except np.linalg.LinAlgError:
-            return np.full(len(G), np.nan)
-    a, b = A.copy(), -G
-    for i in range(len(b)):
-        a[i, i] = max(abs(a[i, i]), 1e-3 * (1.0 + abs(A[i, i])))
-        for j in range(i + 1, len(b)):
-            factor = a[j, i] / a[i, i]
-            a[j, i:] -= factor * a[i, i:]
-            b[j] -= factor * b[i]
-    for i in reversed(range(len(b))):
-        b[i] = (b[i] - a[i, i + 1 :] @ b[i + 1 :]) / a[i, i]
-    return b
+def _program(tape: Tape, search: Search) -> tuple[list[Any], Program]:
+    """Return the slots of the inputs of a search, and its program."""
+    places = list(search.solution(tape, operands_of(tape, search)).values())
+    inputs = [tape.operations[place].data for place in tape.needed(places) if tape.operations[place].name == "input"]
+    at = {slot: column for column, slot in enumerate(inputs)}
+    return inputs, program(tape, list(zip(places, range(len(places)))), Inputs(at, {}, {}))
