@@ -41,3 +41,19 @@ def test_least_values_of_ordinary_numbers():
     assert least(lambda w: potential(w[0], 8.0, 0.7), [8.0]) == pytest.approx(state(8.0, 0.7)[0], rel=1e-14)
     assert minimum(lambda w: potential(w[0], 8.0, 0.7), [8.0])[0] == pytest.approx(-state(8.0, 0.7)[1], rel=1e-14)
     assert np.isnan(least(lambda w: -w[0] ** 2, [1.0]))
+
+
+def test_a_saddle_is_no_minimum():
+    """x**2 - y**2 + y**4 is stationary at 0, where Newton's method starts; and where the start is off the axis, y**2 = 1/2."""
+
+    def saddle(w):
+        return w[0] ** 2 - w[1] ** 2 + w[1] ** 4
+
+    assert np.isnan(minimum(saddle, [1.0, 0.0])).all()
+    assert minimum(saddle, [1.0, 0.1]) == pytest.approx((0.0, np.sqrt(0.5)), abs=1e-14)
+
+
+def test_a_minimum_in_a_narrow_valley():
+    """The curvature along the valley is 1e-6 of that across it: (x - y)**2/2 + 1e-6 y**4/4 - 1e-6 y, at x = y = 1."""
+    found = minimum(lambda w: (w[1] - w[0]) ** 2 / 2 + 1e-6 * (w[0] ** 4 / 4 - w[0]), [3.0, 0.0])
+    assert found == pytest.approx((1.0, 1.0), abs=1e-8)
