@@ -90,7 +90,8 @@ def _simple_sub(tape: Any, places: tuple[int, ...]) -> int | None:
     return int(tape.at("add", (a, operation.operands[0]))) if operation.name == "neg" else None
 
 
-def _simple_mul(tape: Any, places: tuple[int, ...]) -> int | None:
+def _simple_mul(tape: Any, places: tuple[int, ...], name: str = "mul") -> int | None:
+    """Simplify a product, or what ``name`` says is one."""
     for one, other in (places, places[::-1]):
         value, operation = tape.value(one), tape.operations[one]
         if value == 0:
@@ -100,8 +101,12 @@ def _simple_mul(tape: Any, places: tuple[int, ...]) -> int | None:
         if value == -1:
             return int(tape.at("neg", (other,)))
         if operation.name == "neg":
-            return int(tape.at("neg", (tape.at("mul", (operation.operands[0], other)),)))
+            return int(tape.at("neg", (tape.at(name, (operation.operands[0], other)),)))
     return None
+
+
+def _simple_product(tape: Any, places: tuple[int, ...]) -> int | None:
+    return _simple_mul(tape, places, "product")
 
 
 def _simple_div(tape: Any, places: tuple[int, ...]) -> int | None:
@@ -256,7 +261,7 @@ TABLE: dict[str, Primitive] = {
     "select": _primitive(lambda c, a, b: a if c != 0 else b, _of_select, simplify=_simple_select, selects=True),
     # a product that is 0 where one of its factors is, also if the other one is nan or inf
     "product": _primitive(
-        lambda x, y: 0.0 if x == 0 or y == 0 else x * y, _of_product, simplify=_simple_mul, commutes=True, selects=True
+        lambda x, y: 0.0 if x == 0 or y == 0 else x * y, _of_product, simplify=_simple_product, commutes=True, selects=True
     ),
     "abs": _primitive(np.absolute, lambda tape, data, xs, r: (tape.apply("select", xs[0] < 0, -1.0, 1.0),)),
     "sign": _primitive(np.sign, _none),
