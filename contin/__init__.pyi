@@ -19,7 +19,7 @@ from .files import temporary_name, write_whole
 from .functions.batch import Batch
 from .functions.cache import cache_directory
 from .functions.gradient import gradient
-from .functions.iteration import minimum, root
+from .functions.iteration import least, minimum, root
 from .linalg.orientation import eigenbasis
 from .names import exact_text
 from .problems.algebraic import AlgebraicProblem
@@ -47,7 +47,7 @@ __all__ = [
     "MapProblem", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "ProblemError", "Segment",
     "SegmentedProblem", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem",
     "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "eigenbasis", "exact_text", "follow", "from_auto",
-    "gradient", "homoclinic", "interpolation", "load", "locate_branch_point", "minimum", "point_of", "read_auto", "read_columns",
+    "gradient", "homoclinic", "interpolation", "least", "load", "locate_branch_point", "minimum", "point_of", "read_auto", "read_columns",
     "root", "save",
     "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

@@ -25,38 +25,31 @@ def margin(law: Law) -> Callable | None:
     It is computed for the strains at the nodes and halfway between neighbouring nodes, which detects jumps. None for a law
     whose H is a closed expression, because its domain is known.
     """
-    return None if law.curvatures_at is None else _least
+    return _least if law.ends_with_convexity else None
 
 
 def _least(system, x):
     problem, p, u = system.problem, system.all_parameters(x), system.states(x)
-    strains, curvatures = _compiled(problem)
-    w = strains.values(system.nodes, np.ascontiguousarray(u), u[:0], p)
+    names = tuple(problem.parameters)
+    w = _strains(problem).values(system.nodes, np.ascontiguousarray(u), u[:0], p)
     w = np.concatenate([w, (w[1:] + w[:-1]) / 2])
-    U11, U13, U33 = curvatures.values(np.zeros(len(w)), w, w[:0], p).T
+    law, known = problem.law, dict(zip(names, p))
+    stiffness = law.strain_energy(w, known["kappa_n"], *(known[name] for name in law.parameters))[2]
+    U11, U13, U33 = stiffness[:, 0, 0], stiffness[:, 0, 2], stiffness[:, 2, 2]
     ratio = np.where((U11 > 0) & (U33 > 0), (U11 * U33 - U13**2) / (U11 * U33), -1.0)
     return float(np.nan_to_num(ratio, nan=-1.0).min())
 
 
 @functools.cache
-def _compiled(problem: StripProblem) -> tuple[Batch, Batch]:
-    """Return omega_1, omega_3 from the states of a problem, and U_11, U_13, U_33 from omega_1, omega_3, compiled."""
-    law = problem.law
-    curvatures_at = law.curvatures_at
+def _strains(problem: StripProblem) -> Batch:
+    """Return the strains from the states of a problem."""
     moment = moment_with_force if "x1" in problem.state_names else moment_without_force
 
     def strains(u, p, M, response):
         H, w1, w2, w3, conjugate = response
-        return w1, w3
+        return w1, w2, w3
 
-    def curvatures(t, u, p):
-        return curvatures_at(u.w1, u.w3, p)
-
-    names = tuple(problem.parameters)
-    return (
-        Batch([law.at_points(moment, strains)], [2], problem.state_names, names),
-        Batch([curvatures], [3], ("w1", "w3"), names),
-    )
+    return Batch([problem.law.at_points(moment, strains)], [3], problem.state_names, tuple(problem.parameters))
 
 
 def test_functions(law: Law) -> list[TestFunction]:

@@ -18,7 +18,6 @@ Units: B = 1 (the plate's modulus times the width), L = 2 pi. Source of every nu
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
@@ -61,20 +60,9 @@ class FiniteWidthPoint:
         return np.array([self.kappa_n / 5, self.omega, math.sqrt(self.amplitude)])
 
 
-@functools.cache
-def _energy():
-    """Return U and its derivatives, compiled for many strains."""
-    from contin import Batch
-
-    def function(w, p):
-        return strain_energy(w.w1, w.w3, p.kappa_n, p.nu, p.Gamma)
-
-    return Batch([function], [9], ("w1", "w3"), ("kappa_n", "nu", "Gamma"), times=False)
-
-
 def _derivatives(w, kappa_n, nu, Gamma):
     """Return (U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k), shape (9, nodes), at strains (nodes, 2)."""
-    return _energy().values(np.zeros(len(w)), np.ascontiguousarray(w), np.empty((0, 2)), np.array([kappa_n, nu, Gamma])).T
+    return np.array(strain_energy(w[:, 0], w[:, 1], kappa_n, nu, Gamma))
 
 
 def _level(direction, omega, kappa_n, nu, Gamma):

@@ -20,70 +20,153 @@ This factor does not change equilibria: kappa_n and the strains are the same. ka
 flat rod's, plus nu**2 kappa_n.
 
 H is the Legendre transform of U. Where D2U is not positive definite it has several values or none: the law ends there, and
-`response` is not a number.
+H is another minimum's or not a number. U and H are written once, as functions of numbers; `contin` differentiates them.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from fractions import Fraction
+from collections.abc import Callable
+from typing import NamedTuple
 
-#: Below this x**4 the series of g is used: the closed form cancels. (Its radius of convergence is 4.730**4/4 = 125.)
-SERIES_LIMIT = 16.0
-_STEPS = 80
-#: Relative size of the last Newton step in real numbers: the error left is about its square, and one more step follows.
-_TOLERANCE = 1e-6
-
-
-def _series(terms: int) -> tuple[float, ...]:
-    """Return the coefficients of g(z) about z = 0: 1 - G by division of power series in z = x**4, exact until rounded."""
-    numerator = [Fraction(4, math.factorial(4 * k + 2)) for k in range(terms + 1)]
-    denominator = [Fraction(2, math.factorial(4 * k + 1)) for k in range(terms + 1)]
-    quotient = []
-    for k in range(terms + 1):
-        quotient.append((numerator[k] - sum(quotient[j] * denominator[k - j] for j in range(k))) / denominator[0])
-    return tuple(-float(value) for value in quotient[1:])
+#: Below this x**4 the first pole of g and a series are used, of which `_TERMS` terms leave 1e-16 of g and 2e-14 of its fourth
+#: derivative. The closed form loses 1e-13 of the fourth derivative there, and ten times more at 16.
+SERIES_LIMIT = 64.0
+_TERMS = 9
+#: Poles of g that are summed for the series: the next is 1e-17 of the sum of the first two terms.
+_POLES = 60
 
 
-_COEFFICIENTS = _series(20)
-_TERMS = len(_COEFFICIENTS)
+def _expansion() -> tuple[float, float, tuple[float, ...]]:
+    """Return residue and place of the first pole of g, -lambda_1, and the coefficients of the power series of what is left.
+
+    With z = -4 b**4, g has poles where tan b = -tanh b (the even modes of a free beam), with the residues 4 tanh(b)**2/b**2:
+    it is the sum of c_k/(z + lambda_k). The second pole is at -3655, the first at -125. g(0) = 1/180 is their slowest sum.
+    """
+    roots = []
+    for k in range(1, _POLES + 1):
+        b = (k - 0.25) * math.pi
+        for _ in range(5):
+            tanh = math.tanh(b)
+            b -= (math.tan(b) + tanh) / (1 + math.tan(b) ** 2 + 1 - tanh * tanh)
+        roots.append(b)
+    residues = [4 * math.tanh(b) ** 2 / b**2 for b in roots]
+    places = [4 * b**4 for b in roots]
+    rest = [
+        (-1) ** j * math.fsum(c / place ** (j + 1) for c, place in zip(residues[1:], places[1:])) for j in range(_TERMS)
+    ]
+    rest[0] = 1 / 180 - residues[0] / places[0]
+    return residues[0], places[0], tuple(rest)
+
+
+_RESIDUE, _POLE, _COEFFICIENTS = _expansion()
 
 
 def membrane(z):
-    """g, g' and g'' at z = x**4 >= 0; free of overflow and of cancellation in g.
+    """g at z = x**4 >= 0; free of overflow and of cancellation.
 
     Examples
     --------
-    >>> round(float(membrane(0.0)[0]) * 180, 12)
+    >>> round(membrane(0.0) * 180, 12)
     1.0
     """
     if z < SERIES_LIMIT:
-        g, slope, half_curvature = 0.0, 0.0, 0.0
-        for i in range(_TERMS):
-            half_curvature = half_curvature * z + slope
-            slope = slope * z + g
-            g = g * z + _COEFFICIENTS[_TERMS - 1 - i]
-        return g, slope, 2 * half_curvature
-    G, first, second = foundation(math.sqrt(math.sqrt(z)))
-    g = (1 - G) / z
-    a = -g - first / (4 * z)  # z d/dz g, as x d/dx = 4 z d/dz
-    b = -a - (second / 16 - first / 4) / z  # once more
-    return g, a / z, (b - a) / (z * z)
+        rest = _COEFFICIENTS[-1]
+        for coefficient in _COEFFICIENTS[-2::-1]:
+            rest = rest * z + coefficient
+        return _RESIDUE / (z + _POLE) + rest
+    return (1 - foundation(math.sqrt(math.sqrt(z)))) / z
 
 
 def foundation(x):
-    """G and its first two derivatives by log x, for x of at least about 1; hyperbolic functions divided by exp(x)."""
+    """G, for x of at least about 1; hyperbolic functions divided by exp(x)."""
     e = math.exp(-x)
-    sine, cosine = 2 * math.sin(x) * e, 2 * math.cos(x) * e
-    below = 1 - e * e + sine
-    F = (1 + e * e - cosine) / below  # (cosh x - cos x) / (sinh x + sin x)
-    E = (1 + e * e + cosine) / below
-    J = (1 - e * e - sine) / below
-    slope = 1 - F * E
-    curvature = -E + 2 * F * E * E - F * J
-    G = 2 * F / x
-    first = 2 * slope - G
-    return G, first, 2 * x * curvature - first
+    return 2 * (1 + e * e - 2 * e * math.cos(x)) / (x * (1 - e * e + 2 * e * math.sin(x)))
+
+
+# --- the energy -----------------------------------------------------------------------------------------------------------------
+
+
+class Section(NamedTuple):
+    """The numbers on which U of a strip of a plate depends, over the modulus D22 of the plate across; see `ribbon_model.plate`.
+
+    Attributes
+    ----------
+    nu, plane, twist, stiff : float
+        D12/D22, D11/D22 - nu**2, 2 D66/D22, sqrt(D11/D22).
+    C : float
+        Of the membrane energy; not read of an inextensible ribbon.
+    """
+
+    nu: float
+    plane: float
+    twist: float
+    stiff: float
+    C: float
+
+
+def isotropic(nu, Gamma) -> Section:
+    """Return the section of an isotropic strip."""
+    plane = 1 - nu * nu
+    return Section(nu, plane, 1 - nu, 1.0, 3 * plane * Gamma * Gamma)
+
+
+def section_energy(w1, w3, kappa_n, section: Section):
+    """Return U of a section, without the term -kappa_n**2/2."""
+    nu, plane, twist, _, C = section
+    bent = w1 - kappa_n
+    Q = w3 * w3 + nu * w1 * bent
+    return plane * bent * bent / 2 + twist * w3 * w3 + C * membrane(C * w1 * w1) * Q * Q / 2
+
+
+def ribbon_energy(w1, w3, kappa_n, section: Section):
+    """Return U of an inextensible ribbon, g = 1/z, without the term -kappa_n**2/2."""
+    nu, plane, twist, _, _ = section
+    bent = w1 - kappa_n
+    curved = w3 * w3 / w1 + nu * bent
+    return plane * bent * bent / 2 + twist * w3 * w3 + curved * curved / 2
+
+
+def energy(w1, w3, kappa_n, nu, Gamma):
+    """Return U of an isotropic strip, without the term -kappa_n**2/2."""
+    return section_energy(w1, w3, kappa_n, isotropic(nu, Gamma))
+
+
+@functools.cache
+def _derivatives(function: Callable[..., float]):
+    """Return U and its slopes, to be evaluated for many sections, and the columns of their derivatives."""
+    from contin import Batch, gradient  # loads compiled code, which circles do not need
+
+    def value(w1, w3, kappa_n, nu, plane, twist, stiff, C):
+        return function(w1, w3, kappa_n, Section(nu, plane, twist, stiff, C))
+
+    slopes = gradient(value, ("w1", "w3", "kappa_n"))
+    batch = Batch([lambda w, p: slopes(*w)], [4], ("w1", "w3", "kappa_n", *Section._fields), (), times=False)
+    return batch, batch.columns([], [0, 1, 2])
+
+
+def section_derivatives(w1, w3, kappa_n, section: Section, function: Callable[..., float] = section_energy) -> tuple:
+    """Return U of sections and its derivatives, k for kappa_n: (U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k).
+
+    Numbers or arrays, which are broadcast; ``function`` is `section_energy` or `ribbon_energy`.
+    """
+    import numpy as np
+
+    batch, columns = _derivatives(function)
+    given = np.broadcast_arrays(w1, w3, kappa_n, *section)
+    points = np.array([values.ravel() for values in given], dtype=float).T.copy()
+    value, slope = batch.jacobian(np.zeros(len(points)), points, points[:0], np.empty(0), columns)
+    found = np.array([*value[:, :3].T, slope[:, 1, 0], slope[:, 1, 1], slope[:, 2, 1], value[:, 3], *slope[:, 1:3, 2].T])
+    return tuple(found.reshape(9, *given[0].shape)) if given[0].shape else tuple(found[:, 0].tolist())
+
+
+def strain_energy(w1, w3, kappa_n, nu, Gamma) -> tuple:
+    """Return `section_derivatives` of an isotropic strip."""
+    return section_derivatives(w1, w3, kappa_n, isotropic(nu, Gamma))
+
+
+# --- circles and arcs -----------------------------------------------------------------------------------------------------------
 
 
 def on_circle(ratio, nu, width) -> tuple:
@@ -96,7 +179,7 @@ def on_circle(ratio, nu, width) -> tuple:
     The term with G in t is the membrane stress of the anticlastic profile, Wagner's effect.
     """
     y = 1 - ratio
-    G, first, second = _foundation_by_series(3 * (1 - nu * nu) * width * width)
+    G, first, second = _foundation(3 * (1 - nu * nu) * width * width)
     moment = (1 - nu * nu * G) * y - nu * nu * first * y * y / 4
     bending = 1 - nu * nu * G - nu * nu * first * y - nu * nu * y * y * (second / 8 - first / 4)
     return moment, 2 * (1 - nu) + 2 * nu * (1 - G) * y, bending
@@ -120,71 +203,23 @@ def convex_limits(nu, width) -> list[float]:
     return [1 - y for y in zeros]
 
 
-def _foundation_by_series(z):
-    """`foundation` for every x**4 = z >= 0, numbers or arrays: from g where x is small."""
+@functools.cache
+def _membrane_slopes():
+    """Return the functions (g, g') and (g', g'')."""
+    from contin import gradient
+
+    first = gradient(membrane, ("z",))
+    return first, gradient(lambda z: first(z)[1], ("z",))
+
+
+def _foundation(z):
+    """Return G and its first two derivatives by log x at x**4 = z >= 0, numbers or arrays."""
     import numpy as np
 
-    g, slope, curvature = np.vectorize(membrane, otypes=[float] * 3)(z)
-    first = -4 * z * (g + z * slope)
-    return 1 - z * g, first, -16 * z * (g + 3 * z * slope + z * z * curvature)
-
-
-def isotropic(nu, Gamma):
-    """Return the section of an isotropic strip: the numbers on which U depends, over the modulus D22 of its plate across.
-
-    They are nu = D12/D22, plane = D11/D22 - nu**2, twist = 2 D66/D22, stiff = sqrt(D11/D22), C, and the |omega_1| up to which
-    the strip is like a flat rod, x < 1 (zero stands for an inextensible ribbon, of any width). See `ribbon_model.plate`.
-    """
-    plane = 1 - nu * nu
-    return nu, plane, 1 - nu, 1.0, 3 * plane * Gamma * Gamma, 1 / (math.sqrt(3 * plane.real) * Gamma.real + 1e-100)
-
-
-def strain_energy(w1, w3, kappa_n, nu, Gamma):
-    """U and its derivatives: (U, U_1, U_3, U_11, U_13, U_33, U_k, U_1k, U_3k), k for kappa_n; without the term -kappa_n**2/2.
-
-    Arguments may be complex, for complex steps: first derivatives of U, U_1, U_3 and U_k then are exact. (Only the membrane
-    function of real numbers is called; what the imaginary parts add is its linear term.)
-    """
-    return section_energy(w1, w3, kappa_n, isotropic(nu, Gamma))
-
-
-def section_energy(w1, w3, kappa_n, section):
-    """Return `strain_energy` of a section; see `isotropic`."""
-    return _strain_energy(w1, w3, kappa_n, section, _profile(w1, section))
-
-
-def _profile(w1, section):
-    """Return g, g' and g'' where the section is bent by w1, all real: `membrane`, or 1/z for a ribbon."""
-    z = (section[4] * w1 * w1).real
-    if section[5] > 0:
-        return membrane(z)
-    z = z + 1e-300
-    return 1 / z, -1 / (z * z), 2 / (z * z * z)
-
-
-def _strain_energy(w1, w3, kappa_n, section, profile):
-    """Return `section_energy`, with the values of `_profile`."""
-    nu, plane, twist, _, C, _ = section
-    z = C * w1 * w1
-    g, slope, curvature = profile
-    dz = z - z.real
-    P = C * (g + slope * dz)
-    P1 = 2 * C * C * w1 * (slope + curvature * dz)
-    P11 = 2 * C * C * (slope + 2 * z * curvature)
-    bent = w1 - kappa_n
-    Q, Q1, Q3, Qk = w3 * w3 + nu * w1 * bent, nu * (w1 + bent), 2 * w3, -nu * w1
-    PQ, slope1 = P * Q, P1 * Q + P * Q1
-    return (
-        plane * bent * bent / 2 + twist * w3 * w3 + PQ * Q / 2,
-        plane * bent + P1 * Q * Q / 2 + PQ * Q1,
-        2 * twist * w3 + PQ * Q3,
-        plane + P11 * Q * Q / 2 + 2 * P1 * Q * Q1 + P * Q1 * Q1 + 2 * nu * PQ,
-        slope1 * Q3,
-        2 * twist + P * Q3 * Q3 + 2 * PQ,
-        -plane * bent + PQ * Qk,
-        -plane + slope1 * Qk - nu * PQ,
-        P * Q3 * Qk,
-    )
+    first, second = _membrane_slopes()
+    g, _ = np.vectorize(first, otypes=[float] * 2)(z)
+    slope, curvature = np.vectorize(second, otypes=[float] * 2)(z)
+    return 1 - z * g, -4 * z * (g + z * slope), -16 * z * (g + 3 * z * slope + z * z * curvature)
 
 
 def first_zero_of_t(nu: float, width: float) -> float | None:
@@ -196,118 +231,82 @@ def first_zero_of_t(nu: float, width: float) -> float | None:
         return strain_energy(1 - xi, 0.0, 1.0, nu, width)[5]
 
     grid = 1 - np.geomspace(1.0, 1e-3 / (1 + width), 2000)
-    below = np.flatnonzero([t(xi) < 0 for xi in grid])
+    below = np.flatnonzero(t(grid) < 0)
     return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
 
 
-def _start(M1, M3, kappa_n, section):
-    """Return the strains to start from: the ribbon's or the flat rod's closed form, whichever makes U - M.omega smaller.
-
-    The ribbon's is exact where D12 + 2 D66 = sqrt(D11 D22), as for isotropic plates: scaled by stiff, U then has its form.
-    The flat rod's is not taken if it lies beyond the concave region along omega_1 = 0, where there is another minimum. A start
-    inside that region is moved towards omega_1 > 0, the side on which branches begin.
-    """
-    nu, plane, twist, stiff, _, region = section
-    flat1, flat3 = kappa_n + M1 / plane, M3 / (2 * twist)
-    m3 = M3 / math.sqrt(stiff)
-    p = M1 / stiff + (stiff - nu) * kappa_n
-    root = math.sqrt(p * p + m3 * m3)
-    a = (p + root) / 2 if p > 0 else m3 * m3 / (2 * (root - p) + 1e-300)
-    if a < 1e-12 * root or nu * kappa_n + a <= 0:
-        return flat1, flat3
-    eta = m3 / (2 * a)
-    w1 = (nu * kappa_n + a) / (1 + eta * eta)
-    w3 = eta * w1 / math.sqrt(stiff)
-    w1 = w1 / stiff
-    if p > 0 and w1 > 10 * region:  # x > 3: like a ribbon
-        return w1, w3
-    if flat1 > -region:
-        ribbon = section_energy(w1, w3, kappa_n, section)[0] - M1 * w1 - M3 * w3
-        flat = section_energy(flat1, flat3, kappa_n, section)[0] - M1 * flat1 - M3 * flat3
-        if flat < ribbon:
-            return flat1, flat3
-    for _ in range(20):
-        _, _, _, U11, U13, U33, _, _, _ = section_energy(w1, w3, kappa_n, section)
-        if U11 > 0 and U11 * U33 > U13 * U13:
-            break
-        w1 = 1.2 * w1 + region
-    return w1, w3
-
-
-def _strains(M1, M3, kappa_n, section):
-    """omega_1 and omega_3 at a moment, all real: a minimum of U - M.omega, by Newton's method; nan where none is found.
-
-    Steps are halved until U - M.omega decreases, and they do not leave the convex region again (a concave one lies along
-    omega_1 = 0 at large twist, and another minimum beyond). Where D2U is indefinite, it is shifted.
-    """
-    w1, w3 = _start(M1, M3, kappa_n, section)
-    region = section[5]
-    best, d1, d3, convex = math.inf, 0.0, 0.0, False
-    for _ in range(_STEPS):
-        U, U1, U3, U11, U13, U33, _, _, _ = section_energy(w1 + d1, w3 + d3, kappa_n, section)
-        value = U - M1 * (w1 + d1) - M3 * (w3 + d3)
-        mean, spread = (U11 + U33) / 2, math.sqrt((U11 - U33) * (U11 - U33) / 4 + U13 * U13)
-        was_convex, convex = convex, mean - spread > 1e-9 * (mean + spread)
-        if value > best + 1e-11 * (abs(U) + abs(best)) or (was_convex and not convex):
-            d1, d3, convex = d1 / 2, d3 / 2, was_convex
-            continue
-        w1, w3, best = w1 + d1, w3 + d3, value
-        shift = 0.0 if convex else 1.2 * spread - mean + 0.1
-        A, B = U11 + shift, U33 + shift
-        determinant = A * B - U13 * U13
-        d1 = (B * (M1 - U1) - U13 * (M3 - U3)) / determinant
-        d3 = (A * (M3 - U3) - U13 * (M1 - U1)) / determinant
-        if convex and abs(d1) + abs(d3) < _TOLERANCE * (1e-3 + abs(w1) + abs(w3)):
-            return w1 + d1, w3 + d3
-        largest = 0.7 * abs(w1) + region
-        if abs(d1) > largest:
-            d1, d3 = d1 * largest / abs(d1), d3 * largest / abs(d1)
-    return math.nan, math.nan
-
-
-def search(M1, M3, kappa_n, nu, Gamma):
-    """Return omega_1, omega_3 and the three values of `membrane` there, for real numbers."""
-    return section_search(M1, M3, kappa_n, isotropic(nu, Gamma))
-
-
-def section_search(M1, M3, kappa_n, section):
-    """Return `search` of a section."""
-    w1, w3 = _strains(M1, M3, kappa_n, section)
-    g, slope, curvature = _profile(w1, section)
-    return w1, w3, g, slope, curvature
-
-
-def response(M1, M2, M3, kappa_n, nu, Gamma):
-    """H, omega_1, omega_2, omega_3, dH/dkappa_n: the Legendre transform of U."""
-    return response_from(M1, M2, M3, kappa_n, nu, Gamma, search(M1.real, M3.real, kappa_n.real, nu.real, Gamma.real))
-
-
-def response_from(M1, M2, M3, kappa_n, nu, Gamma, found):
-    """Return the response from what `search` has found for the real parts of the arguments.
-
-    The same as `section_response`.
-    """
-    return section_response(M1, M2, M3, kappa_n, isotropic(nu, Gamma), found)
-
-
-def section_response(M1, M2, M3, kappa_n, section, found):
-    """Return the response of a section from what `section_search` has found for the real parts of the arguments.
-
-    One more step of Newton's method, on the numbers as they come, carries imaginary parts along: by the theorem on implicit
-    functions that is the exact derivative.
-    """
-    w1, w3, g, slope, curvature = found
-    U, U1, U3, U11, U13, U33, Uk, U1k, U3k = _strain_energy(w1, w3, kappa_n, section, (g, slope, curvature))
-    determinant = U11 * U33 - U13 * U13
-    d1 = (U33 * (M1 - U1) - U13 * (M3 - U3)) / determinant
-    d3 = (U11 * (M3 - U3) - U13 * (M1 - U1)) / determinant
-    H = M1 * w1 + M3 * w3 - U + kappa_n * kappa_n / 2  # stationary in the strains: d1, d3 add nothing
-    return H, w1 + d1, 0.0 * M2, w3 + d3, kappa_n - Uk - U1k * d1 - U3k * d3
+# --- the Legendre transform -----------------------------------------------------------------------------------------------------
 
 
 def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
-    """Return H alone."""
-    return response(M1, M2, M3, kappa_n, nu, Gamma)[0]
+    """Return H of an isotropic strip, the Legendre transform of U."""
+    return complementary(M1, M3, kappa_n, isotropic(nu, Gamma)) + kappa_n * kappa_n / 2
 
 
-hamiltonian.gradient = response
+def complementary(M1, M3, kappa_n, section: Section):
+    """Return the largest M.omega - U of a section near `start`; nan where U is not convex."""
+    from contin import least  # loads compiled code, which circles do not need
+
+    def excess(w):
+        return section_energy(w[0], w[1], kappa_n, section) - M1 * w[0] - M3 * w[1]
+
+    return -least(excess, start(M1, M3, kappa_n, section))
+
+
+def ribbon_complementary(M1, M3, kappa_n, section: Section):
+    """Return the same of a ribbon, with omega_1 > 0 where there is such a minimum."""
+    import numpy as np
+
+    from contin import least
+
+    w1, w3, known = ribbon_strains(M1, M3, kappa_n, section)
+    side = np.where(known, 1.0, -1.0)
+
+    def excess(w):
+        if w[0] * side > 0:
+            return ribbon_energy(w[0], w[1], kappa_n, section) - M1 * w[0] - M3 * w[1]
+        return math.inf
+
+    flat1, flat3 = flat_rod_strains(M1, M3, kappa_n, section)
+    return -least(excess, (np.where(known, w1, flat1), np.where(known, w3, flat3)))
+
+
+def ribbon_strains(M1, M3, kappa_n, section: Section):
+    """Return omega_1 > 0 and omega_3 of a ribbon, by a closed form, and 1, or 0 where it has none.
+
+    It is exact where D12 + 2 D66 = sqrt(D11 D22), as for isotropic plates: scaled by stiff, U then has their form.
+    """
+    import numpy as np
+
+    nu, _, _, stiff, _ = section
+    m3, p = M3 / np.sqrt(stiff), M1 / stiff + (stiff - nu) * kappa_n
+    root = np.sqrt(p * p + m3 * m3)
+    a = np.where(p > 0, (p + root) / 2, m3 * m3 / (2 * (root - p) + 1e-300))
+    eta, c = m3 / (2 * a + 1e-300), nu * kappa_n + a
+    w1 = c / (1 + eta * eta)
+    return w1 / stiff, eta * w1 / np.sqrt(stiff), (a > _LEAST * root) & (c > 0)
+
+
+def start(M1, M3, kappa_n, section: Section):
+    """Return the strains at which the search for the minimum of U - M.omega starts.
+
+    They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as long as
+    there is a minimum. Otherwise, or where the ribbon has none, they are the flat rod's.
+    """
+    import numpy as np
+
+    w1, w3, known = ribbon_strains(M1, M3, kappa_n, section)
+    known = known & (section.C * w1 * w1 > _WIDE)
+    flat1, flat3 = flat_rod_strains(M1, M3, kappa_n, section)
+    return np.where(known, w1, flat1), np.where(known, w3, flat3)
+
+
+def flat_rod_strains(M1, M3, kappa_n, section: Section):
+    """Return omega_1 and omega_3 of a flat rod."""
+    return kappa_n + M1 / section.plane, M3 / (2 * section.twist)
+
+
+#: Part of the moment below which the ribbon's a is round-off; it has no bending then.
+_LEAST = 1e-12
+#: x**4 from which the search starts like a ribbon.
+_WIDE = 1.0

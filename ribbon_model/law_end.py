@@ -92,11 +92,8 @@ def _convexity(material: Material, strains: Strains, trial: Trial) -> float:
         return -1.0
     places = np.concatenate([omega, (omega[1:] + omega[:-1]) / 2])
     t = np.concatenate([system.nodes, (system.nodes[1:] + system.nodes[:-1]) / 2])
-    least = math.inf
-    for s, (w1, _, w3) in zip(t, places):
-        U11, U13, U33 = material.curvatures(s, w1, w3, p)
-        least = min(least, (U11 * U33 - U13**2) / (U11 * U33) if U11 > 0 and U33 > 0 else -1.0)
-    return least
+    U11, U13, U33 = material.curvatures(t, places, p)
+    return float(np.where((U11 > 0) & (U33 > 0), (U11 * U33 - U13**2) / (U11 * U33), -1.0).min())
 
 
 def _numbers(trial: Trial) -> SimpleNamespace:

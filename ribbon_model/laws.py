@@ -1,8 +1,8 @@
 """Material laws. All that depends on the law is in this module; the rest of the package calls the law's methods.
 
 A law is one scalar function, the complementary energy H(M1, M2, M3; kappa_n, nu); the strains, the conjugate curvature kappa*,
-the tangent moduli and every Jacobian follow from its derivatives. (A law can also be given by its strain energy, with H as
-Legendre transform: `ribbon_model.finite_width`.) `Law` is enough for branches of any such function; the
+the tangent moduli and every Jacobian follow from its derivatives. (H may be a Legendre transform, found at each point:
+`ribbon_model.finite_width`.) `Law` is enough for branches of any such function; the
 classes below it add what is known in closed form: circles, their thresholds, the unfolding arc, the strain energy.
 
 Units: bending modulus B = 1, total length L = 2 pi (so kappa_n stands for the paper's kappa_n L / 2 pi). The strain
@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import functools
 import math
-import types
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -41,13 +40,14 @@ class Law:
     ----------
     name : str
     hamiltonian : callable
-        H(M1, M2, M3, kappa_n, *parameters), with arithmetic and ``math`` only, unless ``gradient`` is given.
+        H(M1, M2, M3, kappa_n, *parameters), of numbers: arithmetic, ``math``, decisions, `contin.least`.
     constrained : bool
         True if omega_2 = 0 (then H does not depend on M2, which is a reaction).
     parameters : tuple of str
         The law's own parameters, in the order in which they are passed: ``nu``, and for some laws more.
-    gradient : callable, optional
-        The response, if H cannot be differentiated symbolically; prepared for compilation by `contin`.
+    energy : callable, optional
+        U(omega_1, omega_2, omega_3, kappa_n, *parameters) in the same manner, without the constant kappa_n**2/2, for the
+        descents of `ribbon_model.descent`.
 
     Examples
     --------
@@ -59,15 +59,14 @@ class Law:
     hamiltonian: Callable[..., float]
     constrained: bool
     parameters: tuple[str, ...] = ("nu",)
-    gradient: Callable[..., tuple] | None = None
+    energy: Callable[..., float] | None = None
 
     #: True if Gamma is a parameter.
     has_width: ClassVar[bool] = False
     #: True if the surface is ruled along d1 + eta d3, eta = omega_3/omega_1 (6a).
     has_rulings: ClassVar[bool] = False
-    #: ``curvatures_at(omega_1, omega_3, p)`` = (U_11, U_13, U_33) for a law that ends where U loses convexity; None for
-    #: a law whose H is a closed expression, because its domain is known.
-    curvatures_at: ClassVar[Callable[..., tuple] | None] = None
+    #: True if the law ends where U loses convexity; the domain of a law whose H is a closed expression is known.
+    ends_with_convexity: ClassVar[bool] = False
 
     # --- parameters -------------------------------------------------------------------------------------------------------
 
@@ -92,10 +91,8 @@ class Law:
 
     @functools.cached_property
     def response(self) -> Callable[..., tuple]:
-        """``response(M1, M2, M3, kappa_n, *parameters)`` = (H, omega_1, omega_2, omega_3, dH/dkappa_n), plain Python."""
-        if self.gradient:
-            return self.gradient
-        from contin import gradient  # loads numba (.3 s), which a law without its derivatives does not need
+        """``response(M1, M2, M3, kappa_n, *parameters)`` = (H, omega_1, omega_2, omega_3, dH/dkappa_n), of numbers."""
+        from contin import gradient  # loads compiled code (.3 s), which a law without its derivatives does not need
 
         return gradient(self.hamiltonian, ("M1", "M2", "M3", "kappa_n"))
 
@@ -104,29 +101,22 @@ class Law:
 
         p, a named tuple, has kappa_n and the law's parameters.
         """
-        response = self.response
+        response, names = self.response, self.parameters
 
         def value(t, u, p):
             M = moment(u, p)
-            return function(u, p, M, response(M[0], M[1], M[2], p.kappa_n, p.nu))
+            return function(u, p, M, response(M[0], M[1], M[2], p.kappa_n, *[getattr(p, name) for name in names]))
 
         return value
 
     def linearized(self, moments, kappa_n: float, *parameters: float):
-        """Return strains (K, 3) and compliance D2H (K, 3, 3) at moments on the directors (K, 3), by complex steps."""
-        import numpy as np
+        """Return strains (K, 3) and compliance D2H (K, 3, 3) at moments on the directors (K, 3)."""
+        values, slopes = _evaluated(_response_at_points, self, moments, kappa_n, parameters)
+        return values[:, 1:4], slopes[:, 1:4]
 
-        step = 1e-30
-        arguments = np.repeat(np.asarray(moments).T[:, None].astype(complex), 3, axis=1)  # component, direction, place
-        arguments[range(3), range(3)] += 1j * step
-        shape = arguments.shape[1:]
-        if self.gradient:  # it has loops and decisions: one place at a time
-            places = [self.response(*moment, kappa_n, *parameters)[1:4] for moment in arguments.reshape(3, -1).T]
-            strain = np.array(places, dtype=complex).T.reshape(3, *shape)
-        else:  # the same code as plain Python's, on arrays
-            response = types.FunctionType(self.response.__code__, {"math": np})
-            strain = np.array([np.broadcast_to(w, shape) for w in response(*arguments, kappa_n, *parameters)[1:4]])
-        return strain[:, 0].real.T, strain.imag.transpose(2, 0, 1) / step
+    def complementary(self, moments, kappa_n: float, *parameters: float):
+        """Return H (K,) at moments on the directors (K, 3)."""
+        return _evaluated(_response_at_points, self, moments, kappa_n, parameters)[0][:, 0]
 
     def strain_energy(self, strain, kappa_n: float, *parameters: float) -> tuple:
         """U, the moment dU/d(omega) and the stiffness D2U at strains (..., 3), for the descents of `ribbon_model.descent`.
@@ -142,7 +132,15 @@ class Law:
         ValueError
             A law without a strain energy.
         """
-        raise ValueError(f"law {self.name!r} has no strain energy for descents")
+        import numpy as np
+
+        shape = np.shape(strain)[:-1]
+        value, slope = _evaluated(_energy_at_points, self, np.reshape(strain, (-1, 3)), kappa_n, parameters)
+        return value[:, 0].reshape(shape), value[:, 1:4].reshape(*shape, 3), slope[:, 1:4].reshape(*shape, 3, 3)
+
+    def conjugate(self, strain, kappa_n: float, *parameters: float):
+        """Return -dU/dkappa_n at strains (K, 3), with U as in `strain_energy`."""
+        return -_evaluated(_energy_at_points, self, strain, kappa_n, parameters)[0][:, 4]
 
     # --- circles ----------------------------------------------------------------------------------------------------------
 
@@ -198,6 +196,38 @@ class Law:
         return True
 
 
+@functools.cache
+def _response_at_points(law: Law):
+    """Return the response of a law, to be evaluated at many points, and the columns of its derivatives by the moment."""
+    from contin import Batch
+
+    response = law.response
+    names = ("kappa_n", *law.parameters)
+    batch = Batch([lambda M, p: response(*M, *p)], [5], ("M1", "M2", "M3"), names, times=False)
+    return batch, batch.columns([])
+
+
+@functools.cache
+def _energy_at_points(law: Law):
+    """Return U and its slopes by the strains and kappa_n in the same manner."""
+    from contin import Batch, gradient
+
+    if law.energy is None:
+        raise ValueError(f"law {law.name!r} has no strain energy for descents")
+    slopes = gradient(law.energy, ("w1", "w2", "w3", "kappa_n"))
+    batch = Batch([lambda w, p: slopes(*w, *p)], [5], ("w1", "w2", "w3"), ("kappa_n", *law.parameters), times=False)
+    return batch, batch.columns([])
+
+
+def _evaluated(function: Callable[[Law], tuple], law: Law, points, kappa_n: float, parameters: tuple):
+    """Return values (K, 5) and derivatives (K, 5, 3) of one of these at points (K, 3)."""
+    import numpy as np
+
+    batch, columns = function(law)
+    u = np.ascontiguousarray(points, dtype=float)
+    return batch.jacobian(np.zeros(len(u)), u, u[:0], np.array([kappa_n, *parameters], dtype=float), columns)
+
+
 # --- the laws of the paper --------------------------------------------------------------------------------------------------
 
 
@@ -223,38 +253,39 @@ def isotropic_rod_hamiltonian(M1, M2, M3, kappa_n, nu):
     return (M1 + kappa_n) * (M1 + kappa_n) / 2 + M2 * M2 / 2 + M3 * M3 * (1 + nu) / 2
 
 
+def ribbon_energy(w1, w2, w3, kappa_n, nu):
+    """Inextensible ribbon. With c = (omega_1**2 + omega_3**2)/omega_1 and a = c - nu kappa_n where that is positive, else 0,
+
+        U = a**2/2 - (1 - nu) kappa_n omega_1 - (nu kappa_n)**2/2,
+
+    which is (7) of Audoly & Seffen (2015) where a > 0, and its convex envelope elsewhere; U = inf for omega_1 <= 0. Where
+    a = 0 the stiffness is singular.
+    """
+    if w1 > 0:
+        a = max(w1 + w3 * w3 / w1 - nu * kappa_n, 0.0)
+        return a * a / 2 - (1 - nu) * kappa_n * w1 - nu * kappa_n * nu * kappa_n / 2
+    return math.inf
+
+
+def flat_rod_energy(w1, w2, w3, kappa_n, nu):
+    """Flat rod: the Legendre transform of `flat_rod_hamiltonian`."""
+    return w1 * w1 / 2 - kappa_n * w1 + w3 * w3 / (1 + nu)
+
+
+def isotropic_rod_energy(w1, w2, w3, kappa_n, nu):
+    """Isotropic rod: the Legendre transform of `isotropic_rod_hamiltonian`."""
+    return w1 * w1 / 2 - kappa_n * w1 + w2 * w2 / 2 + w3 * w3 / (2 * (1 + nu))
+
+
+def finite_width_energy(w1, w2, w3, kappa_n, nu, Gamma):
+    """Strip of finite width."""
+    return finite_width.energy(w1, w3, kappa_n, nu, Gamma) - kappa_n * kappa_n / 2
+
+
 class Ribbon(Law):
     """The inextensible ribbon: developable, omega_2 = 0."""
 
     has_rulings = True
-
-    def strain_energy(self, strain, kappa_n: float, nu: float) -> tuple:
-        """With c = (omega_1**2 + omega_3**2)/omega_1 and a = c - nu kappa_n where that is positive, else 0,
-
-            U = a**2/2 - (1 - nu) kappa_n omega_1 - (nu kappa_n)**2/2,
-
-        which is (7) of Audoly & Seffen (2015) where a > 0, and its convex envelope elsewhere; U = inf for omega_1 <= 0. Where
-        a = 0 the stiffness is singular.
-        """
-        import numpy as np
-
-        strain = np.asarray(strain)
-        w1, w3 = strain[..., 0], strain[..., 2]
-        kind = np.result_type(strain, kappa_n)
-        moment, stiffness = np.zeros(strain.shape, kind), np.zeros((*strain.shape, 3), kind)
-        safe = np.where(w1.real > 0, w1, 1.0)
-        eta = w3 / safe
-        a = safe * (1 + eta * eta) - nu * kappa_n
-        convex = a.real > 0
-        a = np.where(convex, a, 0.0)
-        slope = np.stack([1 - eta * eta, 2 * eta], axis=-1)  # of c, by omega_1 and omega_3
-        ratio = np.stack([-eta, np.ones_like(eta)], axis=-1)
-        bend = (2 / safe)[..., None, None] * ratio[..., None] * ratio[..., None, :]
-        moment[..., ::2] = a[..., None] * slope
-        moment[..., 0] -= (1 - nu) * kappa_n
-        stiffness[..., ::2, ::2] = convex[..., None, None] * slope[..., None] * slope[..., None, :] + a[..., None, None] * bend
-        U = a * a / 2 - (1 - nu) * kappa_n * w1 - (nu * kappa_n) ** 2 / 2
-        return np.where(w1.real > 0, U, np.inf), moment, stiffness
 
     def tangent_moduli(self, ratio, nu, width=None) -> tuple:
         return math.inf, 2 * (1 - nu * ratio)
@@ -282,22 +313,7 @@ class Ribbon(Law):
         return nu >= 0
 
 
-class Rod(Law):
-    """A rod: U is quadratic, with constant moduli."""
-
-    def strain_energy(self, strain, kappa_n: float, nu: float) -> tuple:
-        """Return the inverse of the compliances, which are those at any moment."""
-        import numpy as np
-
-        strain = np.asarray(strain)
-        compliance = np.diag(self.linearized(np.zeros((1, 3)), 0.0, nu)[1][0])
-        moduli = np.array([0.0 if value == 0 else 1 / value for value in compliance])
-        moment = moduli * strain - kappa_n * np.array([1.0, 0.0, 0.0])
-        U = np.sum(moduli * strain * strain, axis=-1) / 2 - kappa_n * strain[..., 0]
-        return U, moment, np.broadcast_to(np.diag(moduli), (*strain.shape, 3))
-
-
-class FlatRod(Rod):
+class FlatRod(Law):
     """The flat rod: omega_2 = 0."""
 
     def tangent_moduli(self, ratio, nu, width=None) -> tuple:
@@ -308,7 +324,7 @@ class FlatRod(Rod):
         return (m * (1 + 2 * s / (1 + nu)),)
 
 
-class IsotropicRod(Rod):
+class IsotropicRod(Law):
     """The isotropic rod: three moduli."""
 
     def tangent_moduli(self, ratio, nu, width=None) -> tuple:
@@ -329,6 +345,7 @@ class FiniteWidth(Law):
     """The strip of finite width: `ribbon_model.finite_width`."""
 
     has_width = True
+    ends_with_convexity = True
 
     def values(self, nu: float, Gamma: float | None = None) -> dict[str, float]:
         if Gamma is None:
@@ -336,42 +353,6 @@ class FiniteWidth(Law):
         if not 0 <= Gamma < math.inf:
             raise ValueError(f"Gamma = {Gamma:g} must be a finite number from 0; the limit of a wide strip is the law 'ribbon'")
         return {"nu": nu, "Gamma": Gamma}
-
-    def at_points(self, moment: Callable[..., tuple], function: Callable[..., Any]) -> Callable[..., Any]:
-        """As for all laws; the search for the strains runs once a point."""
-        search, response = finite_width.search, finite_width.response_from
-
-        def solve(t, u, p):
-            M = moment(u, p)
-            return search(M[0], M[2], p.kappa_n, p.nu, p.Gamma)
-
-        def value(t, u, p, w):
-            M = moment(u, p)
-            return function(u, p, M, response(M[0], M[1], M[2], p.kappa_n, p.nu, p.Gamma, w))
-
-        from contin import Pointwise
-
-        return Pointwise(value, solve)
-
-    def strain_energy(self, strain, kappa_n: float, nu: float, Gamma: float) -> tuple:
-        """As `finite_width.strain_energy`, with the constant that all laws leave out; a strain at a time."""
-        import numpy as np
-
-        strain = np.asarray(strain)
-        energy = np.frompyfunc(finite_width.strain_energy, 5, 9)
-        kind = np.result_type(strain, kappa_n)
-        values = energy(strain[..., 0], strain[..., 2], kappa_n, nu, Gamma)
-        U, U1, U3, U11, U13, U33 = (np.asarray(value, dtype=kind) for value in values[:6])
-        moment, stiffness = np.zeros(strain.shape, kind), np.zeros((*strain.shape, 3), kind)
-        moment[..., 0], moment[..., 2] = U1, U3
-        stiffness[..., 0, 0], stiffness[..., 2, 2] = U11, U33
-        stiffness[..., 0, 2] = stiffness[..., 2, 0] = U13
-        return U - kappa_n * kappa_n / 2, moment, stiffness
-
-    @staticmethod
-    def curvatures_at(w1, w3, p) -> tuple:
-        U, U1, U3, U11, U13, U33, Uk, U1k, U3k = finite_width.strain_energy(w1, w3, p.kappa_n, p.nu, p.Gamma)
-        return U11, U13, U33
 
     def circle(self, m: int, kappa_n: float, nu: float, Gamma: float | None = None) -> dict[str, float]:
         U, U1, _, _, _, _, Uk, _, _ = finite_width.strain_energy(m, 0.0, kappa_n, nu, Gamma)
@@ -414,7 +395,7 @@ class FiniteWidth(Law):
         import numpy as np
 
         kappa = 1 - xi
-        energy = np.vectorize(finite_width.strain_energy, otypes=[float] * 9)(kappa, 0.0, 1.0, nu, width)
+        energy = finite_width.strain_energy(kappa, np.zeros_like(kappa), 1.0, nu, width)
         moment, t = energy[1], energy[5]
         return math.inf, moment, t * kappa, 1 / t + 0 * kappa
 
@@ -422,11 +403,11 @@ class FiniteWidth(Law):
         return finite_width.first_zero_of_t(nu, width)
 
 
-RIBBON = Ribbon("ribbon", ribbon_hamiltonian, constrained=True)
-FLAT_ROD = FlatRod("flat rod", flat_rod_hamiltonian, constrained=True)
-ISOTROPIC_ROD = IsotropicRod("isotropic rod", isotropic_rod_hamiltonian, constrained=False)
+RIBBON = Ribbon("ribbon", ribbon_hamiltonian, constrained=True, energy=ribbon_energy)
+FLAT_ROD = FlatRod("flat rod", flat_rod_hamiltonian, constrained=True, energy=flat_rod_energy)
+ISOTROPIC_ROD = IsotropicRod("isotropic rod", isotropic_rod_hamiltonian, constrained=False, energy=isotropic_rod_energy)
 FINITE_WIDTH = FiniteWidth(
-    "finite width", finite_width.hamiltonian, True, parameters=("nu", "Gamma"), gradient=finite_width.response
+    "finite width", finite_width.hamiltonian, constrained=True, parameters=("nu", "Gamma"), energy=finite_width_energy
 )
 
 #: The laws of the paper by name, each a closed expression for H in which nu is the one parameter.

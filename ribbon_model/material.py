@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ribbon_model import plate
-from ribbon_model.finite_width import isotropic, section_energy
+from ribbon_model.finite_width import Section, ribbon_energy, section_derivatives, section_energy
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, LAWS, RIBBON, Law
 from ribbon_model.plate import RIGIDITIES
 
@@ -267,22 +267,26 @@ class Material:
 
     def _wide_energy(self, t: np.ndarray, strains: np.ndarray, kappa_n: np.ndarray, p) -> tuple[np.ndarray, ...]:
         """Return `strain_energy` of a ribbon (infinite unless omega_1 > 0) or a strip of finite width."""
-        U, moment, stiffness = np.full(len(t), math.inf), np.zeros((len(t), 3)), np.zeros((len(t), 3, 3))
+        moment, stiffness = np.zeros((len(t), 3)), np.zeros((len(t), 3, 3))
         modulus = p.D22 if self.orthotropic else 1.0
-        for i, (w1, _, w3) in enumerate(strains):
-            if self.law == RIBBON.name and not w1 > 0:
-                continue
-            U[i], U1, U3, U11, U13, U33, *_ = section_energy(w1, w3, kappa_n[i], self._section_at(t[i], p))
-            moment[i, ::2], stiffness[i, ::2, ::2] = (U1, U3), ((U11, U13), (U13, U33))
-        return modulus * U, modulus * moment, modulus * stiffness
+        U, U1, U3, U11, U13, U33 = self._wide_derivatives(t, strains, kappa_n, p)[:6]
+        valid = strains[:, 0] > 0 if self.law == RIBBON.name else np.full(len(t), True)
+        moment[:, 0], moment[:, 2] = np.where(valid, U1, 0.0), np.where(valid, U3, 0.0)
+        stiffness[valid, ::2, ::2] = np.array([[U11, U13], [U13, U33]])[:, :, valid].transpose(2, 0, 1)
+        return np.where(valid, modulus * U, math.inf), modulus * moment, modulus * stiffness
 
-    def _section_at(self, t: float, p) -> tuple:
-        """Return the section of a ribbon or a strip of finite width at a place, as `finite_width.isotropic`."""
+    def _wide_derivatives(self, t: np.ndarray, strains: np.ndarray, kappa_n: np.ndarray, p) -> tuple[np.ndarray, ...]:
+        """Return `finite_width.section_derivatives` at places t (K,) with strains (K, 3)."""
+        sections = np.array([self._section_at(s, p) for s in t], dtype=float).reshape(-1, len(Section._fields))
+        function = ribbon_energy if self.law == RIBBON.name else section_energy
+        return section_derivatives(strains[:, 0], strains[:, 2], kappa_n, Section(*sections.T), function)
+
+    def _section_at(self, t: float, p) -> Section:
+        """Return the section of a ribbon or a strip of finite width at a place."""
         rigidities = (p.D11, p.D12, p.D22, p.D66) if self.orthotropic else (1.0, p.nu, 1.0, (1 - p.nu) / 2)
         if self.law == RIBBON.name:
-            return plate.section_of(*rigidities)
-        Gamma = p.Gamma * self.datum("width")(t, p) ** 2 / self.datum("thickness")(t, p)
-        return plate.wide_section_of(*rigidities, Gamma) if self.orthotropic else isotropic(p.nu, Gamma)
+            return plate.section_of(*rigidities, math.inf)
+        return plate.section_of(*rigidities, p.Gamma * self.datum("width")(t, p) ** 2 / self.datum("thickness")(t, p))
 
     def ribbon_margin(self, t: float, M1: float, M3: float, p) -> float:
         """Return a number that is positive where the law of the ribbon holds: omega_1 > 0, and no other strain is preferred.
@@ -314,10 +318,10 @@ class Material:
         least = min(twisting, root) if twisting > 0 else root
         return p.D11 * (1 - p.D12 / least), p.D11 * (1 + p.D12 / root)
 
-    def curvatures(self, t: float, w1: float, w3: float, p) -> tuple[float, float, float]:
-        """Return U_11, U_13 and U_33 of the law of finite width at a place, up to a factor."""
-        _, _, _, U11, U13, U33, *_ = section_energy(w1, w3, self.datum("kappa_n")(t, p), self._section_at(t, p))
-        return U11, U13, U33
+    def curvatures(self, t: np.ndarray, strains: np.ndarray, p) -> tuple[np.ndarray, ...]:
+        """Return U_11, U_13 and U_33 of the law of finite width at places t (K,) with strains (K, 3), up to a factor."""
+        natural = self.datum("kappa_n")
+        return self._wide_derivatives(t, strains, np.array([natural(s, p) for s in t]), p)[3:6]
 
 
 # --- expressions ------------------------------------------------------------------------------------------------------------

@@ -20,22 +20,17 @@ from __future__ import annotations
 
 import math
 
-from ribbon_model.finite_width import section_response, section_search
+from ribbon_model.finite_width import Section, complementary, ribbon_complementary
 
 #: Bending stiffnesses of the plate times the width: along the strip, coupling, across it, twisting.
 RIGIDITIES = ("D11", "D12", "D22", "D66")
 
 
-def section_of(D11, D12, D22, D66):
-    """Return the section of a ribbon; see `finite_width.isotropic`."""
+def section_of(D11, D12, D22, D66, Gamma) -> Section:
+    """Return the section of a strip of an orthotropic plate; Gamma is not read of a ribbon."""
     nu = D12 / D22
-    return nu, D11 / D22 - nu * nu, 2 * D66 / D22, math.sqrt(D11.real / D22.real), 1.0, 0.0
-
-
-def wide_section_of(D11, D12, D22, D66, Gamma):
-    """Return the section of a strip of finite width."""
-    nu, plane, twist, stiff, _, _ = section_of(D11, D12, D22, D66)
-    return nu, plane, twist, stiff, 3 * plane * Gamma * Gamma, 1 / (math.sqrt(3 * plane.real) * Gamma.real + 1e-100)
+    plane = D11 / D22 - nu * nu
+    return Section(nu, plane, 2 * D66 / D22, math.sqrt(D11 / D22), 3 * plane * Gamma * Gamma)
 
 
 def flat_rod(M1, M2, M3, kappa_n, D11, D12, D22, D66):
@@ -45,32 +40,10 @@ def flat_rod(M1, M2, M3, kappa_n, D11, D12, D22, D66):
 
 def ribbon(M1, M2, M3, kappa_n, D11, D12, D22, D66):
     """Return H of a ribbon, zero without moments."""
-    return ribbon_response(M1, M2, M3, kappa_n, D11, D12, D22, D66)[0]
-
-
-def ribbon_response(M1, M2, M3, kappa_n, D11, D12, D22, D66):
-    """Return H, omega_1, omega_2, omega_3 and dH/dkappa_n of a ribbon."""
-    real = section_of(D11.real, D12.real, D22.real, D66.real)
-    return _response(M1, M2, M3, kappa_n, D22, section_of(D11, D12, D22, D66), real)
+    section = section_of(D11, D12, D22, D66, math.inf)
+    return D22 * ribbon_complementary(M1 / D22, M3 / D22, kappa_n, section)
 
 
 def finite_width(M1, M2, M3, kappa_n, D11, D12, D22, D66, Gamma):
     """Return H of a strip of finite width, zero without moments."""
-    return finite_width_response(M1, M2, M3, kappa_n, D11, D12, D22, D66, Gamma)[0]
-
-
-def finite_width_response(M1, M2, M3, kappa_n, D11, D12, D22, D66, Gamma):
-    """Return H, omega_1, omega_2, omega_3 and dH/dkappa_n of a strip of finite width."""
-    real = wide_section_of(D11.real, D12.real, D22.real, D66.real, Gamma.real)
-    return _response(M1, M2, M3, kappa_n, D22, wide_section_of(D11, D12, D22, D66, Gamma), real)
-
-
-def _response(M1, M2, M3, kappa_n, D22, section, real):
-    """Return the response of a section, also of the real parts of its numbers; that of `finite_width` is in units of D22."""
-    found = section_search(M1.real / D22.real, M3.real / D22.real, kappa_n.real, real)
-    H, w1, w2, w3, slope = section_response(M1 / D22, M2 / D22, M3 / D22, kappa_n, section, found)
-    return D22 * (H - kappa_n * kappa_n / 2), w1, w2, w3, D22 * (slope - kappa_n)
-
-
-ribbon.gradient = ribbon_response
-finite_width.gradient = finite_width_response
+    return D22 * complementary(M1 / D22, M3 / D22, kappa_n, section_of(D11, D12, D22, D66, Gamma))

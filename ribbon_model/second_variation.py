@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import Batch, basis, interpolation
+from contin import basis, interpolation
 from ribbon_model import linear
 from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH
@@ -101,29 +101,7 @@ class Equilibrium:
 
     def response(self, moment):
         """Return the strains (K, 3) and compliance D2H (K, 3, 3) from body components of the moment (K, 3)."""
-        values = self.law.values(self.nu, self.Gamma).values()
-        if not self.law.gradient:
-            return self.law.linearized(moment, self.kappa_n, *values)
-        batch, colours = _compiled(
-            self.law
-        )  # compiled, a response with loops and decisions is a hundred times faster than in plain Python
-        arguments = np.ascontiguousarray(moment), np.empty((0, 3)), np.array([self.kappa_n, *values])
-        return batch.jacobian(np.zeros(len(moment)), *arguments, colours)
-
-
-@functools.cache
-def _compiled(law: Law) -> tuple:
-    """Return the strains of a law as compiled functions of M1, M2, M3, and the columns of their Jacobian."""
-
-    def strains(u, p, M, response):
-        H, w1, w2, w3, conjugate = response
-        return w1, w2, w3
-
-    def moment(u, p):
-        return u.M1, u.M2, u.M3
-
-    batch = Batch([law.at_points(moment, strains)], [3], ("M1", "M2", "M3"), ("kappa_n", *law.parameters))
-    return batch, batch.columns([])
+        return self.law.linearized(moment, self.kappa_n, *self.law.values(self.nu, self.Gamma).values())
 
 
 def coupling(moment, force) -> np.ndarray:

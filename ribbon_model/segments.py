@@ -206,10 +206,12 @@ class Strip(Chain):
     @cached_property
     def density(self):
         """U, moment and stiffness on the segments: `Law.strain_energy`."""
-        return self._strain_energy(self.kappa_n)
+        return self.law.strain_energy(self.strains, *self._material)
 
-    def _strain_energy(self, kappa_n):
-        return self.law.strain_energy(self.strains, kappa_n, *self.law.values(self.nu, self.Gamma).values())
+    @property
+    def _material(self) -> tuple[float, ...]:
+        """kappa_n and the law's parameters."""
+        return self.kappa_n, *self.law.values(self.nu, self.Gamma).values()
 
     @cached_property
     def energy(self) -> float:
@@ -219,9 +221,7 @@ class Strip(Chain):
     @cached_property
     def kappa_star(self) -> float:
         """-dE/dkappa_n, the conjugate curvature (28), with U as in `Law.strain_energy`."""
-        step = 1e-30
-        varied = self._strain_energy(self.kappa_n + 1j * step)[0]
-        return float(-np.mean(varied.imag) / step)
+        return float(np.mean(self.law.conjugate(self.strains, *self._material)))
 
     @property
     def slack(self) -> int:

@@ -91,13 +91,13 @@ class Solution:
 
     def strains(self) -> np.ndarray:
         """omega_1, omega_2 and omega_3 at the nodes, shape (K, 3): curvatures and twist, over 2 pi/L."""
-        return np.array([self.law.response(*m, *self.material)[1:4] for m in self.loads()[0]])
+        return self.law.linearized(self.loads()[0], *self.material)[0]
 
     def invariants(self) -> dict[str, np.ndarray]:
         """Return the constants of motion at the nodes: ``norm`` |q|^2 and ``hamiltonian`` H(M) + R3, shape (K,) each."""
         moment, force = self.loads()
-        values = [self.law.response(*m, *self.material)[0] for m in moment]
-        return {"norm": np.sum(self.states[:, :4] ** 2, axis=1), "hamiltonian": np.array(values) + force[:, 2]}
+        values = self.law.complementary(moment, *self.material)
+        return {"norm": np.sum(self.states[:, :4] ** 2, axis=1), "hamiltonian": values + force[:, 2]}
 
     def shape(self) -> Shape:
         """Return the closed strip in space, unfolded by the symmetries of the domain."""

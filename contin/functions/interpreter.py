@@ -367,7 +367,8 @@ def _direction(work, at, k, minimum, lane, scratch):
     """Solve for Newton's step in one lane, and return its slope: of the potential, or of half the squared residual.
 
     ``at`` is the register of [unknowns (k) | value | G (k) | A | before (k) | step (k) | ...]: A is the lower triangle of the
-    Hessian by rows, or the Jacobian. Pivots of a Hessian are made positive, so that the step leads downhill.
+    Hessian by rows, or the Jacobian. Pivots of a Hessian that are not positive are replaced, so that the step leads downhill; the
+    lower left entry of ``scratch`` is 0 where there was one, else 1.
     """
     first, matrix = at + k + 1, at + 2 * k + 1
     for i in range(k):
@@ -380,9 +381,13 @@ def _direction(work, at, k, minimum, lane, scratch):
                 entry = matrix + j * (j + 1) // 2 + i
             scratch[i, j] = work[entry * LANES + lane]
         scratch[i, k] = -work[(first + i) * LANES + lane]
+    convex = 1.0
     for i in range(k):
         if minimum:
-            scratch[i, i] = max(abs(scratch[i, i]), LEAST_PIVOT * (1.0 + abs(work[(matrix + i * (i + 3) // 2) * LANES + lane])))
+            diagonal = abs(work[(matrix + i * (i + 3) // 2) * LANES + lane])
+            if not scratch[i, i] > POSITIVE * diagonal:
+                convex = 0.0
+                scratch[i, i] = max(abs(scratch[i, i]), LEAST_PIVOT * (1.0 + diagonal))
         else:
             largest = i
             for j in range(i + 1, k):
@@ -402,6 +407,7 @@ def _direction(work, at, k, minimum, lane, scratch):
     for i in range(k):
         G = work[(first + i) * LANES + lane]
         slope += G * scratch[i, k] if minimum else -G * G
+    scratch[k - 1, 0] = convex
     return slope
 
 
@@ -467,6 +473,9 @@ def _advance(work, lists, row, lanes, scratch):
             work[(step + i) * LANES + lane] = change
             work[(at + i) * LANES + lane] = x + change
             arrived = arrived and change * change <= SETTLED * SETTLED * (SMALLEST + x * x)
+        if arrived and scratch[k - 1, 0] == 0.0:  # a saddle or a maximum
+            for i in range(k):
+                work[(at + i) * LANES + lane] = math.nan
         work[part * LANES + lane] = 0.0 if arrived else 1.0
         moving = moving or not arrived
     return moving
@@ -578,6 +587,9 @@ SHORTEST = 1e-12
 SETTLED = 1e-9
 #: Square of the size below which an unknown counts as this large. Smaller unknowns are found to 1e-9 of this size squared.
 SMALLEST = 1.0
+#: Pivots of a Hessian below this part of its diagonal are round-off of its elimination, which makes 1e-16 to 1e-14. Ten times
+#: larger, minima of that condition would be called saddles.
+POSITIVE = 1e-13
 #: Where a potential is not convex, a pivot is at least this part of 1 + the diagonal: Newton's step is then long, and damped.
 LEAST_PIVOT = 1e-3
 #: A potential that does not decrease by more than its round-off is accepted.

@@ -16,15 +16,18 @@ import numpy as np
 
 from contin.errors import ProblemError
 from contin.functions import derivatives
+<<<<<<< HEAD
 from contin.functions.recorded_arrays import NUMPY, recorded, select
+=======
+from contin.functions.program import Inputs, Program, evaluated, program
+from contin.functions.recorded_arrays import recorded, select
+from contin.functions.recording import recorded_paths
+>>>>>>> laws
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Number, Tape, Unrecordable
 
 #: Largest number of unknowns that are found together. Their equations are solved with a dense matrix at every point.
 _MOST = 16
-#: Newton steps and halvings of each in Python, as in the interpreter.
-_NEWTON = 60
-_HALVINGS = 40
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,7 @@ class Search:
     def _implicit(self, tape: Tape, operands: Sequence[Number]) -> list[list[Any]]:
         """Return the derivatives of all unknowns by each operand."""
         k, places = len(self.unknowns), [operand.place for operand in operands]
-        solution = [tape.apply("root", *operands, data=(self, i)) for i in range(k)]
-        at = {unknown: number.place for unknown, number in zip(self.unknowns, solution)}
+        at = self.solution(tape, operands)
         by = derivatives.jacobian(tape, self.slopes, places)
         wanted = [self.entry(i, j) for i in range(k) for j in range(k)] + list(by.values())
         moved = tape.substitute(wanted, at)
@@ -94,9 +96,27 @@ class Search:
             columns.append(solved(matrix, right, self.minimum))
         return columns
 
+<<<<<<< HEAD
     def newton(self, tape: Tape, values: Mapping[Any, float]) -> list[float]:
         """Return the unknowns in Python, for ``values`` of the inputs by slot."""
         return newton(tape, self, dict(values))
+=======
+    def solution(self, tape: Tape, operands: Sequence[Number]) -> dict[int, int]:
+        """Return the places of the values found, by the places of the unknowns."""
+        found = [tape.apply("root", *operands, data=(self, i)) for i in range(len(self.unknowns))]
+        return {unknown: number.place for unknown, number in zip(self.unknowns, found)}
+
+    def slopes_of_least(self, tape: Tape, operands: Sequence[Number]) -> list[Any]:
+        """Return the derivatives of the least value by what the potential reads: those at fixed unknowns, as it is stationary."""
+        by = derivatives.jacobian(tape, [self.potential], [operand.place for operand in operands])
+        moved = tape.substitute(list(by.values()), self.solution(tape, operands))
+        slopes = {number: Number(tape, place) for (_, number), place in zip(by, moved)}
+        return [slopes.get(number) for number in range(len(operands))]
+
+    def evaluate(self, index: int, operands: Sequence[float]) -> float:
+        """Raise: an unknown is evaluated with its tape (`Tape.evaluate`)."""
+        raise NotImplementedError
+>>>>>>> laws
 
 
 def solved(matrix: Sequence[Sequence[Any]], right: Sequence[Any], symmetric: bool) -> list[Any]:
@@ -187,14 +207,59 @@ def root(residual: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, ...]:
     return _found(residual, start, False)
 
 
-def _found(function: Callable[..., Any], start: Sequence[Any], minimal: bool) -> tuple[Any, ...]:
+def least(potential: Callable[..., Any], start: Sequence[Any]) -> Any:
+    """Return the least value of ``potential(w)``, as `minimum` finds it.
+
+    Its derivatives are those of the potential at fixed w, since it is stationary there: a Legendre transform costs no more than
+    its strains. They are exact, and so are second and higher ones.
+
+    Parameters
+    ----------
+    potential : callable
+    start : sequence of float
+        As for `minimum`.
+
+    Returns
+    -------
+    float
+        nan where there is no minimum.
+
+    Raises
+    ------
+    ProblemError
+        No unknowns, or more than 16.
+
+    Examples
+    --------
+    The complementary energy of U = w**4/4 is 3 M**(4/3)/4, and its derivative the strain:
+
+    >>> from contin import gradient, least
+    >>> gradient(lambda M: -least(lambda w: w[0] ** 4 / 4 - M * w[0], [1.0]), ["M"])(8.0)
+    (12.0, 2.0)
+    """
+    starts, function, tape = _given(potential, start)
+    if tape is None:
+        scratch = Tape()
+        search, found = _in_python(scratch, function, starts, True)
+        return scratch.evaluate([search.potential], {("unknown", 0, i): value for i, value in enumerate(found)})[0]
+    search, operands = recorded_search(tape, function, starts, True)
+    (value,) = tape.substitute([search.potential], search.solution(tape, operands))
+    return tape.apply("least", Number(tape, value), *operands, data=(search,))
+
+
+def _given(function: Callable[..., Any], start: Sequence[Any]) -> tuple[list[Any], Callable[..., Any], Tape | None]:
+    """Return the starts, a function of recorded numbers, and the tape on which it is recorded (None for ordinary numbers)."""
     starts = list(start)
     if not 1 <= len(starts) <= _MOST:
         raise ProblemError(f"start: {len(starts)} unknowns, must be 1 to {_MOST}")
     function = prepared(function)
-    tape = _tape_of(function, starts)
+    return starts, function, _tape_of(function, starts)
+
+
+def _found(function: Callable[..., Any], start: Sequence[Any], minimal: bool) -> tuple[Any, ...]:
+    starts, function, tape = _given(function, start)
     if tape is None:
-        return _in_python(function, starts, minimal)
+        return tuple(_in_python(Tape(), function, starts, minimal)[1])
     search, operands = recorded_search(tape, function, starts, minimal)
     return tuple(tape.apply("root", *operands, data=(search, i)) for i in range(len(starts)))
 
@@ -232,8 +297,13 @@ def recorded_search(
     k = len(starts)
     unknowns = [tape.input(("unknown", tape.searches, i)) for i in range(k)]
     tape.searches += 1
-    result = function(tuple(unknowns))
-    values = [tape.number(value) for value in (result if isinstance(result, (tuple, list, np.ndarray)) else [result])]
+
+
+    def call(copy: Any) -> Sequence[Any]:
+        result = copy(tuple(unknowns))
+        return list(result) if isinstance(result, (tuple, list, np.ndarray)) else [result]
+
+    values = [Number(tape, place) for place in recorded_paths(tape, function, call)]
     if len(values) != (1 if minimal else k):
         raise ProblemError(f"{'potential' if minimal else 'residual'} returns {len(values)} values, must return {1 if minimal else k}")
     search = search_of(tape, [each.place for each in unknowns], [each.place for each in values], starts, minimal)
@@ -278,58 +348,37 @@ def operands_of(tape: Tape, search: Search) -> list[Number]:
     return [Number(tape, place) for place in operands if tape.value(place) is None]
 
 
+<<<<<<< HEAD
 def _in_python(function: Callable[..., Any], starts: Sequence[float], minimal: bool) -> tuple[float, ...]:
     """Return the unknowns for ordinary numbers."""
     tape = Tape(NUMPY)
+=======
+def _in_python(
+    tape: Tape, function: Callable[..., Any], starts: Sequence[float], minimal: bool
+) -> tuple[Search, list[float]]:
+    """Return the search on an empty tape, and the unknowns for ordinary numbers."""
+>>>>>>> laws
     try:
         search, _ = recorded_search(tape, function, starts, minimal)
     except Unrecordable as reason:
         raise ProblemError(f"{'potential' if minimal else 'residual'} cannot be differentiated: {reason}") from None
-    return tuple(newton(tape, search, {}))
+    return search, newton(tape, search, {})
 
 
-def newton(tape: Tape, search: Search, values: dict[Any, float]) -> list[float]:
-    """Return the unknowns of a search in Python, as the interpreter finds them; nan where it does not arrive."""
-    k = len(search.unknowns)
-    slots = [tape.operations[place].data for place in search.unknowns]
-    w = np.array(tape.evaluate(search.starts, values))
+def newton(tape: Tape, search: Search, values: Mapping[Any, float]) -> list[float]:
+    """Return the unknowns of a search, found by the interpreter at one point; nan where it does not arrive.
 
-    def at(w: Any) -> tuple[float, Any, Any]:
-        found = tape.evaluate(search.results, {**values, **dict(zip(slots, w.tolist()))})
-        by_place = dict(zip(search.results, found))
-        G = np.array([by_place[place] for place in search.slopes])
-        A = np.array([[by_place[search.entry(i, j)] for j in range(k)] for i in range(k)])
-        return (by_place[search.potential] if search.minimum else float(G @ G) / 2), G, A
-
-    with np.errstate(all="ignore"):
-        value, G, A = at(w)
-        for _ in range(_NEWTON):
-            step = _step(A, G, search.minimum)
-            if np.all(step * step <= 1e-18 * (1.0 + w * w)):
-                return (w + step).tolist()
-            slope, part = (float(G @ step) if search.minimum else -float(G @ G)), 1.0
-            for _ in range(_HALVINGS):
-                trial, new_G, new_A = at(w + part * step)
-                if trial <= value + 1e-4 * part * slope + 1e-14 * (np.hypot(1.0, value) if search.minimum else value):
-                    break
-                part /= 2
-            w, value, G, A = w + part * step, trial, new_G, new_A
-    return [float("nan")] * k
+    ``values`` are those of the inputs by slot.
+    """
+    slots, found = tape.kept(("search", search), lambda: _program(tape, search))
+    point = np.array([[values[slot] for slot in slots]], dtype=float)
+    result: list[float] = evaluated(found, point, len(search.unknowns))[0].tolist()
+    return result
 
 
-def _step(A: Any, G: Any, minimal: bool) -> Any:
-    if not minimal:
-        try:
-            return np.linalg.solve(A, -G)
-        except np.linalg.LinAlgError:
-            return np.full(len(G), np.nan)
-    a, b = A.copy(), -G
-    for i in range(len(b)):
-        a[i, i] = max(abs(a[i, i]), 1e-3 * (1.0 + abs(A[i, i])))
-        for j in range(i + 1, len(b)):
-            factor = a[j, i] / a[i, i]
-            a[j, i:] -= factor * a[i, i:]
-            b[j] -= factor * b[i]
-    for i in reversed(range(len(b))):
-        b[i] = (b[i] - a[i, i + 1 :] @ b[i + 1 :]) / a[i, i]
-    return b
+def _program(tape: Tape, search: Search) -> tuple[list[Any], Program]:
+    """Return the slots of the inputs of a search, and its program."""
+    places = list(search.solution(tape, operands_of(tape, search)).values())
+    inputs = [tape.operations[place].data for place in tape.needed(places) if tape.operations[place].name == "input"]
+    at = {slot: column for column, slot in enumerate(inputs)}
+    return inputs, program(tape, list(zip(places, range(len(places)))), Inputs(at, {}, {}))

@@ -112,6 +112,10 @@ def _simple_times(tape: Any, places: tuple[int, ...], name: str) -> int | None:
     return None
 
 
+def _simple_product(tape: Any, places: tuple[int, ...]) -> int | None:
+    return _simple_mul(tape, places, "product")
+
+
 def _simple_div(tape: Any, places: tuple[int, ...]) -> int | None:
     a, b = places
     if tape.value(b) == 1:
@@ -312,11 +316,15 @@ TABLE: dict[str, Primitive] = {
     "mod": _primitive(
         _mod, lambda tape, data, xs, r: (1.0, -tape.apply("floor", xs[0] / xs[1])), "floored(fmod(x, y), y)", "fmod"
     ),
-    # a piecewise polynomial; an unknown that is found by iteration
+    # a piecewise polynomial; an unknown that is found by iteration; the first operand, as a minimum over such unknowns
     "table": Primitive(lambda data, x: data.evaluate(x), _of_table, constant=lambda data, x: data.evaluate(x)),
     "root": Primitive(
         lambda data, *operands: math.nan,  # `Tape.evaluate` finds it
         lambda tape, data, xs, r: data[0].partials(tape, data[1], xs),
+    ),
+    "least": Primitive(
+        lambda data, value, *operands: value,
+        lambda tape, data, xs, r: [None, *data[0].slopes_of_least(tape, xs[1:])],
     ),
 }  # fmt: skip
 

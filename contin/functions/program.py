@@ -32,7 +32,7 @@ _OWN = (
 #: Operations of which a register and a scalar make one instruction: its name with the scalar on the right, and on the left.
 _WITH_SCALAR = {"add": ("add s", "add s"), "sub": ("sub s", "s sub"), "mul": ("mul s", "mul s"), "div": ("div s", "s div")}
 CODES: dict[str, int] = {
-    name: code for code, name in enumerate([*_OWN, *(name for name in TABLE if name not in ("input", "constant"))])
+    name: code for code, name in enumerate([*_OWN, *(name for name in TABLE if name not in ("input", "constant", "least"))])
 }
 
 
@@ -324,6 +324,8 @@ class _Stretch:
     def _plain(self, operation: Operation) -> tuple[str, list[int]]:
         """Return name and operands of an instruction that stands for one operation."""
         name, operands = operation.name, operation.operands
+        if name == "least":
+            return "copy", [self._register(operands[0])]
         if name in ("sum", "dot", "linear"):
             return name, self._list(operation)
         if name == "table":

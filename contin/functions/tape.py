@@ -194,8 +194,8 @@ class Tape:
                 moved[place] = self.constant(operation.data)
                 continue
             data = operation.data
-            if operation.name == "root":
-                data = (self._moved_search(other, data[0], moved), data[1])
+            if operation.name in ("root", "least"):
+                data = (self._moved_search(other, data[0], moved), *data[1:])
             moved[place] = self.at(operation.name, tuple(moved[operand] for operand in operation.operands), data)
 
     def _moved_search(self, other: Tape, search: Any, moved: dict[int, int]) -> Any:

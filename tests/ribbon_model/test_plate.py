@@ -19,6 +19,10 @@ PLATES = [(3.0, 0.4, 1.0, 0.5), (1.0, 0.3, 2.5, 0.2), (1.5, -0.2, 0.8, 0.9)]
 MOMENTS = [(0.9, 0.5, 0.0), (0.6, -0.8, 0.4), (1.3, 0.0, -0.3), (2.0, 3.0, 0.5)]
 
 
+BY = ("M1", "M2", "M3", "kappa_n")
+RIBBON_RESPONSE, WIDE_RESPONSE = contin.gradient(plate.ribbon, BY), contin.gradient(plate.finite_width, BY)
+
+
 def isotropic(nu):
     return 1.0, nu, 1.0, (1 - nu) / 2
 
@@ -29,12 +33,12 @@ def test_isotropic_constants_give_the_isotropic_laws(nu, M1, M3, kappa_n):
     """To round-off, with their strains; the flat rod's modulus is that of the plate, 1 - nu**2 times that of the beam."""
     known = LAWS["ribbon"].response(M1, 0.0, M3, kappa_n, nu)
     np.testing.assert_allclose(
-        plate.ribbon_response(M1, 0.0, M3, kappa_n, *isotropic(nu)), np.array(known) - [kappa_n**2 / 2, 0, 0, 0, kappa_n],
+        RIBBON_RESPONSE(M1, 0.0, M3, kappa_n, *isotropic(nu)), np.array(known) - [kappa_n**2 / 2, 0, 0, 0, kappa_n],
         rtol=1e-13, atol=1e-13,
     )  # fmt: skip
     known = LAWS["finite width"].response(M1, 0.0, M3, kappa_n, nu, 2.0)
     np.testing.assert_allclose(
-        plate.finite_width_response(M1, 0.0, M3, kappa_n, *isotropic(nu), 2.0),
+        WIDE_RESPONSE(M1, 0.0, M3, kappa_n, *isotropic(nu), 2.0),
         np.array(known) - [kappa_n**2 / 2, 0, 0, 0, kappa_n], rtol=1e-13, atol=1e-13,
     )  # fmt: skip
     f = 1 - nu**2
@@ -57,7 +61,7 @@ def test_the_ribbon_is_the_plate_of_vanishing_gaussian_curvature(D, M1, M3, kapp
 
     starts = [(a, b) for a in (0.5, 1.5) for b in (-1, 0.1, 1)]
     found = min((minimize(less, start, method="BFGS", options={"gtol": 1e-12}) for start in starts), key=lambda one: one.fun)
-    H, w1, _, w3, _ = plate.ribbon_response(M1, 0.0, M3, kappa_n, *D)
+    H, w1, _, w3, _ = RIBBON_RESPONSE(M1, 0.0, M3, kappa_n, *D)
     at_rest = plate_energy(0.0, 0.0, 0.0, D)
     assert -found.fun - at_rest == pytest.approx(H, rel=1e-9)
     assert (found.x[0] ** 2, found.x[0] * found.x[1]) == pytest.approx((w1, w3), rel=1e-5, abs=1e-6)
@@ -86,7 +90,7 @@ def least_of_section(w1, w3, kappa_n, D, Gamma):
 def test_finite_width_is_the_least_over_profiles(D, Gamma):
     """H = M.omega - U at the strains of its response, and U is the least energy there; measured 1e-15 of U."""
     for M1, M3, kappa_n in MOMENTS:
-        H, w1, _, w3, slope = plate.finite_width_response(M1, 0.0, M3, kappa_n, *D, Gamma)
+        H, w1, _, w3, slope = WIDE_RESPONSE(M1, 0.0, M3, kappa_n, *D, Gamma)
         assert M1 * w1 + M3 * w3 - H == pytest.approx(least_of_section(w1, w3, kappa_n, D, Gamma), rel=1e-8)
         step = 1e-5
         for place, known in ((0, w1), (2, w3), (3, slope)):
