@@ -361,11 +361,7 @@ class Batch:
             run(found, (t, u, v), p, out, jac)
             return
         if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
-<<<<<<< HEAD
             threads.each(lambda part: run(*part), _divided(found, t, u, v, p, out, jac))
-=======
-            threads.each(lambda part: _evaluate(*part), _divided(found, t, u, v, p, out, jac))
->>>>>>> laws
             return
         began = time.perf_counter()
         run(found, (t, u, v), p, out, jac)

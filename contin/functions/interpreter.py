@@ -575,6 +575,13 @@ def run(program: Program, points: tuple[Array, Array, Array], p: Array, out: Arr
     evaluate((program.code, program.lists, scalars, program.tables), program.first, program.last, points, room, out, jac)
 
 
+def evaluated(program: Program, u: Array, count: int) -> Array:
+    """Return the ``count`` values of a program whose inputs are columns of u (points, n), shape (points, count)."""
+    out, none = np.empty((len(u), count)), np.empty((0, 0))
+    run(program, (np.zeros(len(u)), u, none), none.ravel(), out, np.empty((0, 0, 0)))
+    return out
+
+
 #: Codes of the operations that are written in Python.
 POLYGAMMA, TABLE_OF = CODES["polygamma"], CODES["table"]
 #: Bernoulli numbers B_2, B_4, ...

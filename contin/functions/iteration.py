@@ -16,13 +16,10 @@ import numpy as np
 
 from contin.errors import ProblemError
 from contin.functions import derivatives
-<<<<<<< HEAD
+from contin.functions.interpreter import evaluated
+from contin.functions.program import Inputs, Program, program
 from contin.functions.recorded_arrays import NUMPY, recorded, select
-=======
-from contin.functions.program import Inputs, Program, evaluated, program
-from contin.functions.recorded_arrays import recorded, select
 from contin.functions.recording import recorded_paths
->>>>>>> laws
 from contin.functions.stand_ins import prepared
 from contin.functions.tape import Number, Tape, Unrecordable
 
@@ -96,11 +93,10 @@ class Search:
             columns.append(solved(matrix, right, self.minimum))
         return columns
 
-<<<<<<< HEAD
     def newton(self, tape: Tape, values: Mapping[Any, float]) -> list[float]:
-        """Return the unknowns in Python, for ``values`` of the inputs by slot."""
-        return newton(tape, self, dict(values))
-=======
+        """Return the unknowns at one point, for ``values`` of the inputs by slot."""
+        return newton(tape, self, values)
+
     def solution(self, tape: Tape, operands: Sequence[Number]) -> dict[int, int]:
         """Return the places of the values found, by the places of the unknowns."""
         found = [tape.apply("root", *operands, data=(self, i)) for i in range(len(self.unknowns))]
@@ -112,11 +108,6 @@ class Search:
         moved = tape.substitute(list(by.values()), self.solution(tape, operands))
         slopes = {number: Number(tape, place) for (_, number), place in zip(by, moved)}
         return [slopes.get(number) for number in range(len(operands))]
-
-    def evaluate(self, index: int, operands: Sequence[float]) -> float:
-        """Raise: an unknown is evaluated with its tape (`Tape.evaluate`)."""
-        raise NotImplementedError
->>>>>>> laws
 
 
 def solved(matrix: Sequence[Sequence[Any]], right: Sequence[Any], symmetric: bool) -> list[Any]:
@@ -239,7 +230,7 @@ def least(potential: Callable[..., Any], start: Sequence[Any]) -> Any:
     """
     starts, function, tape = _given(potential, start)
     if tape is None:
-        scratch = Tape()
+        scratch = Tape(NUMPY)
         search, found = _in_python(scratch, function, starts, True)
         return scratch.evaluate([search.potential], {("unknown", 0, i): value for i, value in enumerate(found)})[0]
     search, operands = recorded_search(tape, function, starts, True)
@@ -259,7 +250,7 @@ def _given(function: Callable[..., Any], start: Sequence[Any]) -> tuple[list[Any
 def _found(function: Callable[..., Any], start: Sequence[Any], minimal: bool) -> tuple[Any, ...]:
     starts, function, tape = _given(function, start)
     if tape is None:
-        return tuple(_in_python(Tape(), function, starts, minimal)[1])
+        return tuple(_in_python(Tape(NUMPY), function, starts, minimal)[1])
     search, operands = recorded_search(tape, function, starts, minimal)
     return tuple(tape.apply("root", *operands, data=(search, i)) for i in range(len(starts)))
 
@@ -348,16 +339,10 @@ def operands_of(tape: Tape, search: Search) -> list[Number]:
     return [Number(tape, place) for place in operands if tape.value(place) is None]
 
 
-<<<<<<< HEAD
-def _in_python(function: Callable[..., Any], starts: Sequence[float], minimal: bool) -> tuple[float, ...]:
-    """Return the unknowns for ordinary numbers."""
-    tape = Tape(NUMPY)
-=======
 def _in_python(
     tape: Tape, function: Callable[..., Any], starts: Sequence[float], minimal: bool
 ) -> tuple[Search, list[float]]:
     """Return the search on an empty tape, and the unknowns for ordinary numbers."""
->>>>>>> laws
     try:
         search, _ = recorded_search(tape, function, starts, minimal)
     except Unrecordable as reason:

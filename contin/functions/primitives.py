@@ -112,10 +112,6 @@ def _simple_times(tape: Any, places: tuple[int, ...], name: str) -> int | None:
     return None
 
 
-def _simple_product(tape: Any, places: tuple[int, ...]) -> int | None:
-    return _simple_mul(tape, places, "product")
-
-
 def _simple_div(tape: Any, places: tuple[int, ...]) -> int | None:
     a, b = places
     if tape.value(b) == 1:

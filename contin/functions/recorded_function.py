@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.functions.interpreter import run
+from contin.functions.interpreter import evaluated
 from contin.functions.program import Inputs, program
 from contin.functions.recorded_arrays import NUMPY, recorded
 from contin.functions.signature import Arguments
@@ -68,8 +68,7 @@ class RecordedFunction:
         columns = [np.asarray(value, dtype=float) for value in np.broadcast_arrays(*values)]
         found = program(self._tape, list(zip(self._results, range(len(self._results)))), Inputs(dict(zip(slots, range(len(slots)))), {}, {}))
         u = np.ascontiguousarray(np.stack([column.ravel() for column in columns], axis=1))
-        out, none = np.empty((len(u), len(self._results))), np.empty((0, 0))
-        run(found, (np.zeros(len(u)), u, none), none.ravel(), out, np.empty((0, 0, 0)))
+        out = evaluated(found, u, len(self._results))
         return tuple(np.ascontiguousarray(out.T).reshape(-1, *columns[0].shape))
 
     def text(self) -> str:
