@@ -291,12 +291,14 @@ def start(M1, M3, kappa_n, section: Section):
     """Return the strains at which the search for the minimum of U - M.omega starts.
 
     They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as long as
-    there is a minimum. Otherwise, or where the ribbon has none, they are the flat rod's.
+    there is a minimum. They are the flat rod's where the ribbon has none, or where M1 is so negative that a < 0: that root of the
+    ribbon belongs to no minimum of its U, but the strip of finite width, which is nearly planar there, has one.
     """
     import numpy as np
 
     w1, w3, known = ribbon_strains(M1, M3, kappa_n, section)
-    known = known & (section.C * w1 * w1 > _WIDE)
+    p = M1 / section.stiff + (section.stiff - section.nu) * kappa_n
+    known = known & (section.C * w1 * w1 > _WIDE) & (p * np.sqrt(section.stiff) > -abs(M3))
     flat1, flat3 = flat_rod_strains(M1, M3, kappa_n, section)
     return np.where(known, w1, flat1), np.where(known, w3, flat3)
 
