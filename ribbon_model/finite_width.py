@@ -79,6 +79,12 @@ def membrane(z):
     return (1 - foundation(math.sqrt(math.sqrt(z)))) / z
 
 
+def nearly_membrane(z):
+    """Return g within 7 %, with the right values at 0 and infinity, for first guesses."""
+    root = math.sqrt(z)
+    return 1 / (z + 2 * root * math.sqrt(root) + 180)
+
+
 def foundation(x):
     """G, for x of at least about 1; hyperbolic functions divided by exp(x)."""
     e = math.exp(-x)
@@ -104,6 +110,11 @@ class Section(NamedTuple):
     twist: float
     stiff: float
     C: float
+
+    def softened(self, part) -> Section:
+        """Return the section, over D22 times ``part``, of which the plate across has only this part of its stiffness."""
+        plane = self.plane / part
+        return Section(self.nu, plane, self.twist / part, (plane + self.nu * self.nu) ** 0.5, self.C)
 
 
 def isotropic(nu, Gamma) -> Section:
@@ -244,13 +255,24 @@ def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
 
 
 def complementary(M1, M3, kappa_n, section: Section):
-    """Return the largest M.omega - U of a section near `start`; nan where U is not convex."""
+    """Return the largest M.omega - U of a section near `start`; nan where U is not convex.
+
+    A search that starts like a ribbon does not cross omega_1 = 0 where U is concave there, since another minimum lies beyond.
+    """
+    import numpy as np
+
     from contin import least  # loads compiled code, which circles do not need
 
-    def excess(w):
-        return section_energy(w[0], w[1], kappa_n, section) - M1 * w[0] - M3 * w[1]
+    nu, plane, _, _, C = section
+    w1, w3, wide = start(M1, M3, kappa_n, section)
 
-    return -least(excess, start(M1, M3, kappa_n, section))
+    def excess(w):
+        squared = w[1] * w[1]
+        ridge = C * C * squared * squared / 22680 - C * nu * (nu * kappa_n * kappa_n + 2 * squared) / 180 - plane  # -U_11 there
+        beyond = np.where(wide & (w[0] < 0) & (ridge > 0), math.inf, 0.0)
+        return section_energy(w[0], w[1], kappa_n, section) - M1 * w[0] - M3 * w[1] + beyond
+
+    return -least(excess, (w1, w3))
 
 
 def ribbon_complementary(M1, M3, kappa_n, section: Section):
@@ -288,17 +310,25 @@ def ribbon_strains(M1, M3, kappa_n, section: Section):
 
 
 def start(M1, M3, kappa_n, section: Section):
-    """Return the strains at which the search for the minimum of U - M.omega starts.
+    """Return the strains at which the search for the minimum of U - M.omega starts, and whether they are the ribbon's.
 
     They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as long as
-    there is a minimum. Otherwise, or where the ribbon has none, they are the flat rod's.
+    there is a minimum. They are the flat rod's where the ribbon has none, and where the ribbon's other root, a < 0, has omega_1 > 0
+    and M1 is negative: that root is no minimum of the ribbon's U, but a strip of finite width, nearly planar there, has one.
     """
     import numpy as np
 
     w1, w3, known = ribbon_strains(M1, M3, kappa_n, section)
-    known = known & (section.C * w1 * w1 > _WIDE)
+    for _ in range(_ROUNDS):
+        z = np.maximum(section.C * w1 * w1, _WIDE)
+        part = z * nearly_membrane(z)
+        softer = section.softened(part)
+        w1, w3, _ = ribbon_strains(M1 / part, M3 / part, kappa_n, softer)
+    p, m3 = M1 / section.stiff + (section.stiff - section.nu) * kappa_n, M3 / np.sqrt(section.stiff)
+    planar = (p < -abs(m3)) & (np.sqrt(p * p + m3 * m3) - p < 2 * section.nu * kappa_n)
+    known = known & (section.C * w1 * w1 > _WIDE) & ~planar
     flat1, flat3 = flat_rod_strains(M1, M3, kappa_n, section)
-    return np.where(known, w1, flat1), np.where(known, w3, flat3)
+    return np.where(known, w1, flat1), np.where(known, w3, flat3), known
 
 
 def flat_rod_strains(M1, M3, kappa_n, section: Section):
@@ -308,5 +338,8 @@ def flat_rod_strains(M1, M3, kappa_n, section: Section):
 
 #: Part of the moment below which the ribbon's a is round-off; it has no bending then.
 _LEAST = 1e-12
+#: Rounds in which the strains of a ribbon are computed with the part of its membrane energy that a strip of this width has. With
+#: two, the branches (9, 5) and (1, 5) of the tests are followed; with none they end at jumps to another minimum.
+_ROUNDS = 2
 #: x**4 from which the search starts like a ribbon.
 _WIDE = 1.0

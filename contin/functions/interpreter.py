@@ -457,7 +457,13 @@ def _advance(work, lists, row, lanes, scratch):
             continue
         now, old = _value(work, at, k, minimum, lane), work[value * LANES + lane]
         rounding = ROUNDING * (math.sqrt(1.0 + old * old) if minimum else abs(old))
-        if length > SHORTEST and not now <= old + 1e-4 * length * work[slope * LANES + lane] + rounding:
+        low = now <= old + 1e-4 * length * work[slope * LANES + lane] + rounding
+        if minimum and not low and now <= old + CANCELLED * math.sqrt(1.0 + old * old):  # the slope says more than the value
+            rate = 0.0
+            for i in range(k):
+                rate += work[(at + k + 1 + i) * LANES + lane] * work[(step + i) * LANES + lane]
+            low = rate <= -FLATTER * work[slope * LANES + lane]
+        if length > SHORTEST and not low:
             work[part * LANES + lane] = length / 2
             for i in range(k):
                 change = work[(step + i) * LANES + lane] * length / 2
@@ -594,6 +600,10 @@ SHORTEST = 1e-12
 SETTLED = 1e-9
 #: Square of the size below which an unknown counts as this large. Smaller unknowns are found to 1e-9 of this size squared.
 SMALLEST = 1.0
+#: A potential that rises by less than this part of 1 + itself may have fallen: large terms of it cancel. The step is accepted if
+#: the slope along it is at most `FLATTER` times the former one uphill (approximate Wolfe condition, Hager & Zhang 2005).
+CANCELLED = 1e-10
+FLATTER = 0.9
 #: Pivots of a Hessian below this part of its diagonal are round-off of its elimination, which makes 1e-16 to 1e-14. Ten times
 #: larger, minima of that condition would be called saddles.
 POSITIVE = 1e-13

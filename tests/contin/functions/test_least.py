@@ -57,3 +57,9 @@ def test_a_minimum_in_a_narrow_valley():
     """The curvature along the valley is 1e-6 of that across it: (x - y)**2/2 + 1e-6 y**4/4 - 1e-6 y, at x = y = 1."""
     found = minimum(lambda w: (w[1] - w[0]) ** 2 / 2 + 1e-6 * (w[0] ** 4 / 4 - w[0]), [3.0, 0.0])
     assert found == pytest.approx((1.0, 1.0), abs=1e-8)
+
+
+def test_terms_of_a_potential_may_cancel():
+    """(x - 3)**2/2 as a difference of terms of 1e8: its round-off, 1e-8, is that of the value at 1e-4 from the minimum."""
+    found = minimum(lambda w: (1e8 + (w[0] - 3) ** 2 / 2 + (w[0] - 3) ** 4) - 1e8, [5.0])
+    assert found[0] == pytest.approx(3.0, abs=1e-8)
