@@ -29,11 +29,11 @@ PURPOSE = {
     "discretization": "collocation, mesh, assembly; the protocol of all systems",
     "problems": "what a user states, checked",
     "linalg": "factorization by condensation, dense LU, singular vectors",
-    "functions": "users' functions compiled: exact derivatives, sparsity, cache",
+    "functions": "users' functions recorded: exact derivatives, interpreter; kernels",
     FOUNDATION: "what every room uses (arrows left out)",
 }
 #: Packages that are named in the box of a room that imports them.
-SHOWN_PACKAGES = ("numba", "llvmlite", "sympy", "networkx", "matplotlib", "pandas")
+SHOWN_PACKAGES = ("numba", "llvmlite", "networkx", "matplotlib", "pandas")
 
 #: Fills of rooms and of the foundation; the text on them is dark, so that it can be read on light and on dark pages.
 FILLS = ("#cfe3f5", "#dcebd9")

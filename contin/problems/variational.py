@@ -50,8 +50,7 @@ class VariationalProblem(BoundaryValueProblem):
         ``f(t, x, w, p)``: integrals that are columns of every point. ``energy`` (the integral of L) is one without being named.
     hamiltonian : callable, optional
         ``hamiltonian(t, x, lam, p)``, H = max over w of lam.f - L, where it is known in closed form; instead of ``energy``
-        (pass None), ``kinematics`` and ``integrals``. A function f that it calls and that is no formula, such as a loop, may
-        state its first derivatives: ``f.gradient(*arguments)`` returns f and its derivatives by its first arguments.
+        (pass None), ``kinematics`` and ``integrals``.
     symmetries : mapping of str to callable, optional
         Maps of states that leave the energy unchanged, by name: ``map(t, x)`` with t (K,) and x (K, n) at symmetric places t
         returns the image of x, as for `contin.diagram`. Special points say which of them they break.

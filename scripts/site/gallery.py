@@ -112,7 +112,7 @@ def page(name: str, folder: Path) -> str:
         f"# {title}\n\n{text}\n\n![{title}]({name}.png)\n\n```python\n{code}\n```\n\n"
         f"It prints\n\n```text\n{found['output'].strip()}\n```\n\n"
         f"When this page was built, the script took {found['seconds']:.1f} s of processor time, with the start of Python and "
-        f"the compilation of what had not been compiled before. [The script as a file]({name}.py)\n"
+        f"the compilation of kernels that had not been compiled before. [The script as a file]({name}.py)\n"
     )
 
 
