@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.detection.lyapunov import CriticalPair, critical_pair
@@ -34,8 +36,10 @@ def switches(point: Point) -> bool:
     return point.label == "HB" or doubles(point)
 
 
-def switched(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
+def switched(point: Point, free: Sequence[str] | None = None) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
     """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
+
+    Free parameters are those of the point, or others: the new branch leaves along the states alone, whichever are free.
 
     Raises
     ------
@@ -44,7 +48,12 @@ def switched(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Arra
     ConvergenceError
         The branch point of doubled orbits is not found.
     """
-    return doubled(point) if doubles(point) else from_hopf(point)
+    cycles, x, tangent = doubled(point) if doubles(point) else from_hopf(point)
+    if free is None:
+        return cycles, x, tangent
+    found, x = cycles.with_free(checks.names("free", free), x)
+    along: Any = found.pack(cycles.states(tangent), dict.fromkeys(found.free, 0.0))
+    return found, x, along  # type: ignore[return-value]  # with_free keeps the kind
 
 
 def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:

@@ -522,6 +522,7 @@ class Continuation:
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
             state.arclength + found.at, trial.iterations, trial.newton_error, errors, found.details,
             stability.index, stability.nullity, change, stability.breaks,
+            *(("", None) if found.test is None else (found.test.column, found.test.value)),
         )  # fmt: skip
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from contin import checks
 from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.progress import Progress, follow_until_interrupted
@@ -34,7 +36,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         Or any of its fields by name.
     free : sequence of str, optional
         Free parameters, if they shall differ from those of ``start``; the first is the primary one. From a point of a curve in
-        two parameters they lead to the branch of solutions through it.
+        two parameters they lead to the branch of solutions through it. With ``branch=1`` at HB and PD, those of the new branch.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
         the opposite way. By default the one that it was found on, with ``direction`` that of the primary parameter.
@@ -62,6 +64,11 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     x = start.x
     if isinstance(system, System) and forget_changed(system.problem):
         system = system.with_parameters({})
+    if branch is not None:
+        checks.whole("branch", branch, 0, 10)
+    if branch == 1 and switches(start):
+        cycles, x, tangent = switched(start, free)
+        return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
     if branch is None:
@@ -71,13 +78,15 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
             rate = tangents[0][system.parameter_index(settings.primary or system.free[0])]
             own = settings.direction * oriented_along(tangents[0], rate)
         return follow_until_interrupted(Continuation(system, x, settings, own), shown)
-    checks.whole("branch", branch, 0, 10)
-    if branch == 1 and switches(start):
-        cycles, x, tangent = switched(start)
-        return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
     if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")
+    if set(system.free) != set(start.system.free):
+        own = ", ".join(start.system.free)
+        raise ProblemError(f"free: {', '.join(system.free)} must be {own}, with which the branch point was found")
     if not 0 <= branch < len(start.details.tangents):
         raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
     tangent = settings.direction * start.details.tangents[branch]
+    if system.free != start.system.free:  # the same in another order
+        at = [start.system.parameter_index(name) for name in system.free]
+        tangent = np.concatenate([tangent[: system.state_size], tangent[at]])
     return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)

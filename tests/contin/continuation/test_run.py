@@ -191,3 +191,12 @@ def test_the_number_of_free_parameters_is_counted():
     system = Collocation(bratu(), [0, 1], 4, [], {})
     with pytest.raises(ProblemError, match="needs 1"):
         Continuation(system, np.zeros(system.size))
+
+
+def test_a_branch_point_is_left_in_its_own_parameters():
+    """Its tangents are those in the parameter it was found in: they say nothing of another one."""
+    pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - p.b * u.x**2),), ["x"], {"a": -1.0, "b": 1.0})
+    found = trace(solve(pitchfork, [0.0]), free=["a"], limits={"a": (-1, 1)}).labelled("BP")[0]
+    with pytest.raises(ProblemError, match="free: b must be a, with which the branch point was found"):
+        trace(found, branch=1, free=["b"])
+    assert trace(found, branch=1, free=["a"], limits={"a": (-1, 1)}).stop.message == "reached a = 1"

@@ -39,6 +39,17 @@ def test_the_logistic_map_doubles_its_period():
             branch = contin.trace(doubling, branch=1, limits={"r": (1, 3.7)})
 
 
+def test_a_doubling_left_in_another_parameter():
+    """x -> r s x (1 - x) has the doublings r s = 3 and 1 + sqrt(6); r stays 3 along the second branch."""
+    problem = MapProblem(lambda u, p: (p.r * p.s * u.x * (1 - u.x),), ["x"], {"r": 2.0, "s": 1.0})
+    single = contin.trace(contin.solve(problem, [0.5]), free=["r"], limits={"r": (2, 3.4)})
+    double = contin.trace(single.labelled("PD")[0], branch=1, free=["s"], limits={"s": (0.9, 1.2)})
+    (doubling,) = double.labelled("PD")
+    assert (doubling["r"], doubling["s"]) == pytest.approx((3, (1 + math.sqrt(6)) / 3), abs=1e-11)
+    with pytest.raises(ProblemError, match="'q' is not one of"):
+        contin.trace(single.labelled("PD")[0], branch=1, free=["q"])
+
+
 def test_multipliers_of_the_logistic_map():
     """2 - r at fixed points, 4 + 2 r - r**2 at cycles of two."""
     single = logistic()
