@@ -131,10 +131,10 @@ def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:
     """Return the same of a map: the new branch leaves along a tangent that is none of the branch of single cycles."""
     twice, x = system.doubled(x)
     found = locate_branch_point(twice, x)
-    jacobian = system.differentiated(found.x, system.free)[1]
 
     def change(tangent: Array) -> float:
-        return float(np.abs(jacobian @ tangent).max())
+        first, second = np.split(twice.states(tangent), 2)
+        return float(np.abs(second - first).max() / np.abs(first).max())
 
     return twice, found.x, max(found.tangents, key=change)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from contin import checks
+from contin.arrays import Array
 from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
@@ -72,12 +73,28 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
     if branch is None:
-        tangents = start.details.tangents if isinstance(start.details, (BranchPoint, MultiplePoint)) else ()
-        own = None
-        if tangents and system is start.system:  # the equations tell no tangent there
-            rate = tangents[0][system.parameter_index(settings.primary or system.free[0])]
-            own = settings.direction * oriented_along(tangents[0], rate)
-        return follow_until_interrupted(Continuation(system, x, settings, own), shown)
+        return follow_until_interrupted(Continuation(system, x, settings, _own_tangent(start, system, settings)), shown)
+    tangent = settings.direction * _tangent(start, system, branch)
+    return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)
+
+
+def _own_tangent(start: Point, system: Any, settings: Settings) -> Array | None:
+    """Return the tangent of the branch that a branch point was found on, oriented; None at other points."""
+    if not isinstance(start.details, (BranchPoint, MultiplePoint)) or not start.details.tangents or system is not start.system:
+        return None  # elsewhere the equations tell it
+    tangent: Array = start.details.tangents[0]
+    rate = tangent[system.parameter_index(settings.primary or system.free[0])]
+    return settings.direction * oriented_along(tangent, rate)
+
+
+def _tangent(start: Point, system: Any, branch: int) -> Array:
+    """Return a tangent of a branch point, in the free parameters of a system: those of the point, in any order.
+
+    Raises
+    ------
+    ProblemError
+        The start is no branch point, or one in other parameters, or has fewer branches.
+    """
     if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")
     if set(system.free) != set(start.system.free):
@@ -85,8 +102,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         raise ProblemError(f"free: {', '.join(system.free)} must be {own}, with which the branch point was found")
     if not 0 <= branch < len(start.details.tangents):
         raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
-    tangent = settings.direction * start.details.tangents[branch]
-    if system.free != start.system.free:  # the same in another order
+    tangent: Array = start.details.tangents[branch]
+    if isinstance(start.system, System):
         at = [start.system.parameter_index(name) for name in system.free]
         tangent = np.concatenate([tangent[: system.state_size], tangent[at]])
-    return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)
+    return tangent

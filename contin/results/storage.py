@@ -256,6 +256,8 @@ def _with_reference(system: Discretization, x: Array) -> Discretization:
 
 def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array], number: int) -> Point:
     x = arrays[f"x{number}"]
+    if len(x) != system.size:
+        raise ProblemError("the file is of an earlier version, which kept one point of a map's cycle only: follow it again")
     system = _with_reference(system, x)
     details: BranchPoint | MultiplePoint | dict[str, float] | None = row.get("details")
     if row["imperfection"] is not None:
