@@ -74,9 +74,10 @@ class FoldSearch:
         """Return the folds inside the step, in order.
 
         The parameter goes one way before a fold and the other way behind it. Where its rate is so small that it may be
-        round-off, and the parameter itself does not differ from one fold to the next, or to both ends of the step, there is
-        none. A fold where it does not differ from a first point on which branches cross is that point. For rates that may be
-        errors of the mesh see `contin.detection.significance`.
+        round-off, or the equations so nearly singular that Newton's method stays above its tolerance, and the parameter itself
+        does not differ from one fold to the next, or to both ends of the step, there is none. A fold where it does not differ
+        from a first point on which branches cross is that point. For rates that may be errors of the mesh see
+        `contin.detection.significance`.
         """
         segment = self.segment
         left, right = (segment.low, segment.before), (segment.step, segment.trial)
@@ -85,7 +86,8 @@ class FoldSearch:
         found = self.between(left, right)
         while segment.state.singular and found and not self._differs(left[1], found[0].trial):
             del found[0]  # the first point itself: beside it tangents are blurred
-        if max(abs(trial.value(self.fold)) for _, trial in (left, right)) >= _ROUND_OFF:
+        clear = max(abs(trial.value(self.fold)) for _, trial in (left, right)) >= _ROUND_OFF
+        if clear and segment.trial.newton_error <= segment.newton.tolerance:
             return found
         at = 0
         while at < len(found):
