@@ -18,10 +18,13 @@ from contin.discretization.degree import CYCLE_DEGREE
 from contin.discretization.kinds import discretized
 from contin.discretization.maps import MapSystem
 from contin.discretization.mesh import MeshControl
+from contin.discretization.scales import usual
 from contin.errors import ProblemError
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
+#: A state of an equilibrium that is smaller than this part of the largest, or than this, may be round-off, and has no size.
+_FAINT = 1e-6
 #: Intervals of the first mesh of a branch from a Hopf point.
 _INTERVALS = 20
 
@@ -71,7 +74,27 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
     cycles, x, tangent = small_cycle(system, point.x, pair, 0.0)
-    return cycles.with_reference(x + tangent), x, tangent
+    scaled, x = _in_sizes_of_the_equilibrium(cycles, x)
+    if scaled is not cycles:
+        tangent = cycles.carrier(scaled)(tangent)
+    return scaled.with_reference(x + tangent / np.abs(tangent).max()), x, tangent
+
+
+def _in_sizes_of_the_equilibrium(cycles: CycleCollocation, x: Array) -> tuple[CycleCollocation, Array]:
+    """Return the system of cycles with the sizes of the states and the period of a Hopf point, and x for it.
+
+    Where nothing is far from one it is the same. Sizes that the cycles outgrow are renewed on the way.
+    """
+    states, names = np.abs(cycles.states(x)).max(axis=0), list(cycles.problem.parameters)
+    states = np.where(states > _FAINT * states.max(), states, 0.0)
+    parameters = np.ones(len(names))
+    parameters[[names.index(name) for name in cycles.free]] = np.abs([cycles.parameter(x, name) for name in cycles.free])
+    sizes = usual(np.where(states > _FAINT, states, 0.0)), usual(np.where(parameters > _FAINT, parameters, 0.0))
+    if all(np.all(found == 1) for found in sizes):
+        return cycles, x
+    scaled, x = cycles.with_scales(x, *sizes)
+    assert isinstance(scaled, CycleCollocation)
+    return scaled, x
 
 
 def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) -> tuple[CycleCollocation, Array, Array]:

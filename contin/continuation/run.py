@@ -80,8 +80,8 @@ _SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
 #: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
 #: the curvature, it is one half.
 _MISSED = 0.75
-#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. What Newton's method says
-#: of its errors comes on top: where cycles shrink onto a Hopf point they are 1e-10, and steps of 1e-6 were refused.
+#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. Twice the error that
+#: Newton's method left comes on top: where cycles shrink onto a Hopf point it is 1e-10, and steps of 1e-6 were refused.
 _NOISE = 1e-12
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
 _ROUNDS = 3
@@ -399,8 +399,8 @@ class Continuation:
         missed = abs(guess[at] - trial.x[at])
         tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
         change = step * max(abs(tangent[at]) for tangent in tangents)
-        left = trial.newton_error + (0.0 if self._end is None else self._end.newton_error)
-        jumped = missed > _MISSED * change and missed > (_NOISE + left) * (1 + abs(trial.x[at]))
+        noise = _NOISE + 2 * trial.newton_error
+        jumped = missed > _MISSED * change and missed > noise * (1 + abs(trial.x[at]))
         return bool(jumped and self._sense(trial))
 
     def _has_moved(self, gone: Array, trial: Trial) -> bool:

@@ -1,9 +1,9 @@
 """The end of a branch of cycles that shrink onto an equilibrium, at a Hopf point.
 
-The amplitude, the projection of a cycle on an earlier one of the run, passes zero along the branch: beyond the Hopf point is the
-same branch again, half a period on. The equations of cycles are singular at the equilibrium (the period is arbitrary there), and
-their solutions are known the less exactly the smaller the cycle is. So the place is taken from the amplitude on the cubic through
-both ends of a step, and the point from its own equations, which are regular:
+The amplitude, the projection of a cycle on an earlier one of the run, passes zero along the branch: beyond the Hopf point is
+the same branch again, half a period on. The equations of cycles are singular at the equilibrium (the period is arbitrary
+there), and their solutions are known the less exactly the smaller the cycle is. So the place is taken from the amplitude on the
+cubic through both ends of a step, and the point from its own equations, which are regular:
 
 1. Find the zero of the amplitude on the cubic. The cycle there, but for its mean, is left out.
 2. Find the equilibrium F(u, p) = 0 by Newton's method, for the value of the parameter.
@@ -32,8 +32,8 @@ from contin.stepping.trial import Trial
 _OFF = 0.1
 #: Newton's updates of the equilibrium, and secants, at most: both converge from near by, in four to six.
 _UPDATES = 20
-#: Newton's method ends with an update below this, relative to 1 + the states, the secant method with such a step: a few units in
-#: the last place. Ten times larger, the point is known to as much less.
+#: Newton's method ends with an update below this, relative to 1 + the states, the secant method with such a step: a few units
+#: in the last place. Ten times larger, the point is known to as much less.
 _CONVERGED = 1e-14
 #: First step of the secant method, relative to 1 + the parameter: the square root of round-off.
 _FIRST = 1e-8
@@ -43,7 +43,7 @@ _ON_AXIS = 1e-9
 
 @functools.singledispatch
 def own_home(system: Discretization, segment: Segment) -> SpecialPoint | None:
-    """Return the end of a branch inside a step that a kind of problem knows; None where there is none. Each kind registers its own."""
+    """Return the end of a branch inside a step that a kind of problem knows, or None. Each kind registers its own."""
     return None
 
 
@@ -53,9 +53,10 @@ def _of_cycles(system: CycleCollocation, segment: Segment) -> SpecialPoint | Non
     before, trial = (system.amplitude(place.x) for place in (segment.before, segment.trial))
     if not before > 0 > trial:
         return None
-    amplitude = lambda s: system.amplitude(segment.guess(s))  # noqa: E731
     try:
-        at = find_zero(amplitude, (segment.low, before), (segment.step, trial), segment.precision)
+        at = find_zero(
+            lambda s: system.amplitude(segment.guess(s)), (segment.low, before), (segment.step, trial), segment.precision
+        )
         x, frequency, error = _hopf_point(system, segment.guess(at))
     except ConvergenceError:
         return None

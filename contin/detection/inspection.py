@@ -121,8 +121,8 @@ class Inspection:
         knots = [before, *(fold.trial for fold in self._folds), trial]
         at = trial.system.parameter_index(self.fold.name)
         sense = np.sign(before.value(self.fold))
+        noise = _STANDS + 2 * trial.newton_error
         for left, right in itertools.pairwise(knots):
-            noise = _STANDS + left.newton_error + right.newton_error
             if sense * (right.x[at] - left.x[at]) < -noise * (1 + abs(right.x[at])):
                 return False
             sense = -sense

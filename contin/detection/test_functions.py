@@ -227,7 +227,7 @@ def own_stop(system: Discretization, trial: Trial, stop: Stop) -> Stop:
 def _of_slow_cycles(system: CycleCollocation, trial: Trial, stop: Stop) -> Stop:
     """Where the period runs away: the equilibrium near which the cycle spends its time, and the limit of the parameter."""
     cycles: Any = trial.system
-    place = resting_place(cycles, trial.x)
+    place = None if cycles.has_shrunk(trial.x) else resting_place(cycles, trial.x)
     if place is None:
         return stop
     message = f"{stop.message}; {place.describe(cycles.problem.states)}"

@@ -13,6 +13,7 @@ from contin import (
     BoundaryValueProblem,
     Collocation,
     Continuation,
+    ConvergenceError,
     ProblemError,
     Settings,
     TestFunction,
@@ -200,3 +201,25 @@ def test_a_branch_point_is_left_in_its_own_parameters():
     with pytest.raises(ProblemError, match="free: b must be a, with which the branch point was found"):
         trace(found, branch=1, free=["b"])
     assert trace(found, branch=1, free=["a"], limits={"a": (-1, 1)}).stop.message == "reached a = 1"
+
+
+def test_a_point_that_is_not_found_shortens_the_step_and_does_not_lose_the_branch():
+    """What is looked for inside a step may need points that Newton's method does not find: then the step is halved."""
+    parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+
+    def only_in_steps_below(longest):
+        def search(segment, places):
+            if segment.step > longest:
+                raise ConvergenceError("a point inside the step is not found")
+            return []
+
+        return TestFunction("UZ", "shy", lambda trial: 1.0, search=search)
+
+    def followed(longest):
+        return trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)},
+                     test_functions=[only_in_steps_below(longest)])  # fmt: skip
+
+    assert str(followed(0.04).stop) == "reached a = 4"
+    lost = followed(0.0)
+    assert (lost.points[-1].label, lost.stop.reason) == ("MX", "no convergence")
+    assert "a point inside the step is not found" in lost.stop.message
