@@ -223,3 +223,19 @@ def test_a_point_that_is_not_found_shortens_the_step_and_does_not_lose_the_branc
     lost = followed(0.0)
     assert (lost.points[-1].label, lost.stop.reason) == ("MX", "no convergence")
     assert "a point inside the step is not found" in lost.stop.message
+
+
+def test_every_labelled_branch_point_can_be_left():
+    """As AUTO's ``for x in r("BP")``: x (a - x^2) y = ... has the branches x = 0 and x^2 = a; the start of one is no find."""
+
+    def residual(u, p):
+        return u.x * (p.a - u.x**2), u.y * (p.a - 1 - u.y**2)
+
+    problem = AlgebraicProblem(residual, ["x", "y"], {"a": -1.0})
+    rest = trace(solve(problem, [0.0, 0.0]), free=["a"], limits={"a": (-1, 2)})
+    assert [round(point["a"], 9) for point in rest.labelled("BP")] == [0, 1]
+    fork = trace(rest.labelled("BP")[0], branch=1, limits={"a": (-1, 2)})
+    assert (fork.points[0].label, fork.points[0].name) == ("BP", "start")
+    assert [round(point["a"], 9) for point in fork.labelled("BP")] == [1]
+    for point in (*rest.labelled("BP"), *fork.labelled("BP")):
+        assert trace(point, branch=1, limits={"a": (-1, 2)}).stop.reason == "limit"
