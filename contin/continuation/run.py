@@ -23,6 +23,7 @@ from contin.arrays import Array
 from contin.continuation.failure import no_convergence
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.extrema import extremum
+from contin.detection.hopf_end import collapsed
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
@@ -333,6 +334,8 @@ class Continuation:
         residual = state.system.residual(trial.x)
         if not np.all(np.isfinite(residual)):
             raise ConvergenceError("the equations are not finite at the corrected point")
+        if collapsed(state.system, state.x, trial.x):
+            raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         gap = guess - trial.x
         distance = np.sqrt(inner(state.system, gap, gap))
         angle = turn(state, trial)
@@ -489,6 +492,8 @@ class Continuation:
             done = correct(system, x, row, row @ x, self.settings.newton)
         except ConvergenceError:
             return  # the old mesh still serves; the step control will notice if it does not
+        if collapsed(system, x, done.x):
+            return
         end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0))
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Function
+from contin.detection.hopf_end import collapsed
 from contin.detection.phase import in_phase
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
@@ -203,3 +204,9 @@ def _of_curves(system: Extended, x: Array, vectors: Sequence[Array], reference: 
     size = system.base.size
     inside, others = in_phase(system.base, x[:size], [vector[:size] for vector in vectors], reference[:size])
     return np.append(inside, x[size:]), [np.append(other, vector[size:]) for other, vector in zip(others, vectors)]
+
+
+@collapsed.register
+def _of_curves_of_cycles(system: Extended, x: Array, z: Array) -> bool:
+    """The solution itself has no size."""
+    return collapsed(system.base, x[: system.base.size], z[: system.base.size])

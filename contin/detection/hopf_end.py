@@ -30,6 +30,9 @@ from contin.stepping.trial import Trial
 
 #: The Hopf point lies no further off the cubic through both ends of the step than this part of the step; branch points neither.
 _OFF = 0.1
+#: Smallest size of a cycle as a part of that before the step. A branch that ends at a Hopf point is this near to it at the end
+#: of a step by chance only, and the step is halved then; Newton's method that falls onto an equilibrium is nearer by far.
+_COLLAPSED = 1e-3
 #: Newton's updates of the equilibrium, and secants, at most: both converge from near by, in four to six.
 _UPDATES = 20
 #: Newton's method ends with an update below this, relative to 1 + the states, the secant method with such a step: a few units
@@ -66,6 +69,18 @@ def _of_cycles(system: CycleCollocation, segment: Segment) -> SpecialPoint | Non
     there, details = Trial.without_tangent(system, x), {"frequency": frequency, "pairs": 1}
     sizes = dict(zip(system.free, map(float, error * system.free_scales)))
     return SpecialPoint(at, "HB", "Hopf", there, stop, details, errors=sizes)
+
+
+@functools.singledispatch
+def collapsed(system: Discretization, x: Array, z: Array) -> bool:
+    """Return whether a step from x to z has left its branch for solutions of no size. Each kind registers its own."""
+    return False
+
+
+@collapsed.register
+def _of_equilibria_as_cycles(system: CycleCollocation, x: Array, z: Array) -> bool:
+    """An equilibrium solves the equations of cycles with any period, and those of curves of them with some."""
+    return abs(system.amplitude(z)) < _COLLAPSED * abs(system.amplitude(x))
 
 
 def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, Array]:
