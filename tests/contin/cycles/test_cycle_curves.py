@@ -220,8 +220,8 @@ def test_a_curve_of_doublings_does_not_slide_onto_an_equilibrium():
     """
     problem = contin.AlgebraicProblem(circuit, ["x", "y", "z"], {"nu": -0.9, "be": 0.5})
     rest = contin.trace(contin.solve(problem, [0, 0, 0]), free=["nu"], limits={"nu": (-0.95, -0.55)})
-    limits = {"nu": (-0.62, -0.5), "period": (0, 11)}
-    single = contin.trace(rest.labelled("HB")[0], branch=1, limits=limits, max_points=12)
+    limits = {"nu": (-0.62, -0.5), "period": (0, 10)}
+    single = contin.trace(rest.labelled("HB")[0], branch=1, limits=limits, max_points=60)
     beside = contin.trace(single.labelled("BP")[0], branch=1, limits=limits, max_points=40)
     (doubling,) = beside.labelled("PD")
     assert doubling["nu"] == pytest.approx(-0.614955, abs=1e-6)
