@@ -279,7 +279,7 @@ class Continuation:
             yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return
-        self.state = self._accept(segment, distance, any(point.label == "LP" for point in special))
+        self.state = self._accept(segment, distance, inspection.turns)
         self._end = segment.trial
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")

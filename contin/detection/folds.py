@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin.detection.segment import Place, Segment, SpecialPoint
-from contin.detection.significance import on_plateau, senses
+from contin.detection.significance import on_plateau, passed_before, senses
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
 from contin.stepping.trial import TestFunction, Trial, sign_changed
@@ -87,8 +87,12 @@ class FoldSearch:
         while segment.state.singular and found and not self._differs(left[1], found[0].trial):
             del found[0]  # the first point itself: beside it tangents are blurred
         clear = max(abs(trial.value(self.fold)) for _, trial in (left, right)) >= _ROUND_OFF
-        if clear and segment.trial.newton_error <= segment.newton.tolerance:
-            return found
+        if not (clear and segment.trial.newton_error <= segment.newton.tolerance):
+            self._drop_round_off(found, left, right)
+        return found or passed_before(segment, self.fold)
+
+    def _drop_round_off(self, found: list[SpecialPoint], left: Place, right: Place) -> None:
+        """Take out of the folds found those between which, or beside which, the parameter does not differ."""
         at = 0
         while at < len(found):
             places = [left[1], *(fold.trial for fold in found), right[1]]
@@ -98,7 +102,6 @@ class FoldSearch:
                 del found[at]
             else:
                 at += 1
-        return found
 
     def _differs(self, one: Trial, other: Trial) -> bool:
         """Return whether the parameter differs between two points by more than round-off."""

@@ -176,6 +176,11 @@ class Inspection:
             return []
         return FoldSearch(self.segment, self.fold, self._pitchfork).find()
 
+    @property
+    def turns(self) -> bool:
+        """The primary parameter turns inside the step, be it where branches cross."""
+        return bool(self._folds)
+
     def _pitchfork(self) -> SpecialPoint | None:
         """Return the fold of a pitchfork, right at the branch point inside the step; None if there is none."""
         fold: Any = self.fold

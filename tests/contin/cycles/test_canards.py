@@ -81,7 +81,8 @@ def fitzhugh_nagumo(u, p):
 
 #: Canards at both ends; the field is the same with the load 1.75 - load and the states reflected.
 EPS = [
-    0.06,
+    0.08095134978416786,  # a fold on which the load changes by less than round-off over a whole step
+    pytest.param(0.06, marks=pytest.mark.full),
     pytest.param(0.04369, marks=pytest.mark.full),
     pytest.param(0.03209, marks=pytest.mark.full),
     pytest.param(0.02, marks=pytest.mark.full),  # 7 s: the steps in the explosions are short
@@ -112,9 +113,7 @@ def test_canards_of_fitzhugh_and_nagumo(eps):
         assert str(branch.stop) == "the cycles shrink onto an equilibrium, a Hopf point"
         first, last = branch.labelled("LP")
         folds += [first["load"], last["load"]]
-        assert first["load"] + last["load"] == pytest.approx(
-            1.75, abs=10 * (first.errors["load"] + last.errors["load"] + 1e-12)
-        )
+        assert first["load"] + last["load"] == pytest.approx(1.75, abs=1e-8)  # not all errors can be told on a plateau
     assert folds[:2] == pytest.approx(folds[:1:-1], abs=1e-8)
 
 
