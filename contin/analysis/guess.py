@@ -58,7 +58,10 @@ def first_guess(problem: Any, guess: Guess, options: Options) -> tuple[System, A
 def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tuple[System, Array]:
     system = algebraic(problem, options.free, options.parameters)
     given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
-    states = np.zeros(system.state_size) if given is None else _numbers(given, system.state_size)
+    count = len(problem.state_names)  # a map takes one point of a cycle, too
+    states = np.zeros(count) if given is None else _numbers(given)
+    if states.size != count:
+        states = _numbers(given, system.state_size)
     return system, system.pack(states, {**problem.parameters, **options.parameters})
 
 

@@ -31,8 +31,8 @@ def sensitivities(
     by : sequence of str, optional
         The other parameters; all that are not free by default.
     held : str or callable, optional
-        For points that are neither, the quantity that stays fixed: a parameter, a functional, or ``held(trial)``; the name
-        before " = " in a user zero's name by default, else the first free parameter.
+        For points that are neither, the quantity that stays fixed: a parameter, a functional, or ``held(trial)``; the column
+        that the point is about by default, else the first free parameter.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def sensitivities(
 
 def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return -(w.F_mu) / (w.F_lambda) for all mu at once."""
-    system, primary = point.system, point.name
+    system, primary = point.system, point.column
     unit = np.zeros(system.size)
     unit[system.parameter_index(primary)] = 1.0
     # F_x^T w = 0 but for the primary parameter: w from the transposed matrix bordered by that parameter's row and the tangent's
@@ -103,7 +103,7 @@ def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) 
     """Return the response, moved along the branch until the held quantity is what it was."""
     system, (wide, x, column, size) = system_of(point, "point"), _with(point, name)
     if held is None:
-        held = point.name.partition(" = ")[0] or system.free[0]
+        held = point.column or system.free[0]
     response = _response(point, column)
     gradient = None if callable(held) else wide.column_gradient(x, held)
     if gradient is not None:

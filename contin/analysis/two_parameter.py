@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 from collections.abc import Sequence
 from typing import Any
@@ -123,7 +122,7 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
         raise ProblemError("start: must be a point of a branch, with the free parameters of a curve")
     known = tuple(system.problem.parameters)
     branch = isinstance(system, System)
-    found_in = start.name if start.label == "LP" and branch else system.free[0]
+    found_in = start.column if start.label == "LP" and branch else system.free[0]
     if (second is None) == (free is None):
         raise ProblemError("curve: give the second parameter, or free=[first, second]")
     if free is None:
@@ -193,7 +192,7 @@ def _tori(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _extrema(start: Point, base: System, x: Array) -> _First | None:
-    return (ExtremumCurve(base, start.name), x) if start.label == "EX" else None
+    return (ExtremumCurve(base, start.column), x) if start.label == "EX" else None
 
 
 def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
@@ -204,19 +203,16 @@ def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
         objective = base.free[0]
     else:
         return None
-    if start.label not in ("EX", "LP") or start.name != objective:
+    if start.label not in ("EX", "LP") or start.column != objective:
         return None
     return ExtremumCurve(base.base, objective), x[: base.base.size]
 
 
 def _values(start: Point, base: Any, x: Array) -> _First | None:
-    """A point whose name says that a column has a value."""
-    column, _, text = start.name.partition(" = ")
-    if column not in start.parameters and column not in start.functionals:
+    """A point where a column has a given value."""
+    column, value = start.column, start.value
+    if value is None or not abs(start[column] - value) <= _LOCATED * (1 + abs(value)):
         return None
-    value = start[column]
-    with contextlib.suppress(ValueError):
-        value = float(text) if abs(float(text) - value) <= _LOCATED * (1 + abs(value)) else value
     known = base.column_gradient(x, column) is not None
     gradient = (lambda system, x: system.column_gradient(x, column)) if known else None
     return EventCurve(base, lambda trial: trial[column] - value, gradient), x

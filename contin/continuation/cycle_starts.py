@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.detection.lyapunov import CriticalPair, critical_pair
@@ -16,10 +18,13 @@ from contin.discretization.degree import CYCLE_DEGREE
 from contin.discretization.kinds import discretized
 from contin.discretization.maps import MapSystem
 from contin.discretization.mesh import MeshControl
+from contin.discretization.scales import usual
 from contin.errors import ProblemError
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
+#: A state of an equilibrium that is smaller than this part of the largest, or than this, may be round-off, and has no size.
+_FAINT = 1e-6
 #: Intervals of the first mesh of a branch from a Hopf point.
 _INTERVALS = 20
 
@@ -34,8 +39,10 @@ def switches(point: Point) -> bool:
     return point.label == "HB" or doubles(point)
 
 
-def switched(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
+def switched(point: Point, free: Sequence[str] | None = None) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
     """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
+
+    Free parameters are those of the point, or others: the new branch leaves along the states alone, whichever are free.
 
     Raises
     ------
@@ -44,7 +51,12 @@ def switched(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Arra
     ConvergenceError
         The branch point of doubled orbits is not found.
     """
-    return doubled(point) if doubles(point) else from_hopf(point)
+    cycles, x, tangent = doubled(point) if doubles(point) else from_hopf(point)
+    if free is None:
+        return cycles, x, tangent
+    found, x = cycles.with_free(checks.names("free", free), x)
+    along: Any = found.pack(cycles.states(tangent), dict.fromkeys(found.free, 0.0))
+    return found, x, along  # type: ignore[return-value]  # with_free keeps the kind
 
 
 def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
@@ -62,7 +74,27 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
     cycles, x, tangent = small_cycle(system, point.x, pair, 0.0)
-    return cycles.with_reference(x + tangent), x, tangent
+    scaled, x = _in_sizes_of_the_equilibrium(cycles, x)
+    if scaled is not cycles:
+        tangent = cycles.carrier(scaled)(tangent)
+    return scaled.with_reference(x + tangent / np.abs(tangent).max()), x, tangent
+
+
+def _in_sizes_of_the_equilibrium(cycles: CycleCollocation, x: Array) -> tuple[CycleCollocation, Array]:
+    """Return the system of cycles with the sizes of the states and the period of a Hopf point, and x for it.
+
+    Where nothing is far from one it is the same. Sizes that the cycles outgrow are renewed on the way.
+    """
+    states, names = np.abs(cycles.states(x)).max(axis=0), list(cycles.problem.parameters)
+    states = np.where(states > _FAINT * states.max(), states, 0.0)
+    parameters = np.ones(len(names))
+    parameters[[names.index(name) for name in cycles.free]] = np.abs([cycles.parameter(x, name) for name in cycles.free])
+    sizes = usual(np.where(states > _FAINT, states, 0.0)), usual(np.where(parameters > _FAINT, parameters, 0.0))
+    if all(np.all(found == 1) for found in sizes):
+        return cycles, x
+    scaled, x = cycles.with_scales(x, *sizes)
+    assert isinstance(scaled, CycleCollocation)
+    return scaled, x
 
 
 def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) -> tuple[CycleCollocation, Array, Array]:
@@ -122,10 +154,10 @@ def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:
     """Return the same of a map: the new branch leaves along a tangent that is none of the branch of single cycles."""
     twice, x = system.doubled(x)
     found = locate_branch_point(twice, x)
-    jacobian = system.differentiated(found.x, system.free)[1]
 
     def change(tangent: Array) -> float:
-        return float(np.abs(jacobian @ tangent).max())
+        first, second = np.split(twice.states(tangent), 2)
+        return float(np.abs(second - first).max() / np.abs(first).max())
 
     return twice, found.x, max(found.tangents, key=change)
 

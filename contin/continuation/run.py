@@ -23,6 +23,7 @@ from contin.arrays import Array
 from contin.continuation.failure import no_convergence
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.extrema import extremum
+from contin.detection.hopf_end import collapsed
 from contin.detection.inspection import Inspection, Start
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
@@ -80,7 +81,8 @@ _SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
 #: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
 #: the curvature, it is one half.
 _MISSED = 0.75
-#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
+#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. Twice the error that
+#: Newton's method left comes on top: where cycles shrink onto a Hopf point it is 1e-10, and steps of 1e-6 were refused.
 _NOISE = 1e-12
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
 _ROUNDS = 3
@@ -277,7 +279,7 @@ class Continuation:
             yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return
-        self.state = self._accept(segment, distance)
+        self.state = self._accept(segment, distance, inspection.turns)
         self._end = segment.trial
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
@@ -308,6 +310,7 @@ class Continuation:
                 segment, distance = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
                 if step < 2 * finest or (inspection.is_simple() and self._is_explained(segment, inspection)):
+                    inspection.special_points(self._tests)  # where points inside cannot be found the step is halved
                     return segment, inspection, distance
                 problem = ConvergenceError("several branch points in one step, or another branch at its end")
             except ConvergenceError as error:
@@ -331,6 +334,8 @@ class Continuation:
         residual = state.system.residual(trial.x)
         if not np.all(np.isfinite(residual)):
             raise ConvergenceError("the equations are not finite at the corrected point")
+        if collapsed(state.system, state.x, trial.x):
+            raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         gap = guess - trial.x
         distance = np.sqrt(inner(state.system, gap, gap))
         angle = turn(state, trial)
@@ -368,20 +373,19 @@ class Continuation:
             if self._end is None:
                 self._end = Trial(state.system, state.x, Linearization(state.tangent, state.sign))
             return 0.0, self._end
-        low, aside = self._aside(state, step)
-        if turn(state, aside) > self.settings.angle:
-            raise ConvergenceError("another branch was met right beside the branch point")
-        return low, aside
+        return self._aside(state, step)
 
     def _aside(self, state: State, step: float) -> Place:
-        """Return the nearest point beside a branch point that Newton's method finds."""
+        """Return the nearest point beside a branch point that Newton's method finds, with a tangent along the branch."""
+        problem = ConvergenceError("another branch was met right beside the branch point")
         for share in _ASIDE:
             try:
-                return share * step, located(state, state.x + share * step * state.tangent, share * step, self.settings.newton)
-            except ConvergenceError:
-                if share == _ASIDE[-1]:
-                    raise
-        raise AssertionError
+                aside = located(state, state.x + share * step * state.tangent, share * step, self.settings.newton)
+                if turn(state, aside) <= self.settings.angle:
+                    return share * step, aside
+            except ConvergenceError as error:
+                problem = error
+        raise problem
 
     def _may_turn(self, trial: Trial, residual: Array) -> bool:
         """Return whether the primary parameter is so near to a fold that an approximate tangent may have the wrong sign."""
@@ -398,7 +402,8 @@ class Continuation:
         missed = abs(guess[at] - trial.x[at])
         tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
         change = step * max(abs(tangent[at]) for tangent in tangents)
-        jumped = missed > _MISSED * change and missed > _NOISE * (1 + abs(trial.x[at]))
+        noise = _NOISE + 2 * trial.newton_error
+        jumped = missed > _MISSED * change and missed > noise * (1 + abs(trial.x[at]))
         return bool(jumped and self._sense(trial))
 
     def _has_moved(self, gone: Array, trial: Trial) -> bool:
@@ -415,8 +420,11 @@ class Continuation:
         tangent = linearization(state.system, state.x, state.row).tangent
         return tangent if np.all(np.isfinite(tangent)) else state.tangent
 
-    def _accept(self, segment: Segment, distance: float) -> State:
-        """Return the next state, its step chosen so that the predictor's error is ``accuracy`` of it."""
+    def _accept(self, segment: Segment, distance: float, turned: bool) -> State:
+        """Return the next state, its step chosen so that the predictor's error is ``accuracy`` of it.
+
+        ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
+        """
         settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
         order = 2 if state.previous_tangent is None else 3
         aim = settings.accuracy * step
@@ -427,7 +435,7 @@ class Continuation:
         longer = step * np.clip(factor, _SHORTER, _LONGER)
         following = float(np.clip(longer, settings.min_step, max(longest, settings.min_step)))
         gone = trial.x - state.x
-        way = self._sense(trial) if self._has_moved(gone, trial) else 0.0
+        way = self._sense(trial) if turned or self._has_moved(gone, trial) else 0.0
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
@@ -484,6 +492,8 @@ class Continuation:
             done = correct(system, x, row, row @ x, self.settings.newton)
         except ConvergenceError:
             return  # the old mesh still serves; the step control will notice if it does not
+        if collapsed(system, x, done.x):
+            return
         end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0))
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):
@@ -522,6 +532,7 @@ class Continuation:
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
             state.arclength + found.at, trial.iterations, trial.newton_error, errors, found.details,
             stability.index, stability.nullity, change, stability.breaks,
+            *(("", None) if found.test is None else (found.test.column, found.test.value)),
         )  # fmt: skip
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from contin import checks
+from contin.arrays import Array
 from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
@@ -34,7 +37,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         Or any of its fields by name.
     free : sequence of str, optional
         Free parameters, if they shall differ from those of ``start``; the first is the primary one. From a point of a curve in
-        two parameters they lead to the branch of solutions through it.
+        two parameters they lead to the branch of solutions through it. With ``branch=1`` at HB and PD, those of the new branch.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
         the opposite way. By default the one that it was found on, with ``direction`` that of the primary parameter.
@@ -61,22 +64,45 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     x = start.x
     if isinstance(system, System) and forget_changed(system.problem):
         system = system.with_parameters({})
+    if branch is not None:
+        checks.whole("branch", branch, 0, 10)
+    if branch == 1 and switches(start):
+        cycles, x, tangent = switched(start, free)
+        return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
     if branch is None:
-        tangents = start.details.tangents if isinstance(start.details, (BranchPoint, MultiplePoint)) else ()
-        own = None
-        if tangents and system is start.system:  # the equations tell no tangent there
-            rate = tangents[0][system.parameter_index(settings.primary or system.free[0])]
-            own = settings.direction * oriented_along(tangents[0], rate)
-        return follow_until_interrupted(Continuation(system, x, settings, own), shown)
-    checks.whole("branch", branch, 0, 10)
-    if branch == 1 and switches(start):
-        cycles, x, tangent = switched(start)
-        return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
+        return follow_until_interrupted(Continuation(system, x, settings, _own_tangent(start, system, settings)), shown)
+    tangent = settings.direction * _tangent(start, system, branch)
+    return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)
+
+
+def _own_tangent(start: Point, system: Any, settings: Settings) -> Array | None:
+    """Return the tangent of the branch that a branch point was found on, oriented; None at other points."""
+    if not isinstance(start.details, (BranchPoint, MultiplePoint)) or not start.details.tangents or system is not start.system:
+        return None  # elsewhere the equations tell it
+    tangent: Array = start.details.tangents[0]
+    rate = tangent[system.parameter_index(settings.primary or system.free[0])]
+    return settings.direction * oriented_along(tangent, rate)
+
+
+def _tangent(start: Point, system: Any, branch: int) -> Array:
+    """Return a tangent of a branch point, in the free parameters of a system: those of the point, in any order.
+
+    Raises
+    ------
+    ProblemError
+        The start is no branch point, or one in other parameters, or has fewer branches.
+    """
     if not isinstance(start.details, (BranchPoint, MultiplePoint)):
         raise ProblemError("branch: the start is not a branch point")
+    if set(system.free) != set(start.system.free):
+        own = ", ".join(start.system.free)
+        raise ProblemError(f"free: {', '.join(system.free)} must be {own}, with which the branch point was found")
     if not 0 <= branch < len(start.details.tangents):
         raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
-    tangent = settings.direction * start.details.tangents[branch]
-    return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)
+    tangent: Array = start.details.tangents[branch]
+    if isinstance(start.system, System):
+        at = [start.system.parameter_index(name) for name in system.free]
+        tangent = np.concatenate([tangent[: system.state_size], tangent[at]])
+    return tangent

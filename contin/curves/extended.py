@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Function
+from contin.detection.hopf_end import collapsed
+from contin.detection.phase import in_phase
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.system import System
@@ -194,3 +196,17 @@ class _ExtendedStatement:
     def batch(self, name: str) -> Batch:
         """Return functions of the problem, compiled."""
         return self.problem.batch(name)
+
+
+@in_phase.register
+def _of_curves(system: Extended, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+    """The solution itself shifted; the unknowns that the curve adds stay."""
+    size = system.base.size
+    inside, others = in_phase(system.base, x[:size], [vector[:size] for vector in vectors], reference[:size])
+    return np.append(inside, x[size:]), [np.append(other, vector[size:]) for other, vector in zip(others, vectors)]
+
+
+@collapsed.register
+def _of_curves_of_cycles(system: Extended, x: Array, z: Array) -> bool:
+    """The solution itself has no size."""
+    return collapsed(system.base, x[: system.base.size], z[: system.base.size])

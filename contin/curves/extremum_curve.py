@@ -89,5 +89,5 @@ def _of_extremum_curve(system: ExtremumCurve) -> list[TestFunction]:
         return float(system.stationarity(trial.x).by_held[0])
 
     objective = system.objective
-    found = [TestFunction("EX", objective, slope, describe=lambda trial: curvatures(trial, objective))]
+    found = [TestFunction("EX", objective, slope, describe=lambda trial: curvatures(trial, objective), column=objective)]
     return [*found, *shrinking(system.base)] if isinstance(system.base, PeriodicCollocation) else found

@@ -30,6 +30,9 @@ _OFF = 0.1
 #: A branch point that the curve passes at a larger distance is none: the branches do not cross. A mesh that is not symmetric
 #: parts them by the root of its error; ten times smaller, such branch points of coarse meshes would be lost.
 _GAP = 1e-2
+#: The same without a mesh, where branches that cross are parted by the root of round-off, 1e-8, or of the last digits of data:
+#: ten digits part them by 1e-5. At 1e-2, cycles of maps of period 32 were "branch points" with residuals of 1e-2.
+_GAP_WITHOUT_MESH = 1e-5
 #: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is "possible".
 _HALVINGS = 12
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
@@ -69,6 +72,11 @@ class BranchPointSearch:
         return count, clear and (count % 2 == 1) == self.sign_changes
 
     @property
+    def _gap(self) -> float:
+        """Largest distance between two arms of a curve that count as branches which cross."""
+        return _GAP if self.segment.state.system.intervals else _GAP_WITHOUT_MESH
+
+    @property
     def sign_changes(self) -> bool:
         """The determinant's sign changes inside the step."""
         return sign_changed(self.segment.before.sign, self.segment.trial.sign)
@@ -85,7 +93,7 @@ class BranchPointSearch:
                 found = locate_branch_point(state.system, segment.guess(middle), segment.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
                 inside = segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
-                if inside and found.gap < _GAP and segment.distance(found.x, at) < _OFF * step:
+                if inside and found.gap < self._gap and segment.distance(found.x, at) < _OFF * step:
                     found = found.along(state.system, trial.x - state.x)
                     return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:

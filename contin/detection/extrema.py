@@ -113,7 +113,7 @@ def extremum(column: str) -> TestFunction:
         gradient = system.column_gradient(trial.x, column)
         return _difference(trial, column) if gradient is None else float(gradient @ trial.tangent)
 
-    return TestFunction("EX", column, slope, describe=lambda trial: curvatures(trial, column))
+    return TestFunction("EX", column, slope, describe=lambda trial: curvatures(trial, column), column=column)
 
 
 def _difference(trial: Trial, column: str) -> float:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contin.detection.segment import Place, Segment, SpecialPoint
-from contin.detection.significance import on_plateau, senses
+from contin.detection.significance import on_plateau, passed_before, senses
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
 from contin.stepping.trial import TestFunction, Trial, sign_changed
@@ -74,9 +74,10 @@ class FoldSearch:
         """Return the folds inside the step, in order.
 
         The parameter goes one way before a fold and the other way behind it. Where its rate is so small that it may be
-        round-off, and the parameter itself does not differ from one fold to the next, or to both ends of the step, there is
-        none. A fold where it does not differ from a first point on which branches cross is that point. For rates that may be
-        errors of the mesh see `contin.detection.significance`.
+        round-off, or the equations so nearly singular that Newton's method stays above its tolerance, and the parameter itself
+        does not differ from one fold to the next, or to both ends of the step, there is none. A fold where it does not differ
+        from a first point on which branches cross is that point. For rates that may be errors of the mesh see
+        `contin.detection.significance`.
         """
         segment = self.segment
         left, right = (segment.low, segment.before), (segment.step, segment.trial)
@@ -85,8 +86,13 @@ class FoldSearch:
         found = self.between(left, right)
         while segment.state.singular and found and not self._differs(left[1], found[0].trial):
             del found[0]  # the first point itself: beside it tangents are blurred
-        if max(abs(trial.value(self.fold)) for _, trial in (left, right)) >= _ROUND_OFF:
-            return found
+        clear = max(abs(trial.value(self.fold)) for _, trial in (left, right)) >= _ROUND_OFF
+        if not (clear and segment.trial.newton_error <= segment.newton.tolerance):
+            self._drop_round_off(found, left, right)
+        return found or passed_before(segment, self.fold)
+
+    def _drop_round_off(self, found: list[SpecialPoint], left: Place, right: Place) -> None:
+        """Take out of the folds found those between which, or beside which, the parameter does not differ."""
         at = 0
         while at < len(found):
             places = [left[1], *(fold.trial for fold in found), right[1]]
@@ -96,7 +102,6 @@ class FoldSearch:
                 del found[at]
             else:
                 at += 1
-        return found
 
     def _differs(self, one: Trial, other: Trial) -> bool:
         """Return whether the parameter differs between two points by more than round-off."""

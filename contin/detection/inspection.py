@@ -19,6 +19,7 @@ from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint
 from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
+from contin.detection.hopf_end import own_home
 from contin.detection.phase import in_phase, lasting
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
 from contin.detection.significance import senses
@@ -89,6 +90,7 @@ class Inspection:
     def __init__(self, segment: Segment, settings: Settings, start: Start, fold: TestFunction | None) -> None:
         self.segment, self.settings, self.start, self.fold = segment, settings, start, fold
         self._branch_points = BranchPointSearch(segment)
+        self._found: list[SpecialPoint] | None = None
 
     # --- does the step stay on its branch? -----------------------------------------------------------------------
 
@@ -98,6 +100,8 @@ class Inspection:
         A change of the determinant's sign without a branch point means that Newton's method left the branch; so does one of the
         trivial quantity without a zero of it on the branch.
         """
+        if self._own_home is not None:
+            return True  # the equations are singular there, and what they say of other points is blurred
         count, clear = self._branch_points.count if self.settings.branch_points else (0, True)
         if not clear or (self._home is not None and self._home.name.startswith("possible")) or not self._is_steady():
             return False
@@ -117,8 +121,9 @@ class Inspection:
         knots = [before, *(fold.trial for fold in self._folds), trial]
         at = trial.system.parameter_index(self.fold.name)
         sense = np.sign(before.value(self.fold))
+        noise = _STANDS + 2 * trial.newton_error
         for left, right in itertools.pairwise(knots):
-            if sense * (right.x[at] - left.x[at]) < -_STANDS * (1 + abs(right.x[at])):
+            if sense * (right.x[at] - left.x[at]) < -noise * (1 + abs(right.x[at])):
                 return False
             sense = -sense
         return True
@@ -126,7 +131,18 @@ class Inspection:
     # --- special points ------------------------------------------------------------------------------------------
 
     def special_points(self, tests: Iterable[TestFunction]) -> list[SpecialPoint]:
-        """Return the special points inside the step, in order."""
+        """Return the special points inside the step, in order; they are looked for once.
+
+        Raises
+        ------
+        ConvergenceError
+            A point inside the step that is needed to tell is not found.
+        """
+        if self._found is None:
+            self._found = self._searched(tests)
+        return self._found
+
+    def _searched(self, tests: Iterable[TestFunction]) -> list[SpecialPoint]:
         found: list[SpecialPoint] = []
         home = self._home
         if home is not None:
@@ -159,6 +175,11 @@ class Inspection:
         if self.fold is None:
             return []
         return FoldSearch(self.segment, self.fold, self._pitchfork).find()
+
+    @property
+    def turns(self) -> bool:
+        """The primary parameter turns inside the step, be it where branches cross."""
+        return bool(self._folds)
 
     def _pitchfork(self) -> SpecialPoint | None:
         """Return the fold of a pitchfork, right at the branch point inside the step; None if there is none."""
@@ -256,7 +277,17 @@ class Inspection:
     # --- ends ----------------------------------------------------------------------------------------------------
 
     @functools.cached_property
+    def _own_home(self) -> SpecialPoint | None:
+        """The end of the branch that the kind of problem knows."""
+        return own_home(self.segment.trial.system, self.segment)
+
+    @functools.cached_property
     def _home(self) -> SpecialPoint | None:
+        """The end of a branch inside the step."""
+        return self._trivial_end if self._own_home is None else self._own_home
+
+    @functools.cached_property
+    def _trivial_end(self) -> SpecialPoint | None:
         """The end of a branch on the trivial one, where ``settings.trivial`` crosses zero; "possible" without a zero there.
 
         It is the branch point inside the step if the quantity is zero there, else the quantity's zero. Either must lie on the
@@ -330,7 +361,7 @@ class Inspection:
 
         Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
         """
-        others = [other for other in found if other.label in ("BP", "CP") or other.name == "trivial branch"]
+        others = [other for other in found if other.label in ("BP", "CP") or other is self._home]
         if fold.label != "LP" or not others:
             return False
         if fold.name.startswith("possible"):  # the equations are singular at the crossing: nothing else was found

@@ -8,11 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from contin.arrays import Array
-from contin.discretization.cycles import CycleCollocation
+from contin.discretization.cycles import CycleCollocation, ForcedCollocation
 from contin.discretization.protocol import Discretization
 
 #: Places at which two cycles are compared: a power of two for the Fourier transform, more than any cycle needs.
 _PLACES = 2048
+#: The image of a cycle is a cycle where its residual is below this part of that of -u(t), which is none, and has no error of an
+#: interpolation between nodes.
+_SAME = 1e-4
 #: Newton's steps from the best of these places to the best shift; the distance between places is small, three would do.
 _STEPS = 5
 
@@ -49,6 +52,38 @@ def _of_cycles(system: CycleCollocation, x: Array, vectors: Sequence[Array], ref
         return np.concatenate([system.evaluate_scaled(vector, times).ravel(), vector[size:]])
 
     return moved(x), [moved(vector) for vector in vectors]
+
+
+@in_phase.register
+def _of_forced_cycles(
+    system: ForcedCollocation, x: Array, vectors: Sequence[Array], reference: Array
+) -> tuple[Array, list[Array]]:
+    """A cycle of several rounds may begin with any of them; one of a field that is odd after half a period has an image."""
+    size, rounds = system.state_size, system.rounds
+    places = [(number / rounds, 1.0) for number in range(rounds)]
+    if _is_odd(system, x):
+        places += [((number + 0.5) / rounds, -1.0) for number in range(rounds)]
+
+    def moved(vector: Array, place: tuple[float, float]) -> Array:
+        shift, sign = place
+        if shift == 0:
+            return vector.copy()
+        return np.concatenate([sign * system.evaluate_scaled(vector, (system.nodes + shift) % 1).ravel(), vector[size:]])
+
+    def apart(place: tuple[float, float]) -> float:
+        gap = moved(x, place) - reference
+        return float(system.weights @ gap**2)
+
+    nearest = min(places, key=apart)
+    return moved(x, nearest), [moved(vector, nearest) for vector in vectors]
+
+
+def _is_odd(system: ForcedCollocation, x: Array) -> bool:
+    """Return whether -u(t + T / 2) is a solution where u is one, T the period of the forcing."""
+    shifted = system.evaluate_scaled(x, (system.nodes + 0.5 / system.rounds) % 1)
+    image = np.concatenate([-shifted.ravel(), x[system.state_size :]])
+    size = np.abs(system.residual(np.where(np.arange(x.size) < system.state_size, -x, x))).max()
+    return bool(np.abs(system.residual(image)).max() <= _SAME * size)
 
 
 def _shift(system: CycleCollocation, x: Array, reference: Array) -> float:

@@ -15,6 +15,9 @@ from contin.errors import ConvergenceError
 
 #: Steps up to so many tolerances may be round-off of the function: it is known to about a thousand times that of the place.
 _IDLE = 1e3
+#: A value where the bracket closes is no zero if it is above this part of the larger one at its first ends: the function jumps.
+#: At a zero with an infinite slope, as of a square root, it is 1e-6 of them.
+_JUMP = 1e-3
 #: A zero takes 4 evaluations on average; where as many as bisection to round-off would need do not do, the function jumps.
 _MOST_EVALUATIONS = 60
 
@@ -46,6 +49,7 @@ def find_zero(
         return b
     known = [left, right]
     best, idle, c, fc = (np.inf, b), 0, guess, np.nan
+    small = _JUMP * max(abs(fa), abs(fb))
     for _ in range(_MOST_EVALUATIONS):
         if c is None or not min(a, b) < c < max(a, b):
             c = b - fb * (b - a) / (fb - fa)
@@ -65,11 +69,11 @@ def find_zero(
         if following is None:
             following = b - fb * (b - a) / (fb - fa)
         move = abs(following - c)
-        if move <= tolerance:
+        if move <= tolerance and abs(fc) <= small:
             return c
         idle = idle + 1 if move < _IDLE * tolerance and abs(fc) > best[0] / 2 else 0
         best = min(best, (abs(fc), c))
-        if idle == 2:
+        if idle == 2 and best[0] <= small:
             return best[1]
         c = following
     raise ConvergenceError(f"no zero between the two ends (last value {fc:.1e})")

@@ -109,9 +109,27 @@ def on_plateau(segment: Segment, fold: TestFunction) -> list[SpecialPoint]:
     state, (before, behind) = segment.state, senses(segment, fold)
     if before or not state.sense * behind < 0 or state.sensed is None:
         return []
-    lengths = np.abs(free_values(segment.trial) - state.sensed)
-    errors = dict(zip(state.system.free, map(float, lengths)))
-    return [SpecialPoint(0.0, fold.label, fold.name, segment.before, test=fold, errors=errors)]
+    return [_behind_plateau(segment, fold)]
+
+
+def passed_before(segment: Segment, fold: TestFunction) -> list[SpecialPoint]:
+    """Return the fold that a step has behind it, where the parameter goes by more than round-off against its last sense.
+
+    A fold on which the parameter changes by less than round-off over a whole step is not seen in that step.
+    """
+    state, behind = segment.state, sense(segment.trial, fold, segment.newton)
+    at = state.system.parameter_index(fold.name)
+    gone = segment.trial.x[at] - state.x[at]
+    moved = gone * behind > STANDS * (1 + abs(state.x[at]))
+    return [_behind_plateau(segment, fold)] if moved and state.sense * behind < 0 and state.sensed is not None else []
+
+
+def _behind_plateau(segment: Segment, fold: TestFunction) -> SpecialPoint:
+    """Return the beginning of a step as a fold; its errors are the way since the parameter's sense was told last."""
+    assert segment.state.sensed is not None
+    lengths = np.abs(free_values(segment.trial) - segment.state.sensed)
+    errors = dict(zip(segment.state.system.free, map(float, lengths)))
+    return SpecialPoint(0.0, fold.label, fold.name, segment.before, test=fold, errors=errors)
 
 
 def free_values(trial: Trial) -> Array:

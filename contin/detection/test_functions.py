@@ -46,7 +46,7 @@ def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
 
 
 def _user_zero(name: str, value: float, text: str) -> TestFunction:
-    return TestFunction("UZ", f"{name} = {text}", lambda trial: trial[name] - value)
+    return TestFunction("UZ", f"{name} = {text}", lambda trial: trial[name] - value, column=name, value=value)
 
 
 def limits(intervals: Mapping[str, Sequence[float]]) -> list[TestFunction]:
@@ -60,7 +60,11 @@ def limits(intervals: Mapping[str, Sequence[float]]) -> list[TestFunction]:
 
 def _limit(name: str, value: float, text: str, side: int) -> TestFunction:
     """Return the one of the upper (``side`` +1) or lower (-1) end."""
-    return TestFunction("EP", f"{name} = {text}", lambda trial: side * (trial[name] - value), terminal=True, limit=True)
+
+    def function(trial: Trial) -> float:
+        return side * (trial[name] - value)
+
+    return TestFunction("EP", f"{name} = {text}", function, terminal=True, limit=True, column=name, value=value)
 
 
 def within_limits(segment: Segment, points: list[SpecialPoint], ends: Sequence[TestFunction]) -> list[SpecialPoint]:
@@ -82,7 +86,7 @@ def within_limits(segment: Segment, points: list[SpecialPoint], ends: Sequence[T
 
 def fold(name: str) -> TestFunction:
     """Return the test function of folds with respect to a free parameter: its component of the tangent (AUTO's LP)."""
-    return TestFunction("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)])
+    return TestFunction("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name)
 
 
 @functools.singledispatch
@@ -223,7 +227,7 @@ def own_stop(system: Discretization, trial: Trial, stop: Stop) -> Stop:
 def _of_slow_cycles(system: CycleCollocation, trial: Trial, stop: Stop) -> Stop:
     """Where the period runs away: the equilibrium near which the cycle spends its time, and the limit of the parameter."""
     cycles: Any = trial.system
-    place = resting_place(cycles, trial.x)
+    place = None if cycles.has_shrunk(trial.x) else resting_place(cycles, trial.x)
     if place is None:
         return stop
     message = f"{stop.message}; {place.describe(cycles.problem.states)}"

@@ -231,12 +231,12 @@ class ForcedCollocation(PeriodicCollocation):
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         values = dict(zip(self.problem.parameters, map(float, self.parameters)))
-        self._rounds = rounds_of(self.free, values)
+        self.rounds = rounds_of(self.free, values)
         problem.duration(values)
 
     def is_doubled(self, x: Array) -> bool:
         """Return whether a cycle goes twice round one of half its period, and that is a number of periods of the forcing."""
-        return self._rounds % 2 == 0 and super().is_doubled(x)
+        return self.rounds % 2 == 0 and super().is_doubled(x)
 
     def with_reference(self, x: Array) -> ForcedCollocation:
         """Return the same: nothing needs a reference."""

@@ -10,20 +10,35 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import is_opposite
-from contin.discretization.multilinear import partitions, subsets
 from contin.discretization.scales import Scales
 from contin.functions.batch import Batch
+from contin.linalg.periodic import log_eigenvalues
 from contin.problems.cycle import ROUNDS, rounds_of
 from contin.problems.map import MapProblem
 
 #: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
 _SHRUNK = 1e-7
-#: A multiplier of zero, of which the logarithm is taken.
+#: The logarithm of a multiplier is no smaller than that of this number: a superstable cycle has the multiplier zero.
 _NO_MULTIPLIER = 1e-300
+#: Smallest number of unknown states for which the matrix is kept sparse: it has n + 1 entries a row. Dense factors of 200
+#: unknowns take as long as sparse ones.
+_MANY = 200
 
 
 class MapSystem(Algebraic):
-    """f(... f(u, p) ..., p) - u = 0; the derivatives are products of those of f. There are no scales.
+    """Cycles u_1 ... u_k of a map: f(u_j, p) - u_(j+1) = 0, with u_(k+1) = u_1. There are no scales.
+
+    All points are unknowns, so that the equations are as nonlinear as f, and not as f applied k times: other cycles, which may
+    come as near to one point of a cycle as there are numbers, are apart in some of the others, and round-off of the residual is
+    that of f. The matrix is
+
+                             u_1    u_2    ...    u_k     p
+                          [  A_1    -1                   B_1  ]
+                          [         A_2    -1            B_2  ]        A_j, B_j: derivatives of f at u_j by u and p
+                          [               ...    -1      ...  ]
+                          [  -1                  A_k     B_k  ]
+
+    Columns are those of u_1; the norm is the root mean square over the cycle.
 
     Raises
     ------
@@ -41,107 +56,165 @@ class MapSystem(Algebraic):
     ) -> None:  # fmt: skip
         super().__init__(problem, free, parameters)
         self.rounds = rounds_of(self.free, dict(zip(problem.parameters, map(float, self.parameters))))
+        self._n = len(problem.state_names)
+        self.state_size = self.equations = self._n * self.rounds
+        self.size = self.state_size + len(self.free)
+        self.weights = np.append(np.full(self.state_size, 1 / self.rounds), np.ones(len(self.free)))
+
+    @property
+    def nodes(self) -> Array:
+        """The number of each point of the cycle over that of all, shape (rounds,)."""
+        return np.arange(self.rounds) / self.rounds
 
     @property
     def is_sparse(self) -> bool:
-        """Never: products of sparse matrices are not."""
-        return False
+        """The matrix is kept sparse: the cycle is long, and few of the entries are not zero."""
+        return self.state_size >= _MANY and self.rounds >= _MANY // self._n
 
     def is_drifted(self, x: Array) -> bool:
         """Return whether the multipliers are in doubt: they never are."""
         return False
 
-    def residual(self, x: Array) -> Array:
-        """Return f(... f(u)) - u, shape (n,)."""
-        return self._applied(x, self.rounds) - x[: self.state_size]
+    # --- states --------------------------------------------------------------------------------------------------
 
-    def _applied(self, x: Array, rounds: int) -> Array:
-        batch, p, none = self.problem.batch("map"), self.all_parameters(x), np.empty((0, self.state_size))
-        states = x[None, : self.state_size]
-        for _ in range(rounds):
-            states = batch.values(np.zeros(1), states, none, p)
-        found: Array = states[0]
+    def states(self, x: Array) -> Array:
+        """Return the points of the cycle, shape (rounds, n)."""
+        return x[: self.state_size].reshape(self.rounds, self._n)
+
+    def pack(self, states: Any, values: Mapping[str, float]) -> Array:
+        """Return a vector of unknowns from all points of a cycle, or from one of them, to which the map is applied."""
+        states = np.asarray(states, dtype=float).reshape(-1, self._n)
+        if len(states) == self.rounds:
+            return super().pack(states, values)
+        x = np.concatenate([np.tile(states[0], self.rounds), [float(values[name]) for name in self.free]])
+        with np.errstate(all="ignore"):
+            for at in range(1, self.rounds):
+                following = self._images(x, self.states(x)[at - 1 : at])
+                if not np.all(np.isfinite(following)):
+                    break  # it runs away: the rest stays where it began
+                self.states(x)[at] = following
+        return x
+
+    def functionals(self, x: Array) -> Array:
+        """Return the values of the problem's functionals at the first point, in their order."""
+        if not self.problem.functionals:
+            return np.empty(0)
+        values: Array = self.problem.batch("functionals").values(*self._arguments(x, self.states(x)[:1]))[0]
+        return values
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a parameter or functional by x, shape (size,)."""
+        names = tuple(self.problem.functionals)
+        if name not in names:
+            return super(Algebraic, self).column_gradient(x, name)
+        batch = self.problem.batch("functionals")
+        here = batch.jacobian(*self._arguments(x, self.states(x)[:1]), batch.columns(self._free))[1][0, names.index(name)]
+        gradient = np.zeros(self.size)
+        gradient[: self._n], gradient[self.state_size :] = here[: self._n], here[self._n :]
+        return gradient
+
+    # --- the equations -------------------------------------------------------------------------------------------
+
+    def _arguments(self, x: Array, states: Array) -> tuple[Array, Array, Array, Array]:
+        return np.zeros(len(states)), np.ascontiguousarray(states), np.empty((0, self._n)), self.all_parameters(x)
+
+    def _images(self, x: Array, states: Array) -> Array:
+        """Return f at states (K, n), shape (K, n)."""
+        images: Array = self.problem.batch("map").values(*self._arguments(x, states))
+        return images
+
+    def residual(self, x: Array) -> Array:
+        """Return f(u_j) - u_(j+1), shape (equations,)."""
+        states = self.states(x)
+        return (self._images(x, states) - np.roll(states, -1, axis=0)).ravel()
+
+    def _derivatives(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
+        """Return f at all points, (rounds, n), and its derivatives by states and these parameters."""
+        batch = self.problem.batch("map")
+        found: tuple[Array, Array] = batch.jacobian(*self._arguments(x, self.states(x)), batch.columns(self._indices(names)))
         return found
 
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
-        """Return the residual and F_x, shape (n, size)."""
+        """Return the residual and F_x, a sparse array where `is_sparse`."""
         return self.differentiated(x, self.free)
 
-    def differentiated(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
+    def differentiated(self, x: Array, names: Sequence[str]) -> tuple[Array, Any]:
         """Return the residual, and its derivatives by the states and by these parameters."""
-        batch, p, n = self.problem.batch("map"), self.all_parameters(x), self.state_size
-        columns, none = batch.columns(self._indices(names)), np.empty((0, n))
-        states, total = x[None, :n], np.eye(n, n + len(names))
-        for _ in range(self.rounds):
-            states, (jacobian,) = batch.jacobian(np.zeros(1), states, none, p, columns)
-            total = jacobian[:, :n] @ total
-            total[:, n:] += jacobian[:, n:]
-        total[:, :n] -= np.eye(n)
-        return states[0] - x[:n], total
+        n, k, size = self._n, self.rounds, self.state_size
+        values, jacobians = self._derivatives(x, names)
+        residual = (values - np.roll(self.states(x), -1, axis=0)).ravel()
+        at = np.arange(size).reshape(k, n)
+        following = np.roll(at, -1, axis=0)
+        if not self.is_sparse:
+            matrix = np.zeros((size, size + len(names)))
+            matrix[at[:, :, None], at[:, None, :]] = jacobians[:, :, :n]
+            matrix[at, following] -= 1.0
+            matrix[:, size:] = jacobians[:, :, n:].reshape(size, -1)
+            return residual, matrix
+        from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s; only long cycles need it
+
+        rows = np.broadcast_to(at[:, :, None], jacobians.shape)
+        of_parameters = np.broadcast_to(size + np.arange(len(names)), (k, n, len(names)))
+        columns = np.concatenate([np.broadcast_to(at[:, None, :], (k, n, n)), of_parameters], axis=2)
+        entries = np.append(jacobians.ravel(), np.full(size, -1.0))
+        places = np.append(rows.ravel(), at.ravel()), np.append(columns.ravel(), following.ravel())
+        return residual, csr_array((entries, places), shape=(size, size + len(names)))
+
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+        columns: Array = self._derivatives(x, names)[1][:, :, self._n :].reshape(self.state_size, len(names))
+        return columns
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of F along several directions, shape (n,): the chain rule for every round.
-
-        The derivative of f(u) along some of them is the sum over all ways to divide them into groups, of the derivative of f
-        along those of u along each group.
-        """
-        batch, p, n = self.problem.batch("map"), self.all_parameters(x), self.state_size
-        time, none, numbers = np.zeros(1), np.empty((0, n)), subsets(len(directions))
-        of_states = {chosen: np.zeros((1, n)) for chosen in numbers}
-        of_states[()] = x[None, :n]
-        of_states |= {(i,): v[None, :n] for i, v in enumerate(directions)}
-        for _ in range(self.rounds):
-            still = np.zeros(self.size)
-            wide = {
-                chosen: self._wide(directions[chosen[0]] if len(chosen) == 1 else still, of_states[chosen])
-                for chosen in numbers[1:]
-            }
-            of_states = {
-                chosen: np.sum(
-                    [
-                        batch.along(time, of_states[()], none, p, [wide[group] for group in groups])
-                        for groups in partitions(chosen)
-                    ],
-                    axis=0,
-                )
-                for chosen in numbers
-            }
-        found: Array = of_states[numbers[-1]][0]
+        """Return the derivative of F along several directions, shape (equations,): f at every point; the rest is linear."""
+        wide = [self._wide(v, self.states(v)) for v in directions]
+        found: Array = self.problem.batch("map").along(*self._arguments(x, self.states(x)), wide).ravel()
+        if len(directions) == 1:
+            found = found - np.roll(self.states(directions[0]), -1, axis=0).ravel()
         return found
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
-        """Return the gradient of w.(F_x v), shape (size,): all rounds forwards, then back with multipliers of u and of v."""
-        batch, p, n = self.problem.batch("map"), self.all_parameters(x), self.state_size
-        columns, time, none = batch.columns(self._free), np.zeros(1), np.empty((0, n))
-        states, tangent, rounds = x[None, :n], np.array(v), []
-        for _ in range(self.rounds):
-            after, (jacobian,) = batch.jacobian(time, states, none, p, columns)
-            rounds.append((states, self._wide(tangent, tangent[None, :n]), jacobian))
-            states, tangent = after, np.append(jacobian @ tangent, tangent[n:])
-        of_state, of_tangent, by_parameters = np.zeros(n), np.array(w), np.zeros(self.size - n)
-        for here, wide, jacobian in reversed(rounds):
-            change = of_state @ jacobian + batch.bent(time, here, none, p, of_tangent[None], wide, columns)[0]
-            of_state, of_tangent = change[:n], of_tangent @ jacobian[:, :n]
-            by_parameters += change[n:]
-        return np.append(of_state, by_parameters)
+        """Return the gradient of w.(F_x v), shape (size,)."""
+        batch = self.problem.batch("map")
+        given = *self._arguments(x, self.states(x)), w.reshape(self.rounds, self._n), self._wide(v, self.states(v))
+        found = batch.bent(*given, batch.columns(self._free))
+        return np.append(found[:, : self._n].ravel(), found[:, self._n :].sum(axis=0))
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,)."""
+        names = tuple(self.problem.functionals)
+        if name not in names:
+            return super(Algebraic, self).column_bent(x, name, v)
+        batch, weights = self.problem.batch("functionals"), np.zeros((1, len(names)))
+        weights[0, names.index(name)] = 1.0
+        given = *self._arguments(x, self.states(x)[:1]), weights, self._wide(v, self.states(v)[:1])
+        here = batch.bent(*given, batch.columns(self._free))[0]
+        gradient = np.zeros(self.size)
+        gradient[: self._n], gradient[self.state_size :] = here[: self._n], here[self._n :]
+        return gradient
 
     @property
     def _evaluated(self) -> Sequence[Batch]:
         """The map."""
         return (self.problem.batch("map"),)
 
-    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of F by any parameters, free or not, shape (n, len(names))."""
-        return self.differentiated(x, names)[1][:, self.state_size :]
+    def transitions(self, x: Array) -> Array:
+        """Return the derivatives of f by the states at all points, shape (rounds, n, n)."""
+        return self._derivatives(x, ())[1]
 
     def jacobian(self, x: Array) -> Array:
-        """Return F_u, shape (n, n)."""
-        return self.differentiated(x, ())[1]
+        """Return F_u, shape (equations, equations)."""
+        matrix = self.differentiated(x, ())[1]
+        found: Array = matrix.toarray() if self.is_sparse else matrix
+        return found
+
+    # --- stability -----------------------------------------------------------------------------------------------
 
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers, shape (n,): those with a positive real part are unstable."""
-        values = np.linalg.eigvals(self.jacobian(x) + np.eye(self.state_size)).astype(complex)
-        return np.log(np.where(np.abs(values) > _NO_MULTIPLIER, values, _NO_MULTIPLIER))
+        values = log_eigenvalues(self.transitions(x))
+        values.real = np.maximum(values.real, np.log(_NO_MULTIPLIER))
+        return values
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a torus bifurcation; None near a double multiplier -1."""
@@ -149,16 +222,17 @@ class MapSystem(Algebraic):
 
     def is_doubled(self, x: Array) -> bool:
         """Return whether a cycle goes twice round one of half its rounds, up to the square root of round-off."""
-        states = x[: self.state_size]
         if self.rounds % 2:
             return False
-        return bool(np.all(np.abs(self._applied(x, self.rounds // 2) - states) <= _SHRUNK * (1 + np.abs(states))))
+        first, second = np.split(self.states(x), 2)
+        return bool(np.all(np.abs(second - first) <= _SHRUNK * (1 + np.abs(first))))
 
     def doubled(self, x: Array) -> tuple[MapSystem, Array]:
         """Return the same problem with twice the rounds, and x for it."""
         other = self.with_parameters({ROUNDS: 2.0 * self.rounds})
         assert isinstance(other, MapSystem)
-        return other, x
+        values = dict(zip(self.problem.parameters, self.all_parameters(x)))
+        return other, other.pack(np.tile(self.states(x), (2, 1)), values)
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapSystem, Array]:
         """Return the same."""

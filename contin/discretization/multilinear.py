@@ -76,22 +76,3 @@ def shares(numbers: Numbers, parts: int) -> Iterator[tuple[Numbers, ...]]:
     """
     for owners in itertools.product(range(parts), repeat=len(numbers)):
         yield tuple(tuple(number for number, owner in zip(numbers, owners) if owner == part) for part in range(parts))
-
-
-def partitions(numbers: Numbers) -> Iterator[list[Numbers]]:
-    """Yield all ways to divide the directions into groups (the chain rule).
-
-    Examples
-    --------
-    >>> list(partitions((0, 1)))
-    [[(0, 1)], [(0,), (1,)]]
-    """
-    if not numbers:
-        yield []
-        return
-    first, rest = numbers[0], numbers[1:]
-    for size in range(len(rest), -1, -1):
-        for beside in itertools.combinations(rest, size):
-            others = tuple(number for number in rest if number not in beside)
-            for groups in partitions(others):
-                yield [(first, *beside), *groups]

@@ -15,9 +15,9 @@ from contin.problems.cycle import ROUNDS
 class MapProblem(AlgebraicProblem):
     """Fixed points u = f(u, p) of a map, and its cycles: fixed points of f applied ``rounds`` times.
 
-    ``rounds`` is a parameter of every map by itself, a whole number that cannot be free; the states are those of one point of
-    the cycle. Multipliers are the eigenvalues of the derivative: special points are folds (LP), branch points (BP), period
-    doublings (PD) and torus bifurcations (TR).
+    ``rounds`` is a parameter of every map by itself, a whole number that cannot be free. A guess is one point of the cycle, or
+    all of them one after the other; columns are those of the first. Multipliers are the eigenvalues of the derivative over all
+    rounds: special points are folds (LP), branch points (BP), period doublings (PD) and torus bifurcations (TR).
 
     Parameters
     ----------

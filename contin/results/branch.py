@@ -57,7 +57,9 @@ class Branch:
         return np.array([point[name] for point in self.points])
 
     def labelled(self, label: str) -> list[Point]:
-        """Return the points that carry a label, in order.
+        """Return the points that carry a label, in order, as a run found them.
+
+        The start of a branch that was switched to (BP, HB) was found on another one and is not among them; it is ``points[0]``.
 
         Examples
         --------
@@ -67,7 +69,8 @@ class Branch:
         >>> len(branch.labelled("LP")), len(branch.labelled("HB"))
         (1, 0)
         """
-        return [point for point in self.points if point.label == label]
+        found = [point for point in self.points if point.label == label]
+        return found if label == "EP" else [point for point in found if point.name != "start"]
 
     def to_pandas(self) -> Any:
         """Return all points as a ``pandas.DataFrame``, a row a point, in order.

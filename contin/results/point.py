@@ -90,6 +90,11 @@ class Point:
         At a special point, the index before and after it, in the direction of travel.
     breaks : tuple of str
         At a branch point, the declared symmetries that its modes break.
+    column : str
+        The parameter or functional that turns there (LP), has an extremum (EX) or takes a given value (UZ, EP at a limit); ""
+        at other points.
+    value : float, optional
+        That value, as it was given.
 
     Examples
     --------
@@ -117,6 +122,8 @@ class Point:
     nullity: int = 0
     index_change: tuple[int | None, int | None] | None = None
     breaks: tuple[str, ...] = ()
+    column: str = ""
+    value: float | None = None
 
     def __getitem__(self, name: str) -> float:
         """Return a parameter, a functional, or a state of an equilibrium, by name.

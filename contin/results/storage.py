@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -117,7 +117,7 @@ def _row(point: Point, at: int) -> dict[str, Any]:
         "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
         "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
         "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
-        "details": _numbers(point.details),
+        "details": _numbers(point.details), "column": point.column, "value": point.value,
     }  # fmt: skip
 
 
@@ -232,6 +232,20 @@ def _base(
     return discretized(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values, scales)
 
 
+def _column_of(row: dict[str, Any], parameters: Mapping[str, float]) -> tuple[str, float | None]:
+    """Return the column that a point is about, and its value.
+
+    Files of earlier versions have them in the name only, the value to a few digits: that of the point is better.
+    """
+    if "column" in row:
+        return row["column"], row["value"]
+    column, _, text = row["name"].removeprefix("possible ").partition(" = ")
+    values = {**parameters, **row["functionals"]}
+    if column not in values:
+        return "", None
+    return column, values[column] if text and not row["name"].startswith("possible ") else None
+
+
 def _with_reference(system: Discretization, x: Array) -> Discretization:
     """Return a discretized problem with a stored point as the reference, if it has one."""
     if isinstance(system, Extended):
@@ -242,6 +256,8 @@ def _with_reference(system: Discretization, x: Array) -> Discretization:
 
 def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array], number: int) -> Point:
     x = arrays[f"x{number}"]
+    if len(x) != system.size:
+        raise ProblemError("the file is of an earlier version, which kept one point of a map's cycle only: follow it again")
     system = _with_reference(system, x)
     details: BranchPoint | MultiplePoint | dict[str, float] | None = row.get("details")
     if row["imperfection"] is not None:
@@ -255,4 +271,5 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
         row["label"], row["name"], parameters, row["functionals"], x, arrays[f"tangent{number}"], system, row["arclength"],
         row["iterations"], row["newton_error"], row["errors"], details, row.get("index"), row.get("nullity", 0),
         None if row.get("index_change") is None else tuple(row["index_change"]), tuple(row.get("breaks", ())),
+        *_column_of(row, parameters),
     )  # fmt: skip

@@ -184,6 +184,10 @@ class TestFunction:
         Number of places inside a step where the sign is looked at, too: two zeros in one step leave it as it was at the ends.
     unless : str
         A column; where the user has given a limit for it, the function is not used.
+    column : str
+        The parameter or functional whose value, fold or extremum is looked for; "" where it is about no column.
+    value : float, optional
+        The value of the column at the zero.
 
     Examples
     --------
@@ -205,6 +209,8 @@ class TestFunction:
     search: Callable[..., Any] | None = None
     looks: int = 0
     unless: str = ""
+    column: str = ""
+    value: float | None = None
 
     def passed(self, before: float, after: float) -> bool:
         """Return whether there is a zero between two neighbouring points where the function has these values.

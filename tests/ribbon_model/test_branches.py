@@ -138,11 +138,11 @@ def test_a_secondary_branch_on_the_half_loop():
     """
     system, x, tangent = half_loop_branch(RIBBON, 3, 1, NU, 16, 6)
     primary = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-200, 100)}), tangent)
-    first, second = primary.labelled("BP")[1:]
+    first, second = primary.labelled("BP")
     assert first["kappa_n"] == pytest.approx(-21.6, abs=0.5)
     loop_around = trace(first, branch=1, limits={"kappa_n": (-300, 100)})
     assert loop_around.stop.reason == "closed"
     assert np.abs(loop_around.column("R3")).max() > 1
-    (meeting,) = loop_around.labelled("BP")[1:]
+    (meeting,) = loop_around.labelled("BP")
     assert meeting["kappa_n"] == pytest.approx(second["kappa_n"], abs=1e-7)
     assert abs(meeting["R3"]) < 1e-8

@@ -40,7 +40,7 @@ def secondary():
     """The branch with R != 0 that leaves (3, 1), on the half loop."""
     system, x, tangent = half_loop_branch(RIBBON, 3, 1, NU, 16, 6)
     primary = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-40, 100)}), tangent)
-    leaves = primary.labelled("BP")[1]
+    leaves = primary.labelled("BP")[0]
     return leaves, trace(leaves, branch=1, limits={"kappa_n": (-60, 100)})
 
 

@@ -6,7 +6,18 @@ import math
 import numpy as np
 import pytest
 
-from contin import AlgebraicProblem, BoundaryValueProblem, ProblemError, TestFunction, curve, solve, trace
+from contin import (
+    AlgebraicProblem,
+    BoundaryValueProblem,
+    ProblemError,
+    TestFunction,
+    curve,
+    load,
+    save,
+    sensitivities,
+    solve,
+    trace,
+)
 
 
 @functools.cache
@@ -53,6 +64,41 @@ def test_user_zeros_in_two_parameters(name):
             if event
             else point["mean"] == pytest.approx(float(name[-1]), abs=1e-9)
         )
+
+
+#: More digits than a name holds.
+EXACT = 1.2345678912345
+
+
+@pytest.mark.parametrize("label", ["UZ", "EP"])
+def test_a_curve_keeps_the_value_that_was_given(label, tmp_path):
+    """The mean is held at the number that was given, to round-off, not at that of the point's name; from a file, too."""
+    problem = perturbed_gelfand()
+    given = {"zeros": {"mean": [EXACT]}} if label == "UZ" else {"limits": {"mean": (-1, EXACT)}}
+    run = trace(solve(problem, [0, 0]), free=["lam"], **{"limits": {"mean": (-1, 2)}, **given})
+    save(run, tmp_path / "run.npz")
+    for found in (run, load(problem, tmp_path / "run.npz")):
+        start = found.labelled(label)[-1]
+        assert (start.name, start.column, start.value) == ("mean = 1.23457", "mean", EXACT)
+        assert np.abs(curve(start, "eps", max_points=5).column("mean") - EXACT).max() < 1e-13
+
+
+def test_the_value_of_a_state_is_kept():
+    """x^3 - b x + a = 0 at x = -1 / 7: a = 1 / 343 - b / 7."""
+    problem = AlgebraicProblem(lambda u, p: (u.x**3 - p.b * u.x + p.a,), ["x"], {"a": 2.0, "b": 1.0})
+    run = trace(solve(problem, [-1.5]), free=["a"], direction=-1, limits={"a": (-2, 3)}, zeros={"x": [-1 / 7]})
+    (start,) = run.labelled("UZ")
+    assert start.value == -1 / 7
+    for point in curve(start, "b", limits={"b": (1, 3)}):
+        assert point["a"] == pytest.approx(1 / 343 - point["b"] / 7, abs=1e-13)
+
+
+def test_what_is_held_is_no_word():
+    """Sensitivities at a start, or at a point without a column, hold the first free parameter: nothing changes then."""
+    problem = AlgebraicProblem(lambda u, p: (u.x**3 - p.b * u.x + p.a,), ["x"], {"a": 2.0, "b": 1.0})
+    run = trace(solve(problem, [-1.5]), free=["a"], direction=-1, limits={"a": (-2, 3)})
+    assert run.points[0].name == "start"
+    assert sensitivities(run.points[0])["b"]["a"] == pytest.approx(0, abs=1e-12)
 
 
 @functools.cache

@@ -438,7 +438,7 @@ CASES = [
     Case("food chain: 1", first_of_chain, [Special("BP", {"p1": 0.75, "x": 1.0, "z": 0.0}), Special("EP", {"p1": 1.0})]),
     Case("food chain: 2", second_of_chain,
          equilibria(CHAIN, "p1", two_of_chain, 1e-9, zeros(lambda y: two_of_chain(y)[1], 0.2, 0.25)[0])),
-    Case("food chain: 3", lambda: switch(second_of_chain, 1, "p1", {"p1": (0, 1.2), "z": (-0.1, 1)}, state=2),
+    Case("food chain: 3", lambda: switch(second_of_chain, 0, "p1", {"p1": (0, 1.2), "z": (-0.1, 1)}, state=2),
          equilibria(CHAIN, "p1", three_of_chain, 1e-9, 13 / 36)),
     Case("lake", lambda: follow(LAKE, [6.0, 0.17], "gf", {"gf": (-0.1, 0.2)}, direction=-1, at={"gf": 0.11}),
          equilibria(LAKE, "gf", lake, *(zeros(lambda x, g=g: lake(x)[1] - g, *ends)[0]

@@ -37,7 +37,7 @@ def prey(sign):
 
 
 def predators(sign):
-    point = prey(1).labelled("BP")[1]
+    point = prey(1).labelled("BP")[0]
     return trace(point, branch=1, direction=1 if point.details.tangents[1][1] * sign > 0 else -1, limits=LIMITS)
 
 

@@ -13,6 +13,7 @@ from contin import (
     BoundaryValueProblem,
     Collocation,
     Continuation,
+    ConvergenceError,
     ProblemError,
     Settings,
     TestFunction,
@@ -191,3 +192,50 @@ def test_the_number_of_free_parameters_is_counted():
     system = Collocation(bratu(), [0, 1], 4, [], {})
     with pytest.raises(ProblemError, match="needs 1"):
         Continuation(system, np.zeros(system.size))
+
+
+def test_a_branch_point_is_left_in_its_own_parameters():
+    """Its tangents are those in the parameter it was found in: they say nothing of another one."""
+    pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - p.b * u.x**2),), ["x"], {"a": -1.0, "b": 1.0})
+    found = trace(solve(pitchfork, [0.0]), free=["a"], limits={"a": (-1, 1)}).labelled("BP")[0]
+    with pytest.raises(ProblemError, match="free: b must be a, with which the branch point was found"):
+        trace(found, branch=1, free=["b"])
+    assert trace(found, branch=1, free=["a"], limits={"a": (-1, 1)}).stop.message == "reached a = 1"
+
+
+def test_a_point_that_is_not_found_shortens_the_step_and_does_not_lose_the_branch():
+    """What is looked for inside a step may need points that Newton's method does not find: then the step is halved."""
+    parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+
+    def only_in_steps_below(longest):
+        def search(segment, places):
+            if segment.step > longest:
+                raise ConvergenceError("a point inside the step is not found")
+            return []
+
+        return TestFunction("UZ", "shy", lambda trial: 1.0, search=search)
+
+    def followed(longest):
+        return trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)},
+                     test_functions=[only_in_steps_below(longest)])  # fmt: skip
+
+    assert str(followed(0.04).stop) == "reached a = 4"
+    lost = followed(0.0)
+    assert (lost.points[-1].label, lost.stop.reason) == ("MX", "no convergence")
+    assert "a point inside the step is not found" in lost.stop.message
+
+
+def test_every_labelled_branch_point_can_be_left():
+    """As AUTO's ``for x in r("BP")``: x (a - x^2) y = ... has the branches x = 0 and x^2 = a; the start of one is no find."""
+
+    def residual(u, p):
+        return u.x * (p.a - u.x**2), u.y * (p.a - 1 - u.y**2)
+
+    problem = AlgebraicProblem(residual, ["x", "y"], {"a": -1.0})
+    rest = trace(solve(problem, [0.0, 0.0]), free=["a"], limits={"a": (-1, 2)})
+    assert [round(point["a"], 9) for point in rest.labelled("BP")] == [0, 1]
+    fork = trace(rest.labelled("BP")[0], branch=1, limits={"a": (-1, 2)})
+    assert (fork.points[0].label, fork.points[0].name) == ("BP", "start")
+    assert [round(point["a"], 9) for point in fork.labelled("BP")] == [1]
+    for point in (*rest.labelled("BP"), *fork.labelled("BP")):
+        assert trace(point, branch=1, limits={"a": (-1, 2)}).stop.reason == "limit"

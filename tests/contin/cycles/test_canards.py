@@ -73,3 +73,63 @@ def test_eigenvalues_with_a_known_vector_split_off():
         found = log_eigenvalues_along(factors, np.array(along))
         assert np.sort_complex(np.exp(found)) == pytest.approx(np.sort_complex(values), rel=1e-9)
         assert np.exp(found) == pytest.approx(np.exp(log_eigenvalues(factors)), rel=1e-9)
+
+
+def fitzhugh_nagumo(u, p):
+    return u.v - u.v**3 / 3 - u.w + p.load, p.eps * (u.v + 0.7 - 0.8 * u.w)
+
+
+#: Canards at both ends; the field is the same with the load 1.75 - load and the states reflected.
+EPS = [
+    0.08095134978416786,  # a fold on which the load changes by less than round-off over a whole step
+    pytest.param(0.06, marks=pytest.mark.full),
+    pytest.param(0.04369, marks=pytest.mark.full),
+    pytest.param(0.03209, marks=pytest.mark.full),
+    pytest.param(0.02, marks=pytest.mark.full),  # 7 s: the steps in the explosions are short
+    pytest.param(0.00935, marks=pytest.mark.full),  # 30 s, likewise
+]
+
+
+@pytest.mark.parametrize("eps", EPS)
+def test_canards_of_fitzhugh_and_nagumo(eps):
+    """Cycles leave a Hopf point backwards, turn in the explosion, and do so again at the other end: HB LP LP HB, both ways.
+
+    Hopf points in closed form: v = -+sqrt(1 - 0.8 eps), frequency sqrt(eps - 0.64 eps^2); folds are each other's images.
+    """
+    problem = AlgebraicProblem(fitzhugh_nagumo, ["v", "w"], {"load": 0.0, "eps": eps})
+    rest = contin.trace(contin.solve(problem, [-1.2, -0.6]), free=["load"], limits={"load": (0, 2)})
+    v = np.array([-1, 1]) * np.sqrt(1 - 0.8 * eps)
+    known = (v + 0.7) / 0.8 - v + v**3 / 3
+    assert [hopf["load"] for hopf in rest.labelled("HB")] == pytest.approx(known.tolist(), abs=1e-11)
+    folds = []
+    for number, hopf in enumerate(rest.labelled("HB")):
+        branch = contin.trace(hopf, branch=1, limits={"load": (0, 2)})
+        assert [point.label for point in branch if point.label] == ["HB", "LP", "LP", "HB"]
+        end = branch.points[-1]
+        assert end["load"] == pytest.approx(known[1 - number], abs=1e-12)
+        assert end["period"] == pytest.approx(2 * np.pi / np.sqrt(eps - 0.64 * eps**2), rel=1e-10)
+        assert end.details["frequency"] == pytest.approx(np.sqrt(eps - 0.64 * eps**2), rel=1e-10)
+        assert max(end.errors.values()) < 1e-10
+        assert str(branch.stop) == "the cycles shrink onto an equilibrium, a Hopf point"
+        first, last = branch.labelled("LP")
+        folds += [first["load"], last["load"]]
+        assert first["load"] + last["load"] == pytest.approx(1.75, abs=1e-8)  # not all errors can be told on a plateau
+    assert folds[:2] == pytest.approx(folds[:1:-1], abs=1e-8)
+
+
+def oregonator(u, p):
+    return (u.x * (1 - u.x) + p.f * (p.q - u.x) / (p.q + u.x) * u.z) / p.eps, u.x - u.z
+
+
+@pytest.mark.parametrize("eps", [0.1, pytest.param(0.05, marks=pytest.mark.full)])
+def test_canards_of_the_oregonator(eps):
+    """Two variables, Tyson & Fife 1980: x spans three powers of ten. Both ways give one fold, and the other Hopf point."""
+    problem = AlgebraicProblem(oregonator, ["x", "z"], {"f": 0.3, "q": 0.004 if eps == 0.1 else 0.01, "eps": eps})
+    rest = contin.trace(contin.solve(problem, [0.7, 0.7]), free=["f"], limits={"f": (0.2, 3.5)})
+    hopfs = rest.labelled("HB")
+    runs = [contin.trace(hopf, branch=1, limits={"f": (0.2, 3.5)}) for hopf in hopfs]
+    for branch, other in zip(runs, hopfs[::-1]):
+        assert [point.label for point in branch if point.label] == ["HB", "LP", "HB"]
+        assert branch.points[-1]["f"] == pytest.approx(other["f"], abs=1e-10)
+        assert branch.points[-1]["period"] == pytest.approx(2 * np.pi / other.details["frequency"], rel=1e-9)
+    assert runs[0].labelled("LP")[0]["f"] == pytest.approx(runs[1].labelled("LP")[0]["f"], abs=1e-7)

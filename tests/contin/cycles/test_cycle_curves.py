@@ -200,3 +200,32 @@ def test_a_stored_torus_bifurcation_starts_a_curve(tmp_path):
 def test_what_is_refused():
     with pytest.raises(contin.ProblemError, match="labelled 'EP' must be one of LP, BP"):
         contin.curve(contin.trace(driven(), free=["mu"], limits={"mu": (-0.1, 0.1)}).points[0], "k")
+
+
+def circuit(u, p):
+    """The oscillator of Freire, Rodriguez-Luis, Gamero & Ponce (1993), with the numbers of AUTO's demo ``tor``."""
+    d = u.y - u.x
+    return (
+        (-(p.be + p.nu) * u.x + p.be * u.y - 0.328578 * u.x**3 + 0.933578 * d**3) / 0.6,
+        p.be * u.x - (p.be - 0.6) * u.y - u.z - 0.933578 * d**3,
+        u.y,
+    )
+
+
+def test_a_curve_of_doublings_does_not_slide_onto_an_equilibrium():
+    """An equilibrium solves the equations of the curve, too, with a period of half a round: not a point of it is one.
+
+    The curve that leaves the first doubling of ``tor`` turns at be = .767089 with cycles of the size .036, where a step used to
+    end with a size of 1e-14. Doublings on AUTO's branch: nu = -.614955.
+    """
+    problem = contin.AlgebraicProblem(circuit, ["x", "y", "z"], {"nu": -0.9, "be": 0.5})
+    rest = contin.trace(contin.solve(problem, [0, 0, 0]), free=["nu"], limits={"nu": (-0.95, -0.55)})
+    limits = {"nu": (-0.62, -0.5), "period": (0, 10)}
+    single = contin.trace(rest.labelled("HB")[0], branch=1, limits=limits, max_points=60)
+    beside = contin.trace(single.labelled("BP")[0], branch=1, limits=limits, max_points=40)
+    (doubling,) = beside.labelled("PD")
+    assert doubling["nu"] == pytest.approx(-0.614955, abs=1e-6)
+    found = contin.curve(doubling, "be", limits={"be": (0.4, 1.5)}, newton=contin.Newton(tolerance=1e-9), max_points=60)
+    assert found.labelled("LP")[0]["be"] == pytest.approx(0.767089, abs=1e-6)
+    for point in found:
+        assert point["max_x"] - point["min_x"] > 0.03

@@ -52,6 +52,24 @@ def test_the_circle_of_the_normal_form():
         assert np.abs(exponents - [0, -4 * math.pi * point["mu"]]).max() < 1e-9
 
 
+@pytest.mark.parametrize("free", [["nu"], ["nu", "period"]])
+def test_cycles_in_another_parameter_than_that_of_the_hopf_point(free):
+    """Both parameters add up: mu = 0.5 stays where the Hopf point was found, at nu = -0.5, and r**2 = 0.5 + nu."""
+
+    def both(u, p):
+        square = u.x**2 + u.y**2
+        growth = p.mu + p.nu - square
+        return growth * u.x - u.y, u.x + growth * u.y
+
+    problem = AlgebraicProblem(both, ["x", "y"], {"mu": 0.0, "nu": -0.5})
+    (hopf,) = contin.trace(contin.solve(problem, [0.0, 0.0]), free=["mu"], limits={"mu": (0, 1)}).labelled("HB")
+    branch = contin.trace(hopf, branch=1, free=free, limits={"nu": (-1, 1)})
+    assert branch.stop.message == "reached nu = 1"
+    for point in branch:
+        assert point["mu"] == pytest.approx(0.5, abs=1e-12)
+        assert point["max_x"] ** 2 == pytest.approx(0.5 + point["nu"], abs=1e-9)
+
+
 def test_a_fold_of_cycles():
     """r' = mu r + r**3 - r**5: both cycles meet at mu = -1/4, r**2 = 1/2; multiplier exp(2 pi r d(growth)/dr)."""
     problem = CycleProblem(bautin, ["x", "y"], {"mu": 1.0})

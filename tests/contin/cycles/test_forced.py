@@ -1,14 +1,17 @@
 """Forced systems: a prescribed period, no phase condition, no multiplier that is 1 by itself."""
 
+import functools
 import math
 
 import numpy as np
 import pytest
 from cycles.noted import compare
+from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
 import contin
 from contin import CycleProblem, MeshControl, ProblemError
+from contin.detection.phase import in_phase
 
 
 def mathieu(t, u, p):
@@ -201,3 +204,60 @@ def test_a_motion_that_does_not_close():
     problem = CycleProblem(two_wells, ["x", "v"], {"w": 1.0, "g": 0.4}, period=around)
     with pytest.raises(ProblemError, match="does not close within 16 periods"):
         contin.cycle(problem, [1.0, 0.0])
+
+
+def forced_van_der_pol(t, u, p):
+    return u.v, 0.5 * (1 - u.x**2) * u.v - u.x + p.b * math.cos(p.w * t)
+
+
+@functools.cache
+def locked():
+    """A cycle of three periods of the forcing, as a simulation settles on it."""
+    period = 2 * math.pi / 2.9
+    run = solve_ivp(
+        lambda t, y: [y[1], 0.5 * (1 - y[0] ** 2) * y[1] - y[0] + 1.5 * math.cos(2.9 * t)], (0, 150 * period), [1.0, 0.0],
+        rtol=1e-8, atol=1e-8, dense_output=True,
+    )  # fmt: skip
+    problem = CycleProblem(forced_van_der_pol, ["x", "v"], {"b": 1.5, "w": 2.9}, period=lambda p: 2 * math.pi / p.w)
+    return contin.solve(problem, lambda t: tuple(run.sol(147 * period + 3 * period * t)), {"rounds": 3})
+
+
+def test_a_loop_of_subharmonics_is_closed_when_it_has_gone_round():
+    """In the tongue 1:3 the branch comes back a period of the forcing later: one loop, with the folds at which locking ends.
+
+    Half way round, at the same frequency, is the other cycle of the tongue, which is unstable.
+    """
+    branch = contin.trace(locked(), free=["w"], limits={"w": (2, 4)}, max_points=400)
+    assert [point.label for point in branch if point.label] == ["EP", "LP", "LP", "EP"]
+    assert branch.stop.reason == "closed"
+    last, first = branch.points[-2], branch.points[0]
+    assert not first.floquet().unstable and not last.floquet().unstable
+    times = np.arange(30) / 30
+    apart = [
+        np.abs(last.system.evaluate(last.x, (times + shift / 3) % 1) - first.system.evaluate(first.x, times)).max()
+        for shift in range(3)
+    ]
+    assert apart[0] > 1 and min(apart) < 0.3
+
+
+@pytest.mark.parametrize(("shift", "sign"), [(0, 1), (1 / 3, 1), (2 / 3, 1), (1 / 6, -1), (1 / 2, -1), (5 / 6, -1)])
+def test_cycles_of_several_rounds_are_brought_in_phase(shift, sign):
+    """The field is odd after half a period of the forcing: -u(t + T / 2) is a cycle where u(t) is one."""
+    point = locked()
+    system, x = point.system, point.x
+    size = system.state_size
+    image = np.append(sign * system.evaluate(x, (system.nodes + shift) % 1).ravel(), x[size:])
+    found, (vector,) = in_phase(system, image, (image,), x)
+    assert np.abs(found - x).max() < 1e-6
+    assert np.array_equal(found, vector)
+
+
+def test_a_field_that_is_not_odd_has_no_mirror_image():
+    """x" + x / 4 = cos(t) + 1: the mean is 4, that of the mirror image would be -4."""
+    problem = CycleProblem(
+        lambda t, u, p: (u.v, -u.x / 4 - p.d * u.v + math.cos(t) + 1), ["x", "v"], {"d": 0.1}, period=2 * math.pi
+    )
+    point = contin.solve(problem, [4.0, 0.0])
+    size = point.system.state_size
+    image = np.append(-point.system.evaluate(point.x, (point.system.nodes + 0.5) % 1).ravel(), point.x[size:])
+    assert np.array_equal(in_phase(point.system, point.x, (), image)[0], point.x)

@@ -42,7 +42,7 @@ def test_folds_beside_a_branch_point(options):
 @pytest.mark.parametrize("step", [0.05, 0.5, 2.0])
 def test_the_first_step_from_a_branch_point_is_inspected(step):
     """Predators: a Hopf point one way and the limit the other way lie within the first step."""
-    point = pp2.prey(1).labelled("BP")[1]
+    point = pp2.prey(1).labelled("BP")[0]
     for sign, expected in ((1, ["HB", "EP"]), (-1, ["EP"])):
         direction = 1 if point.details.tangents[1][1] * sign > 0 else -1
         branch = trace(point, branch=1, direction=direction, limits=pp2.LIMITS, step=step, accuracy=0.5, angle=1.2)

@@ -99,3 +99,9 @@ def test_a_function_with_noise_is_located_to_its_noise(noise):
 def test_a_jump_is_not_taken_for_a_zero_where_the_place_is_to_be_known_better_than_round_off():
     with pytest.raises(ConvergenceError, match="no zero between the two ends"):
         find_zero(lambda x: math.copysign(1 + x, x - 0.3), (0.0, -1.0), (1.0, 2.0), 1e-25)
+
+
+@pytest.mark.parametrize("function", [lambda x: math.copysign(1 + x, x - 0.3), lambda x: 1 / (x - 0.3)])
+def test_a_jump_is_no_zero(function):
+    with pytest.raises(ConvergenceError, match="no zero between"):
+        find_zero(function, (0.0, function(0.0)), (1.0, function(1.0)), 1e-12)

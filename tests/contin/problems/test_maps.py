@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
 
 import contin
 from contin import MapProblem, ProblemError
@@ -37,6 +38,17 @@ def test_the_logistic_map_doubles_its_period():
         assert (doubling["r"], doubling["rounds"]) == pytest.approx((place, 2**number), abs=1e-10)
         if number < 2:
             branch = contin.trace(doubling, branch=1, limits={"r": (1, 3.7)})
+
+
+def test_a_doubling_left_in_another_parameter():
+    """x -> r s x (1 - x) has the doublings r s = 3 and 1 + sqrt(6); r stays 3 along the second branch."""
+    problem = MapProblem(lambda u, p: (p.r * p.s * u.x * (1 - u.x),), ["x"], {"r": 2.0, "s": 1.0})
+    single = contin.trace(contin.solve(problem, [0.5]), free=["r"], limits={"r": (2, 3.4)})
+    double = contin.trace(single.labelled("PD")[0], branch=1, free=["s"], limits={"s": (0.9, 1.2)})
+    (doubling,) = double.labelled("PD")
+    assert (doubling["r"], doubling["s"]) == pytest.approx((3, (1 + math.sqrt(6)) / 3), abs=1e-11)
+    with pytest.raises(ProblemError, match="'q' is not one of"):
+        contin.trace(single.labelled("PD")[0], branch=1, free=["q"])
 
 
 def test_multipliers_of_the_logistic_map():
@@ -82,6 +94,63 @@ def test_a_cycle_of_three():
     cycle = contin.solve(problem, [0.15], {"rounds": 3})
     branch = contin.trace(cycle, free=["r"], direction=-1, limits={"r": (3.82, 3.9)}, max_points=30)
     assert branch.labelled("LP")[0]["r"] == pytest.approx(1 + math.sqrt(8), abs=1e-11)
+
+
+def logistic_iterates(x, r, rounds):
+    """The points of an orbit of the logistic map, and the product of the derivatives over them."""
+    points, product = [], 1.0
+    for _ in range(rounds):
+        points.append(x)
+        x, product = r * x * (1 - x), product * r * (1 - 2 * x)
+    return np.array(points), x, product
+
+
+@pytest.mark.parametrize("which", [8, 11, 16, 18])
+def test_a_cycle_of_32_keeps_to_itself(which):
+    """The stable one at r = 3.569, of which a branch may begin at any point; it doubles where plain arithmetic says.
+
+    In the chaos behind it there are millions of cycles of 32; applied 32 times the map has a slope of -800 at r = 3.6.
+    """
+    points = logistic_iterates(logistic_iterates(0.5, 3.569, 100_000)[1], 3.569, 33)[0]
+
+    def critical(unknown):
+        _, end, product = logistic_iterates(*unknown, 32)
+        return end - unknown[0], product + 1
+
+    known = fsolve(critical, (points[which], 3.5697), xtol=1e-12)
+    problem = MapProblem(lambda u, p: (p.r * u.x * (1 - u.x),), ["x"], {"r": 3.569})
+    branch = contin.trace(contin.solve(problem, [points[which]], {"rounds": 32}), free=["r"], limits={"r": (3.569, 3.6)})
+    assert labels(branch) == ["EP", "PD", "EP"]
+    (doubling,) = branch.labelled("PD")
+    assert (doubling["x"], doubling["r"]) == pytest.approx(tuple(known), abs=1e-10)
+    assert branch.points[-1]["r"] == pytest.approx(3.6, abs=1e-12)
+    for point in branch:
+        orbit, end, product = logistic_iterates(point["x"], point["r"], 32)
+        assert np.abs(orbit - point.system.states(point.x).ravel()).max() < 1e-9
+        assert np.abs(point.system.residual(point.x)).max() < 1e-12
+        assert point.floquet().multipliers[0].real == pytest.approx(product, rel=1e-6)
+
+
+def test_the_error_of_multipliers_of_long_cycles():
+    """A cycle of 256 of the Henon map at the accumulation of doublings: its determinant is (-b)**256 in any case."""
+    problem, b = MapProblem(henon, ["x", "y"], {"a": 1.058, "b": 0.3}), 0.3
+    state = np.zeros(2)
+    for _ in range(200_000):
+        state = 1 - 1.058 * state[0] ** 2 + state[1], b * state[0]
+    point = contin.solve(problem, state, {"rounds": 256})
+    found = point.floquet()
+    assert found.logarithms.real.sum() == pytest.approx(256 * math.log(b), rel=1e-11)
+    assert np.all(found.errors < 1e-6)
+
+
+def test_a_curve_of_folds_of_a_cycle_of_three():
+    """x -> r s x (1 - x): the window of period three opens at r s = 1 + sqrt(8), for any s."""
+    problem = MapProblem(lambda u, p: (p.r * p.s * u.x * (1 - u.x),), ["x"], {"r": 3.84, "s": 1.0})
+    cycle = contin.solve(problem, [0.15], {"rounds": 3})
+    branch = contin.trace(cycle, free=["r"], direction=-1, limits={"r": (3.82, 3.9)}, max_points=30)
+    folds = contin.curve(branch.labelled("LP")[0], "s", limits={"s": (0.9, 1.1)})
+    for point in folds:
+        assert point["r"] * point["s"] == pytest.approx(1 + math.sqrt(8), abs=1e-10)
 
 
 def test_a_stored_doubling_goes_on(tmp_path):
