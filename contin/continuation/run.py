@@ -98,6 +98,10 @@ _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 #: The index on both sides of a special point; None where it is not defined.
 IndexChange = tuple[int | None, int | None]
 
+#: Distance from a first point that is exactly a branch point to where Newton's method begins. Ten times larger, the corrected point
+#: is a thousandth of a usual first step away.
+_BESIDE = 1e-6
+
 
 class Continuation:
     """One run along a branch; iterate over it for the points, then read ``stop``.
@@ -217,13 +221,15 @@ class Continuation:
         fixed = np.zeros(system.size)
         fixed[system.parameter_index(self.primary)] = 1.0
         across = np.random.default_rng(3).standard_normal(system.size) * np.sqrt(system.weights)
-        try:
-            return correct(system, x, fixed, fixed @ x, self.settings.newton, unscaled=True).x, fixed
-        except ConvergenceError as error:
+        failed: ConvergenceError | None = None
+        beside = x + _BESIDE * across / np.abs(across).max()  # of a branch point, where both are singular
+        for start, row in ((x, fixed), (x, across), (beside, across)):
             try:
-                return correct(system, x, across, across @ x, self.settings.newton, unscaled=True).x, across
-            except ConvergenceError:
-                raise error from None
+                return correct(system, start, row, row @ start, self.settings.newton, unscaled=True).x, row
+            except ConvergenceError as error:
+                failed = failed or error
+        assert failed is not None
+        raise failed
 
     # --- the loop ------------------------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ controls are eliminated on the tape; else they are found at each point as the mi
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
@@ -251,6 +252,7 @@ class _Inside:
         """
         tape, v = self.tape, self.variation
         search = search_of(tape, [w.place for w in self.w], [convex.place], v.starts, True)
+        search = dataclasses.replace(search, saddles=True)  # a run says where the energy is not convex
         start = {w.place: tape.constant(value) for w, value in zip(self.w, v.starts)}
         at_start = [Number(tape, place) for place in tape.substitute([search.potential, *search.slopes], start)]
         if not self._probed(at_start):

@@ -426,7 +426,7 @@ def _value(work, at, k, minimum, lane):
 def _begin(work, lists, row, lanes):
     """Put the unknowns of all lanes where their search starts.
 
-    ``lists`` has from ``row`` on: k, 1 for a minimum and 0 for a root, the first instruction of the program for value, gradient
+    ``lists`` has from ``row`` on: k, 0 for a root, 1 for a minimum, 2 for one that may be a saddle, the first instruction of the program for value, gradient
     and matrix, its end, the register described in `_direction` (behind the step: value before, slope, part of the step that is
     tried: -1 at the start, 0 where the search has arrived), and the registers of the starts.
     """
@@ -479,7 +479,7 @@ def _advance(work, lists, row, lanes, scratch):
             work[(step + i) * LANES + lane] = change
             work[(at + i) * LANES + lane] = x + change
             arrived = arrived and change * change <= SETTLED * SETTLED * (SMALLEST + x * x)
-        if arrived and scratch[k - 1, 0] == 0.0:  # a saddle or a maximum
+        if arrived and minimum == 1 and scratch[k - 1, 0] == 0.0:  # a saddle or a maximum
             for i in range(k):
                 work[(at + i) * LANES + lane] = math.nan
         work[part * LANES + lane] = 0.0 if arrived else 1.0

@@ -44,6 +44,8 @@ class Search:
         Lower triangle of the Hessian by rows, or the Jacobian by rows.
     starts : tuple of int
         Where Newton's method starts.
+    saddles : bool
+        Places where the potential is stationary and not convex count, too: what calls the search looks at its Hessian.
     """
 
     minimum: bool
@@ -52,6 +54,7 @@ class Search:
     slopes: tuple[int, ...]
     matrix: tuple[int, ...]
     starts: tuple[int, ...]
+    saddles: bool = False
 
     @property
     def results(self) -> tuple[int, ...]:
@@ -61,7 +64,7 @@ class Search:
     def moved(self, places: Mapping[int, int]) -> Search:
         """Return the same search with other places."""
         tuples = [tuple(places[place] for place in group) for group in (self.unknowns, self.slopes, self.matrix, self.starts)]
-        return Search(self.minimum, tuples[0], places[self.potential], *tuples[1:])
+        return Search(self.minimum, tuples[0], places[self.potential], *tuples[1:], self.saddles)
 
     def entry(self, i: int, j: int) -> int:
         """Return the place of an entry of the matrix."""

@@ -392,7 +392,7 @@ class _Stretch:
         self.most = sub.most
         start, begin = len(shared.lists), len(shared.searches)
         shared.searches += sub.code
-        shared.lists += [k, int(search.minimum), begin, len(shared.searches), at, *starts]
+        shared.lists += [k, int(search.minimum) + int(search.saddles), begin, len(shared.searches), at, *starts]
         shared.begins += [start + 2, start + 3]
         shared.unknowns = max(shared.unknowns, k)
         self.code.append([CODES["root"], at, start, 0, 0])

@@ -132,7 +132,7 @@ class BoundaryValueProblem(Restated):
         ... )
         >>> print(elastica.equations())
         angle' = lam_angle
-        lam_angle' = -(load * sin(angle))
+        lam_angle' = -load * sin(angle)
         0 = angle(0)
         0 = lam_angle(1)
         """
