@@ -226,7 +226,7 @@ def test_a_branch_stops_where_the_law_ends():
 def test_a_branch_on_which_the_energy_has_two_minima():
     """(1, 5), nu = .4, Gamma = 40: the minimum of U - M.omega of the neighbouring places is kept, to the circle at the other end.
 
-    Its kappa_n is the closed form; the folds are those of a search that carries the neighbour's strains along.
+    Its kappa_n is the closed form; the folds are those of `exact_finite_width.curve`, which takes 40 s.
     """
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 5, 0.4, 10, 7, Gamma=40.0)
     ends = convexity.test_functions(FINITE_WIDTH)
@@ -238,7 +238,7 @@ def test_a_branch_on_which_the_energy_has_two_minima():
 
 @pytest.mark.parametrize(("m", "n", "nu", "Gamma", "end"), [(8, 3, 0.0478, 10.21, -59.05), (9, 5, 0.13, 1.719, 0.893)])
 def test_where_the_law_ends_the_margin_says_so(m, n, nu, Gamma, end):
-    """Not before: these are ends of branches on which each place continues from the minimum of its neighbour."""
+    """Not before: `exact_finite_width.curve` is lost at -59.0396 and at .8925."""
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 10, 7, Gamma=Gamma)
     ends = convexity.test_functions(FINITE_WIDTH)
     found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, test_functions=ends), tangent)
