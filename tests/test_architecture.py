@@ -27,6 +27,17 @@ def test_every_file_of_the_engine_is_in_the_table():
     assert files == listed
 
 
+def test_every_kernel_is_in_the_table():
+    listed = sorted(re.findall(r"^\| `(\w+)` \| `([\w/]+\.py)` \|", PAGE, re.M))
+    files = [file for file in PACKAGE.rglob("*.py") if file.name != "kernel.py"]  # its docstring has an example
+    kernels = [
+        (name, file.relative_to(PACKAGE).as_posix())
+        for file in files
+        for name in re.findall(r"^@kernel(?:\(.*\))?\ndef (\w+)", file.read_text(), re.M)
+    ]
+    assert sorted(kernels) == listed
+
+
 @pytest.mark.parametrize("file, name", STEPS)
 def test_every_step_is_where_the_page_says(file, name):
     text = (PACKAGE / file).read_text()
