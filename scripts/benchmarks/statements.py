@@ -395,13 +395,12 @@ problem = contin.VariationalProblem(
     ends=lambda a, b, p: (a.y, b.y))
 found = contin.solve(problem, lambda t: [t * (1 - t)])
 """, "abs(u(0.5)[0] - QUARTIC) < 1e-8"),
-    Statement("Sadowsky's strip, two controls by iteration", """
+    Statement("strip, two controls by iteration", """
 def bending(t, x, w, p):
-    return (w.k**2 + w.tau**2) ** 2 / w.k**2 / 2 - p.moment * x.angle - p.torque * x.twist
+    return (w.k**2 + w.tau**2) / 2 + (w.k * w.tau) ** 2 / 4 + w.tau**4 / 4 - p.moment * x.angle - p.torque * x.twist
 problem = contin.VariationalProblem(
     energy=bending, states=["angle", "twist"], parameters={"moment": 0.5, "torque": 0.2},
-    kinematics=lambda t, x, w, p: (w.k, w.tau), controls=["k", "tau"], starts={"k": 1.0},
-    ends=lambda a, b, p: (a.angle, a.twist, b.angle - 1, b.twist))
+    kinematics=lambda t, x, w, p: (w.k, w.tau), controls=["k", "tau"], ends=lambda a, b, p: (a.angle, a.twist, b.angle - 1, b.twist))
 found = contin.solve(problem, lambda t: (t, 0))
 """, "abs(u(1)[0] - 1) < 1e-9 and u(0.5)[1] > 0 and u(0.5)[0] > 0.5"),
 )  # fmt: skip
