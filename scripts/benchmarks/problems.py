@@ -43,7 +43,11 @@ def run(quick: bool, before: str | None = None, before_python: str = sys.executa
         versions["before"] = (before_python, str(Path(before).resolve()))
     firsts = _in_turn("first_solutions", versions, 1 if quick else 3)
     slopes = _in_turn("evaluations", versions, 1 if quick else 3)
-    return {"first": _joined(firsts), "ns": _joined(slopes), "versions": {name: _commit(at) for name, (_, at) in versions.items()}}
+    return {
+        "first": _joined(firsts),
+        "ns": _joined(slopes),
+        "versions": {name: _commit(at) for name, (_, at) in versions.items()},
+    }
 
 
 def _in_turn(what: str, versions: dict[str, tuple[str, str]], repeats: int) -> dict[str, list[dict]]:
@@ -177,7 +181,13 @@ def _of_laws() -> Iterator[tuple[str, Any, Any, Any, Any]]:
             system = domain.discretize(law, 40, 4, law.defaults | {"kappa_n": 0.5})
             x = domain.circle(system, 1, 0.5)
             u = np.ascontiguousarray(system.states(x)[:POINTS])
-            yield f"{law.name}, {forces}", system.problem, np.ascontiguousarray(system.nodes[:POINTS]), u, system.parameters_at(x)
+            yield (
+                f"{law.name}, {forces}",
+                system.problem,
+                np.ascontiguousarray(system.nodes[:POINTS]),
+                u,
+                system.all_parameters(x),
+            )
 
 
 # --- the tables -------------------------------------------------------------------------------------------------------------
@@ -187,9 +197,17 @@ def table(results: dict) -> str:
     """Return the results as Markdown."""
     both = "before" in results["versions"]
     versions = ", ".join(f"{name}: {commit}" for name, commit in results["versions"].items())
-    lines = [*_summary(results["first"], both), "", "| first solution of | now |" + (" before | before / now |" if both else "")]
+    lines = [
+        *_summary(results["first"], both),
+        "",
+        "| first solution of | now |" + (" before | before / now |" if both else ""),
+    ]
     lines += ["|---|---|" + ("---|---|" if both else ""), *(_line(row, both, "ms", 1e3) for row in results["first"])]
-    lines += ["", "| f and J | now |" + (" before | before / now |" if both else ""), "|---|---|" + ("---|---|" if both else "")]
+    lines += [
+        "",
+        "| f and J | now |" + (" before | before / now |" if both else ""),
+        "|---|---|" + ("---|---|" if both else ""),
+    ]
     lines += [_line(row, both, "ns", 1.0) for row in results["ns"]]
     return "\n".join([*lines, "", f"Commits: {versions}. Times are processor times."])
 
@@ -208,7 +226,9 @@ def _summary(rows: list[dict], both: bool) -> list[str]:
 
 
 def _line(row: dict, both: bool, unit: str, factor: float) -> str:
-    cells = [f"{factor * row[version]:.0f} {unit}" if row[version] is not None else "–" for version in ("now", "before")[: 1 + both]]
+    cells = [
+        f"{factor * row[version]:.0f} {unit}" if row[version] is not None else "–" for version in ("now", "before")[: 1 + both]
+    ]
     if both:
         cells.append(f"{row['before'] / row['now']:.1f}" if row["now"] and row["before"] else "–")
     return f"| {row['name']} | {' | '.join(cells)} |"
