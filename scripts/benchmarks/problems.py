@@ -1,9 +1,9 @@
 """New problems: processor time from the statement to the first solution, and ns a point for f and its Jacobian.
 
 Kernels of the engine are compiled before. A process solves every program of `benchmarks.statements` once, which loads modules,
-and then again with functions that it has not seen: they are made by ``exec``, and the name of their argument p is a new one each
-time, so nothing that was kept for other functions serves them. With ``--before`` an earlier version of contin runs the same
-programs, in turns with this one. Processor times count, so other programs of the machine hardly matter.
+and then again with functions that it has not seen: they are made by ``exec``, and a name in them is a new one each time, so that
+nothing that was kept for other functions serves them. With ``--before`` an earlier version of contin runs the same programs, in
+turns with this one. Times are processor times, so that other programs hardly matter.
 """
 
 from __future__ import annotations
@@ -30,8 +30,12 @@ from benchmarks.statements import LARGE, NEWCOMERS, VARIATIONAL, Statement
 GROUPS = {"docs/outside.md": NEWCOMERS, "variational": VARIATIONAL, "large": LARGE}
 #: Seconds after which a program is not run a second time: loading modules is then a small part of it.
 LONG = 5.0
+#: Seconds up to which the median of three runs counts.
+SHORT = 1.0
 #: Points of a 40 x 4 mesh.
 POINTS = 160
+#: Most states of a vector field of the bank whose cycles are evaluated: larger ones are grids, whose steady states are followed.
+FEW = 5
 #: Calls whose median counts: 160 points take 2 to 600 us.
 CALLS = 200
 
@@ -91,7 +95,9 @@ def first_solutions() -> dict[str, float | None]:
 def _seconds(statement: Statement) -> float | None:
     try:
         first = time_of(statement, 0)
-        return first if first > LONG else time_of(statement, 1)
+        if first > LONG:
+            return first
+        return median(time_of(statement, number + 1) for number in range(1 if first > SHORT else 3))
     except Exception as error:  # an earlier version may fail in any way; the row says that it did
         print(f"{statement.name}: {type(error).__name__}: {error}", file=sys.stderr)
         return None
@@ -109,7 +115,7 @@ def time_of(statement: Statement, number: int) -> float:
 
     scope: dict[str, Any] = {"np": np, "math": math, "contin": contin}
     exec(statement.setup, scope)
-    code = compile(renamed(statement.text, f"p_{os.getpid()}_{number}"), f"<{statement.name}, {number}>", "exec")
+    code = compile(renamed(statement, f"_{os.getpid()}_{number}"), f"<{statement.name}, {number}>", "exec")
     began = time.process_time()
     exec(code, scope)
     seconds = time.process_time() - began
@@ -120,9 +126,11 @@ def time_of(statement: Statement, number: int) -> float:
     return seconds
 
 
-def renamed(text: str, name: str) -> str:
-    """Return a program with another name in place of p (attributes and strings stay)."""
-    return re.sub(r"(?<![\w.\"'])p(?![\w\"'])", name, text)
+def renamed(statement: Statement, end: str) -> str:
+    """Return the text with another name in the place of the statement's word; as an argument p, it stays in strings."""
+    if statement.word in ("p", "par"):
+        return re.sub(rf"(?<![\w.\"']){statement.word}(?![\w\"'])", statement.word + end, statement.text)
+    return re.sub(rf"\b{statement.word}\b", statement.word + end, statement.text)
 
 
 def known() -> dict[str, Any]:
@@ -156,7 +164,7 @@ def _nanoseconds(problem: Any, t: Any, u: Any, p: Any) -> float | None:
 
 
 def _of_bank() -> Iterator[tuple[str, Any, Any, Any, Any]]:
-    """The boundary value problems and cycles of the test bank, at points near states of .5."""
+    """The boundary value problems of the test bank, and cycles of its small vector fields, at states near .5."""
     import contin
 
     sys.path.insert(0, str(Path(contin.__file__).parent.parent / "tests" / "contin"))
@@ -165,9 +173,12 @@ def _of_bank() -> Iterator[tuple[str, Any, Any, Any, Any]]:
     for module in (importlib.import_module(f"bank.{name}") for name in (*table.BANK, *table.OUTSIDE)):
         for name, value in vars(module).items():
             problem = value() if name == "problem" else value
-            if isinstance(problem, contin.BoundaryValueProblem) and not getattr(problem, "free_names", ()):
+            title = module.__name__.removeprefix("bank.") + ("" if name == "problem" else f": {name.lower()}")
+            if isinstance(problem, contin.AlgebraicProblem) and problem.dynamics and len(problem.state_names) <= FEW:
+                title += ", cycle"
+                problem = contin.CycleProblem(problem.residual, problem.state_names, problem.parameters)
+            if isinstance(problem, contin.BoundaryValueProblem):
                 n, p = len(problem.state_names), np.array(list(problem.parameters.values()), dtype=float)
-                title = module.__name__.removeprefix("bank.") + ("" if name == "problem" else f": {name.lower()}")
                 yield title, problem, np.linspace(*problem.domain, POINTS), random.uniform(0.3, 0.7, (POINTS, n)), p
 
 

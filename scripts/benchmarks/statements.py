@@ -1,8 +1,8 @@
 """Programs that state a problem and find its first solution, as text: each run makes their functions anew.
 
-The thirty problems are those of docs/outside.md, in the style of their authors, up to the first solution; where the known answer
-there is a bifurcation, the check is of a state that is known in closed form or by SciPy's ``solve_bvp``. Ten are variational, and
-four are large. In every text ``p`` and ``np``, ``math``, ``contin`` stand for the same; the solution is ``found``.
+The thirty problems are those of docs/outside.md, in the style of their authors, up to the first solution; where the known
+answer there is a bifurcation, the check is of a state that is known in closed form or by SciPy. Ten are variational, and four are
+large. Every text ends with its solution, ``found``.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from typing import NamedTuple
 class Statement(NamedTuple):
     """A program: ``setup`` is not timed, ``text`` is, ``check`` is an expression that is true for the right solution.
 
-    In ``check``, ``u(t)`` is the states of the solution at t.
+    In ``check``, ``u(t)`` is the states of the solution at t. ``word`` is a name in the text that is another one in each run.
     """
 
     name: str
     text: str
     check: str
     setup: str = ""
+    word: str = "p"
 
 
 NEWCOMERS = (
@@ -55,7 +56,10 @@ class Disk:
         return a[0], a[2] - self.spin, a[4], b[0] - p.outer, b[2]
 disk = Disk()
 problem = contin.BoundaryValueProblem(disk.rates, disk.ends, ["F", "dF", "G", "dG", "H"], {"outer": 0.0}, domain=(0, 16))
-found = contin.solve(problem, lambda x: (x * math.exp(-x) / 2, (1 - x) * math.exp(-x) / 2, math.exp(-x), -math.exp(-x), -0.9 + 0.9 * math.exp(-x)))
+def guess(x):
+    e = math.exp(-x)
+    return x * e / 2, (1 - x) * e / 2, e, -e, 0.9 * e - 0.9
+found = contin.solve(problem, guess)
 """, "abs(u(0)[1] - 0.510233) < 1e-5 and abs(u(0)[3] + 0.615922) < 1e-5"),
     Statement("5 Jeffery-Hamel flow", """
 def rhs(y, f, p):
@@ -71,7 +75,8 @@ found = contin.solve(problem, lambda y: (1 - y**2, -2 * y), free=["c"])
 EPS0, AREA, STIFFNESS, GAP = 8.854187812e-12, 1e-8, 5.0, 2e-6
 def residual(u, p):
     return np.array([STIFFNESS * u[0] - EPS0 * AREA * p["V"] ** 2 / (2 * (GAP - u[0]) ** 2)])
-problem = contin.AlgebraicProblem(residual, ["x"], {"V": math.sqrt(2 * STIFFNESS * GAP / 6 * (GAP * 5 / 6) ** 2 / (EPS0 * AREA))})
+volts = math.sqrt(2 * STIFFNESS * GAP / 6 * (GAP * 5 / 6) ** 2 / (EPS0 * AREA))
+problem = contin.AlgebraicProblem(residual, ["x"], {"V": volts})
 found = contin.solve(problem, [0.0])
 """, "abs(found.x[0] / 2e-6 - 1 / 6) < 1e-5"),
     Statement("7 pull-in of a beam", """
@@ -232,7 +237,8 @@ def residual(u, p):
     return A @ u / p.lam + u - u**3
 problem = contin.AlgebraicProblem(residual, n, {"lam": 40.0})
 found = contin.solve(problem, list(0.9 * np.sin(np.pi * h * np.arange(1, n + 1))))
-""", "np.abs(A @ found.x / 40 + found.x - found.x**3).max() < 1e-8 and 0.5 < found.x[249] < 1", "import scipy.sparse as sparse"),
+""", "np.abs(A @ found.x / 40 + found.x - found.x**3).max() < 1e-8 and 0.5 < found.x[249] < 1",
+        "import scipy.sparse as sparse"),
     Statement("24 Swift-Hohenberg", """
 def rhs(t, u, p):
     return u.b, u.c, u.d, (p.r - 1) * u.a - 2 * u.c + 1.6 * u.a**2 - u.a**3
@@ -272,8 +278,8 @@ def rhs(x, u, p):
 def gauss(x):
     psi = math.exp(-((x / size) ** 2) / 2) / math.sqrt(size * math.sqrt(math.pi))
     return psi, -x / size**2 * psi
-problem = contin.BoundaryValueProblem(rhs, lambda a, b, p: (a.psi, b.psi), ["psi", "slope"], {"mu": hbar * omega * 0.45, "g": 0.0},
-    integrals=lambda x, u, p: u.psi**2 - 1 / (14 * size), domain=(-7 * size, 7 * size))
+problem = contin.BoundaryValueProblem(rhs, lambda a, b, p: (a.psi, b.psi), ["psi", "slope"],
+    {"mu": hbar * omega * 0.45, "g": 0.0}, integrals=lambda x, u, p: u.psi**2 - 1 / (14 * size), domain=(-7 * size, 7 * size))
 found = contin.solve(problem, gauss, free=["mu"])
 """, "abs(found['mu'] / (1.054571817e-34 * 2 * math.pi * 100) - 0.5) < 1e-9"),
     Statement("28 Orr-Sommerfeld", """
@@ -323,7 +329,7 @@ def func(t, u, par):
     return f
 problem = contin.BoundaryValueProblem(func, lambda a, b, par: (a[1], b[1]), ["u", "v"], {"lam": 15.0})
 found = contin.solve(problem, lambda t: (1.6 * math.cos(math.pi * t), -1.6 * math.pi * math.sin(math.pi * t)))
-""", "abs(PENDULUM(u(0)[0]) / math.sqrt(15) - 1) < 1e-8"),
+""", "abs(PENDULUM(u(0)[0]) / math.sqrt(15) - 1) < 1e-8", word="par"),
 )  # fmt: skip
 
 VARIATIONAL = (
@@ -332,12 +338,12 @@ problem = contin.VariationalProblem(
     energy=lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle), states=["angle"], parameters={"load": 50.0},
     ends=lambda a, b, p: (a.angle, b.angle), integrals={"offset": lambda t, x, w, p: math.sin(x.angle)})
 found = contin.solve(problem, lambda t: [1.3 * math.sin(2 * math.pi * t)])
-""", "abs(2 * PENDULUM(u(0.25)[0]) / math.sqrt(50) - 1) < 1e-8"),
+""", "abs(2 * PENDULUM(u(0.25)[0]) / math.sqrt(50) - 1) < 1e-8", word="load"),
     Statement("elastica, pinned", """
 problem = contin.VariationalProblem(
     energy=lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle), states=["angle"], parameters={"load": 15.0})
 found = contin.solve(problem, lambda t: [1.6 * math.cos(math.pi * t)])
-""", "abs(PENDULUM(u(0)[0]) / math.sqrt(15) - 1) < 1e-8"),
+""", "abs(PENDULUM(u(0)[0]) / math.sqrt(15) - 1) < 1e-8", word="load"),
     Statement("rod in space, three controls", """
 def turning(t, x, w, p):
     return (-0.5 * (x.q1 * w.k1 + x.q2 * w.k2 + x.q3 * w.k3), 0.5 * (x.q0 * w.k1 + x.q2 * w.k3 - x.q3 * w.k2),
@@ -351,21 +357,21 @@ problem = contin.VariationalProblem(
     integrals={"sideways": lambda t, x, w, p: 2 * (x.q1 * x.q3 + x.q0 * x.q2),
         "across": lambda t, x, w, p: 2 * (x.q2 * x.q3 - x.q0 * x.q1)})
 found = contin.solve(problem, lambda t: (math.cos(5 * t), 0, 0, math.sin(5 * t)))
-""", "abs(found['energy'] - 40) < 1e-8"),
+""", "abs(found['energy'] - 40) < 1e-8", word="turn"),
     Statement("catenoid", """
 problem = contin.VariationalProblem(
     energy=lambda t, x, w, p: x.r * math.sqrt(p.gap**2 + w.r**2), states=["r"], parameters={"gap": 0.8},
     ends=lambda a, b, p: (a.r - 1, b.r - 1))
 found = contin.solve(problem, [1.0])
-""", "abs(u(0.5)[0] * math.cosh(0.4 / u(0.5)[0]) - 1) < 1e-9"),
+""", "abs(u(0.5)[0] * math.cosh(0.4 / u(0.5)[0]) - 1) < 1e-9", word="gap"),
     Statement("catenary of given length", """
 def stretch(w, p):
     return math.sqrt(p.span**2 + w.y**2)
 problem = contin.VariationalProblem(
-    energy=lambda t, x, w, p: (x.y + p.height) * stretch(w, p), states=["y"], parameters={"span": 1.0, "length": 1.2, "height": 2.0},
-    ends=lambda a, b, p: (a.y, b.y), integrals={"length": lambda t, x, w, p: stretch(w, p) - p.length})
+    energy=lambda t, x, w, p: (x.y + p.height) * stretch(w, p), states=["y"],
+    parameters={"span": 1.0, "length": 1.2, "height": 2.0}, ends=lambda a, b, p: (a.y, b.y), integrals={"length": lambda t, x, w, p: stretch(w, p) - p.length})
 found = contin.solve(problem, lambda t: [-1.0 * t * (1 - t)])
-""", "abs(u(0.5)[0] - CATENARY) < 1e-7"),
+""", "abs(u(0.5)[0] - CATENARY) < 1e-7", word="span"),
     Statement("geodesic on a hill", """
 def height(x, p):
     return p.h * math.exp(-(x.x**2) - x.y**2)
@@ -376,33 +382,34 @@ problem = contin.VariationalProblem(
     energy=pace, states=["x", "y"], parameters={"h": 0.5}, kinematics=lambda t, x, w, p: (w.vx, w.vy), controls=["vx", "vy"],
     ends=lambda a, b, p: (a.x + 2, a.y - 0.5, b.x - 2, b.y - 0.5))
 found = contin.solve(problem, lambda t: (4 * t - 2, 0.5 + 0.5 * math.sin(math.pi * t)))
-""", "8 < found['energy'] < 8.6 and u(0.5)[1] > 0.5 and abs(u(0.5)[0]) < 1e-9"),
+""", "8 < found['energy'] < 8.6 and u(0.5)[1] > 0.5 and abs(u(0.5)[0]) < 1e-9", word="h"),
     Statement("Dido: area against length", """
 problem = contin.VariationalProblem(
     energy=lambda t, x, w, p: math.sqrt(1 + w.y**2) * p.tension - x.y, states=["y"], parameters={"tension": 1.0},
     ends=lambda a, b, p: (a.y, b.y))
 found = contin.solve(problem, lambda t: [0.5 * t * (1 - t)])
-""", "abs(u(0.5)[0] - (1 - math.sqrt(0.75))) < 1e-9"),
+""", "abs(u(0.5)[0] - (1 - math.sqrt(0.75))) < 1e-9", word="tension"),
     Statement("bar with energy at its end", """
 problem = contin.VariationalProblem(
     energy=lambda t, x, w, p: w.y**2 / 2 - p.weight * x.y, states=["y"], parameters={"weight": 1.0, "k": 2.0},
     ends=lambda a, b, p: (a.y,), end_energy=lambda a, b, p: p.k * b.y**2 / 2 + b.y**4 / 4)
 found = contin.solve(problem, [0.1])
-""", "abs(3 * u(1)[0] + u(1)[0] ** 3 - 0.5) < 1e-9"),
+""", "abs(3 * u(1)[0] + u(1)[0] ** 3 - 0.5) < 1e-9", word="weight"),
     Statement("quartic energy, found by iteration", """
 problem = contin.VariationalProblem(
     energy=lambda t, x, w, p: w.y**2 / 2 + w.y**4 / 4 - p.f * x.y, states=["y"], parameters={"f": 2.0},
     ends=lambda a, b, p: (a.y, b.y))
 found = contin.solve(problem, lambda t: [t * (1 - t)])
-""", "abs(u(0.5)[0] - QUARTIC) < 1e-8"),
+""", "abs(u(0.5)[0] - QUARTIC) < 1e-8", word="f"),
     Statement("strip, two controls by iteration", """
 def bending(t, x, w, p):
     return (w.k**2 + w.tau**2) / 2 + (w.k * w.tau) ** 2 / 4 + w.tau**4 / 4 - p.moment * x.angle - p.torque * x.twist
 problem = contin.VariationalProblem(
     energy=bending, states=["angle", "twist"], parameters={"moment": 0.5, "torque": 0.2},
-    kinematics=lambda t, x, w, p: (w.k, w.tau), controls=["k", "tau"], ends=lambda a, b, p: (a.angle, a.twist, b.angle - 1, b.twist))
+    kinematics=lambda t, x, w, p: (w.k, w.tau), controls=["k", "tau"],
+    ends=lambda a, b, p: (a.angle, a.twist, b.angle - 1, b.twist))
 found = contin.solve(problem, lambda t: (t, 0))
-""", "abs(u(1)[0] - 1) < 1e-9 and u(0.5)[1] > 0 and u(0.5)[0] > 0.5"),
+""", "abs(u(1)[0] - 1) < 1e-9 and u(0.5)[1] > 0 and u(0.5)[0] > 0.5", word="moment"),
 )  # fmt: skip
 
 LARGE = (
