@@ -1,7 +1,7 @@
 """Time contin and other tools on your machine: pictures, a table of ratios, and every number as JSON.
 
-    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [cycles] [defaults]
-                            [--quick] [--out DIR]
+    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [cycles] [defaults] [problems]
+                            [--quick] [--out DIR] [--before DIR]
 
 Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A tool
 that is not installed is left out, and the output names it. See docs/performance.md.
@@ -23,7 +23,7 @@ from benchmarks.measure import ONE_THREAD  # noqa: E402  (it imports nothing tha
 
 os.environ.update(ONE_THREAD)
 
-PARTS = ("like-for-like", "fold", "cost", "startup", "many", "stress", "cores", "cycles", "defaults")
+PARTS = ("like-for-like", "fold", "cost", "startup", "many", "stress", "cores", "cycles", "defaults", "problems")
 
 
 def arguments(argv=None) -> argparse.Namespace:
@@ -40,10 +40,18 @@ def arguments(argv=None) -> argparse.Namespace:
     parser.add_argument(
         "--bifpy-python", metavar="PATH", default=sys.executable, help="a Python interpreter with bifpy (default: this one)"
     )
+    parser.add_argument(
+        "--before", metavar="DIR", help="a checkout of an earlier version, which `problems` times in turns with this one"
+    )
+    parser.add_argument(
+        "--before-python", metavar="PATH", default=sys.executable, help="a Python interpreter for it (default: this one)"
+    )
     options = parser.parse_args(argv)
     for part in options.parts:
         if part not in PARTS:
             parser.error(f"PART {part!r}: must be one of {', '.join(PARTS)}")
+    if options.before and not (Path(options.before) / "contin").is_dir():
+        parser.error(f"--before {options.before!r}: must be a folder with contin in it")
     if options.page and not Path(options.page).is_file():
         parser.error(f"--page {options.page!r}: must be an existing file")
     if Path(options.out).exists() and not Path(options.out).is_dir():
@@ -51,12 +59,15 @@ def arguments(argv=None) -> argparse.Namespace:
     return options
 
 
-def measure(part: str, quick: bool, bifpy_python: str) -> dict:
+def measure(part: str, options: argparse.Namespace) -> dict:
     """Run one part."""
-    from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, startup, stress
+    from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, startup, stress
 
     from ribbon_model import exact
 
+    quick, bifpy_python = options.quick, options.bifpy_python
+    if part == "problems":
+        return problems.run(quick, options.before, options.before_python)
     if part == "cost":
         return cost.run(quick)
     if part == "startup":
@@ -88,7 +99,7 @@ def main(argv=None) -> int:
     for part in options.parts or PARTS:
         began = time.perf_counter()
         print(f"{part} ...", end=" ", flush=True)
-        results[part] = measure(part, options.quick, options.bifpy_python)
+        results[part] = measure(part, options)
         print(f"{time.perf_counter() - began:.0f} s\n\n{report.markdown(results)[part]}\n")
         (out / "bench.json").write_text(json.dumps(results, indent=1))
     (out / "bench.md").write_text(report.page(results), encoding="utf-8")

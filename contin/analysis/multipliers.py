@@ -66,36 +66,36 @@ def _fitted(system: Collocation, states: Array) -> Array:
 def _settled(system: Collocation, states: Array, start: tuple[Array, Array], share: float) -> tuple[Array, Array]:
     """Return the multipliers after damped Gauss-Newton steps, all but the rates of the states weighted by ``share``."""
     lam, multipliers = start
-    residual, jacobian = _equations(system, states, lam, multipliers, share)
+    residual, gradient, normal = _equations(system, states, lam, multipliers, share)
     if not np.all(np.isfinite(residual)):
         raise ProblemError("guess: the equations have no finite value there (look for what divides by zero, or at `starts`)")
     for _ in range(_STEPS):
-        if not np.any(jacobian):
+        if not np.any(normal):
             break
-        normal = jacobian.T @ jacobian
         normal[np.diag_indices_from(normal)] += _LITTLE * np.trace(normal)
-        step = np.linalg.solve(normal, -(jacobian.T @ residual))
+        step = np.linalg.solve(normal, -gradient)
         part = 1.0
         for _ in range(_HALVINGS):
             new_lam = lam + part * step[: lam.size].reshape(lam.shape)
             new_multipliers = multipliers + part * step[lam.size :]
             new = _equations(system, states, new_lam, new_multipliers, share)
-            if np.all(np.isfinite(new[1])) and np.linalg.norm(new[0]) <= np.linalg.norm(residual):
+            if np.all(np.isfinite(new[2])) and np.linalg.norm(new[0]) <= np.linalg.norm(residual):
                 break
             part /= 2
         else:
             break
         gained = np.linalg.norm(residual) - np.linalg.norm(new[0])
-        lam, multipliers, (residual, jacobian) = new_lam, new_multipliers, new
+        lam, multipliers, (residual, gradient, normal) = new_lam, new_multipliers, new
         if gained <= _SETTLED * np.linalg.norm(residual) or np.linalg.norm(residual) < _SETTLED:
             break
     return lam, multipliers
 
 
-def _equations(system: Collocation, states: Array, lam: Array, multipliers: Array, share: float) -> tuple[Array, Array]:
-    """Return the residual of all equations, and its derivatives by lam (K, n), flattened, and the multipliers.
+def _equations(system: Collocation, states: Array, lam: Array, multipliers: Array, share: float) -> tuple[Array, Array, Array]:
+    """Return the residual r of all equations, J.T r and J.T J, with J the derivatives by lam (K, n), flattened, and multipliers.
 
-    All but the rates of the states are multiplied by ``share``.
+    All but the rates of the states are multiplied by ``share``. J.T J is added up interval by interval, without J itself, which
+    has few entries that are not zero.
     """
     problem: Any = system.problem
     assert isinstance(problem, VariationalProblem)
@@ -112,25 +112,23 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
     field, by = batch.jacobian(system.gauss_times, points.reshape(-1, 2 * n), u[:0], p, batch.columns(places))
     field, by = field.reshape(count, d, -1), by.reshape(count, d, field.shape[-1], -1)
     weights = np.sqrt(h[:, None] * basis.weights)
-    size = lam.size
-    rows = np.zeros((count, d, 2 * n, size + len(places)))
-    for e in range(count):
-        for j in range(d + 1):
-            at = n * (e * d + j)
-            rows[e, :, :, at : at + n] -= by[e, :, : 2 * n, n : 2 * n] * basis.value[:, j, None, None]
-            rows[e, :, n:, at : at + n] += np.eye(n) * basis.slope[:, j, None, None] / h[e]
-    rows[:, :, :, size:] -= by[:, :, : 2 * n, 2 * n :]
     residual = (rates - field[:, :, : 2 * n]) * weights[:, :, None]
-    rows *= weights[:, :, None, None]
     residual[:, :, n:] *= share if np.all(np.isfinite(residual)) else 1.0
+    rows = -np.einsum("eirk,ij->eirjk", by[:, :, : 2 * n, n : 2 * n], basis.value)
+    rows[:, :, n:] += np.einsum("rk,ij,e->eirjk", np.eye(n), basis.slope, 1 / h)
+    rows = np.concatenate([rows.reshape(count, d, 2 * n, -1), -by[:, :, : 2 * n, 2 * n :]], axis=-1)
+    rows *= weights[:, :, None, None]
     rows[:, :, n:] *= share
     ends = problem.batch("boundary")
     value, by_ends = ends.jacobian(np.zeros(1), u[:1], u[-1:], p, ends.columns(places))
-    last = np.zeros((len(by_ends[0]), size + len(places)))
-    last[:, :n] += by_ends[0][:, n : 2 * n]
-    last[:, size - n : size] += by_ends[0][:, 3 * n : 4 * n]
-    last[:, size:] = by_ends[0][:, 4 * n :]
-    return (
-        np.concatenate([residual.ravel(), share * value[0]]),
-        np.vstack([rows.reshape(-1, size + len(places)), share * last]),
-    )  # fmt: skip
+    last = share * np.hstack([by_ends[0][:, n : 2 * n], by_ends[0][:, 3 * n :]])
+    of_multipliers = lam.size + np.arange(len(places))
+    parts = [(residual[e].ravel(), rows[e].reshape(2 * n * d, -1), n * d * e + np.arange(n * (d + 1))) for e in range(count)]
+    parts.append((share * value[0], last, np.r_[0:n, lam.size - n : lam.size]))
+    gradient, normal = np.zeros(lam.size + len(places)), np.zeros((lam.size + len(places),) * 2)
+    with np.errstate(invalid="ignore"):  # the caller looks for values that are not finite
+        for part, block, columns in parts:
+            at = np.r_[columns, of_multipliers]
+            gradient[at] += block.T @ part
+            normal[np.ix_(at, at)] += block.T @ block
+    return np.concatenate([part for part, _, _ in parts]), gradient, normal

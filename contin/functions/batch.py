@@ -185,7 +185,7 @@ class Batch:
         if self.interpreted is not None:
             rows, places = self.interpreted.entries_of(inputs)
         else:
-            entries = self._slopes(inputs)[1]
+            entries = list(self._jacobian_entries(inputs))
             rows, places = (np.array([entry[side] for entry in entries], dtype=np.int64) for side in (0, 1))
         return Columns(np.array(inputs, dtype=np.int64), rows, places)
 

@@ -68,6 +68,7 @@ class Interpreted:
     ) -> None:
         self._functions, self._counts, self._signature, self.reason = tuple(functions), tuple(counts), signature, reason
         self._tuples = [None if names is None else named_values(tuple(names)) for names in signature.arguments]
+        self._fills = [signature.fills(function) for function in self._functions]
         self._for_arrays: dict[int, bool] = {}
         self._complex: bool | None = None
         self._pattern = pattern
@@ -261,13 +262,13 @@ class Interpreted:
         """Return the values of a function called once with arrays of places, shape (places, count)."""
         count = max(self._counts[index], 1)
         result = self._called(index, t, np.ascontiguousarray(x.T), (count, len(x)))
-        rows = result if self._counts[index] or self._signature.fills(self._functions[index]) else (result,)
+        rows = result if self._counts[index] or self._fills[index] else (result,)
         return np.stack([np.broadcast_to(np.asarray(row), (len(x),)) for row in rows], axis=1)
 
     def _at_one(self, index: int, t: Any, x: Array) -> Array:
         """Return the values of a function at one place; NaN where they are not defined."""
         count = max(self._counts[index], 1)
-        numbers = x if self._signature.fills(self._functions[index]) else x.tolist()
+        numbers = x if self._fills[index] else x.tolist()
         try:
             result = np.asarray(self._called(index, float(t), numbers, (count,))).reshape(-1)
             if result.size != count or result.dtype.kind not in "iufcb":
@@ -287,7 +288,7 @@ class Interpreted:
     def _called(self, index: int, t: Any, x: Any, shape: tuple[int, ...]) -> Any:
         """Call a function with t, and groups of the inputs x as named tuples; or as arrays, if it fills one."""
         function, place, arguments = self._functions[index], 0, []
-        fills = self._signature.fills(function)
+        fills = self._fills[index]
         for kind in self._tuples:
             if kind is None:
                 arguments.append(t)

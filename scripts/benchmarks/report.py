@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, startup, stress
+from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, startup, stress
 
 TITLES = {
     "like-for-like": "Like for like",
@@ -19,6 +19,7 @@ TITLES = {
     "cores": "Two cores",
     "cycles": "Cycles",
     "defaults": "Default degree",
+    "problems": "New problems",
 }
 TABLES = {
     "like-for-like": like_for_like.table,
@@ -30,6 +31,7 @@ TABLES = {
     "cores": cores.table,
     "cycles": cycles.table,
     "defaults": defaults.table,
+    "problems": problems.table,
 }
 
 
