@@ -47,7 +47,8 @@ __all__ = [
     "MapProblem", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "ProblemError", "Segment",
     "SegmentedProblem", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem",
     "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "eigenbasis", "exact_text", "follow", "from_auto",
-    "gradient", "homoclinic", "interpolation", "least", "load", "locate_branch_point", "minimum", "point_of", "read_auto", "read_columns",
+    "gradient", "homoclinic", "interpolation", "least", "load", "locate_branch_point", "minimum", "point_of", "read_auto",
+    "read_columns",
     "root", "save",
     "sensitivities", "solve", "temporary_name", "trace", "write_whole",
 ]  # fmt: skip

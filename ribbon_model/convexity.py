@@ -24,8 +24,8 @@ NAME = "the end of the convex strain energy"
 def margin(law: Law) -> Callable | None:
     """``margin(system, x)``: the least det D2U / (U_11 U_33) along the strip, 1 on planar circles, -1 without a response.
 
-    It is computed for the strains at the nodes and on straight lines between neighbouring nodes, which detects jumps. None for a law
-    whose H is a closed expression, because its domain is known.
+    It is computed for the strains at the nodes and on straight lines between neighbouring nodes, which detects jumps. None
+    for a law whose H is a closed expression, because its domain is known.
     """
     return _least if law.ends_with_convexity else None
 

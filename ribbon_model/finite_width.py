@@ -53,9 +53,7 @@ def _expansion() -> tuple[float, float, tuple[float, ...]]:
         roots.append(b)
     residues = [4 * math.tanh(b) ** 2 / b**2 for b in roots]
     places = [4 * b**4 for b in roots]
-    rest = [
-        (-1) ** j * math.fsum(c / place ** (j + 1) for c, place in zip(residues[1:], places[1:])) for j in range(_TERMS)
-    ]
+    rest = [(-1) ** j * math.fsum(c / place ** (j + 1) for c, place in zip(residues[1:], places[1:])) for j in range(_TERMS)]
     rest[0] = 1 / 180 - residues[0] / places[0]
     return residues[0], places[0], tuple(rest)
 
@@ -91,7 +89,8 @@ def foundation(x):
     return 2 * (1 + e * e - 2 * e * math.cos(x)) / (x * (1 - e * e + 2 * e * math.sin(x)))
 
 
-# --- the energy -----------------------------------------------------------------------------------------------------------------
+# --- the energy
+# -----------------------------------------------------------------------------------------------------------------
 
 
 class Section(NamedTuple):
@@ -177,7 +176,8 @@ def strain_energy(w1, w3, kappa_n, nu, Gamma) -> tuple:
     return section_derivatives(w1, w3, kappa_n, isotropic(nu, Gamma))
 
 
-# --- circles and arcs -----------------------------------------------------------------------------------------------------------
+# --- circles and arcs
+# -----------------------------------------------------------------------------------------------------------
 
 
 def on_circle(ratio, nu, width) -> tuple:
@@ -246,7 +246,8 @@ def first_zero_of_t(nu: float, width: float) -> float | None:
     return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
 
 
-# --- the Legendre transform -----------------------------------------------------------------------------------------------------
+# --- the Legendre transform
+# -----------------------------------------------------------------------------------------------------
 
 
 def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
@@ -312,8 +313,10 @@ def ribbon_strains(M1, M3, kappa_n, section: Section):
 def start(M1, M3, kappa_n, section: Section):
     """Return the strains at which the search for the minimum of U - M.omega starts, and whether they are the ribbon's.
 
-    They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as long as
-    there is a minimum. They are the flat rod's where the ribbon has none, and where the ribbon's other root, a < 0, has omega_1 > 0
+    They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as
+    long as
+    there is a minimum. They are the flat rod's where the ribbon has none, and where the ribbon's other root, a < 0, has
+    omega_1 > 0
     and M1 is negative: that root is no minimum of the ribbon's U, but a strip of finite width, nearly planar there, has one.
     """
     import numpy as np
@@ -338,8 +341,8 @@ def flat_rod_strains(M1, M3, kappa_n, section: Section):
 
 #: Part of the moment below which the ribbon's a is round-off; it has no bending then.
 _LEAST = 1e-12
-#: Rounds in which the strains of a ribbon are computed with the part of its membrane energy that a strip of this width has. With
-#: two, the branches (9, 5) and (1, 5) of the tests are followed; with none they end at jumps to another minimum.
+#: Rounds in which the strains of a ribbon are computed with the part of its membrane energy that a strip of this width has.
+#: With two, the branches (9, 5) and (1, 5) of the tests are followed; with none they end at jumps to another minimum.
 _ROUNDS = 2
 #: x**4 from which the search starts like a ribbon.
 _WIDE = 1.0

@@ -92,7 +92,8 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
 
 
 def _equations(system: Collocation, states: Array, lam: Array, multipliers: Array, share: float) -> tuple[Array, Array, Array]:
-    """Return the residual r of all equations, J.T r and J.T J, with J the derivatives by lam (K, n), flattened, and multipliers.
+    """Return the residual r of all equations, J.T r and J.T J, with J the derivatives by lam (K, n), flattened, and
+    multipliers.
 
     All but the rates of the states are multiplied by ``share``. J.T J is added up interval by interval, without J itself, which
     has few entries that are not zero.

@@ -98,8 +98,8 @@ _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 #: The index on both sides of a special point; None where it is not defined.
 IndexChange = tuple[int | None, int | None]
 
-#: Distance from a first point that is exactly a branch point to where Newton's method begins. Ten times larger, the corrected point
-#: is a thousandth of a usual first step away.
+#: Distance from a first point that is exactly a branch point to where Newton's method begins. Ten times larger, the corrected
+#: point is a thousandth of a usual first step away.
 _BESIDE = 1e-6
 
 

@@ -21,8 +21,8 @@ from contin.discretization.algebraic import Algebraic
 from contin.discretization.multilinear import of_complex
 from contin.linalg.orientation import oriented
 
-#: Critical vectors are moved by this part of their largest component for an error estimate: ten times their round-off, since one
-#: draw may hardly count. Ten times larger, errors are ten times as large.
+#: Critical vectors are moved by this part of their largest component for an error estimate: ten times their round-off, since
+#: one draw may hardly count. Ten times larger, errors are ten times as large.
 _MOVED = 1e-14
 #: A coefficient is zero below this part of its terms, or below this number. Ten times larger or smaller, the points of the
 #: tests are the same.
@@ -86,7 +86,8 @@ class Coefficient(NamedTuple):
 
     @classmethod
     def of(cls, terms: Callable[[float], Array], error: float) -> Coefficient:
-        """Return the coefficient of terms; ``terms(s)`` are those of critical vectors that are moved by the part s of their size.
+        """Return the coefficient of terms; ``terms(s)`` are those of critical vectors that are moved by the part s of their
+        size.
 
         ``error`` is the relative error of derivatives. The vectors are known to round-off only, which may be more than some of
         their components, so the terms are computed again with moved ones.

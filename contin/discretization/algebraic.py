@@ -87,7 +87,8 @@ class Algebraic(System):
 
     @functools.cached_property
     def is_sparse(self) -> bool:
-        """The matrix is kept sparse: it is large, and few of its entries may differ from zero, or it is given as a sparse one."""
+        """The matrix is kept sparse: it is large, and few of its entries may differ from zero, or it is given as a sparse
+        one."""
         if self.problem.jacobian is not None:
             return self.state_size >= _MANY and self.problem.gives_sparse_matrix
         entries = self._residual.columns(self._free).rows.size

@@ -1,7 +1,7 @@
 """A user's functions evaluated at many points in one call, with exact derivatives.
 
-The functions are recorded (`contin.functions.recording`), differentiated on the recording, and run by the interpreter. What cannot
-be recorded is evaluated in Python (`contin.functions.interpreted`); a warning says so once.
+The functions are recorded (`contin.functions.recording`), differentiated on the recording, and run by the interpreter. What
+cannot be recorded is evaluated in Python (`contin.functions.interpreted`); a warning says so once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.interpreted import Interpreted
 from contin.functions.interpreter import LANES, run
-from contin.functions.program import TIME, Inputs, Program, Slope, program
+from contin.functions.program import Inputs, Program, Slope, program
 from contin.functions.recording import Recording, checked, record
 from contin.functions.signature import Signature, named_values, takes_arrays
 from contin.functions.tape import Number, Unrecordable
@@ -210,13 +210,11 @@ class Batch:
         if self.interpreted is not None:
             return self.interpreted.along(t, u, v, p, directions)
         out = np.empty((len(u), self.count))
-        self._run(self._along(len(directions)), t, u, np.hstack([v[: len(u)] if self.signature.ends else u[:, :0], *directions]),
-                  p, out, _NO_JACOBIAN)  # fmt: skip
+        given = np.hstack([v[: len(u)] if self.signature.ends else u[:, :0], *directions])
+        self._run(self._along(len(directions)), t, u, given, p, out, _NO_JACOBIAN)
         return out
 
-    def jacobian_along(
-        self, t: Array, u: Array, v: Array, p: Array, columns: Columns, directions: Sequence[Array]
-    ) -> Array:
+    def jacobian_along(self, t: Array, u: Array, v: Array, p: Array, columns: Columns, directions: Sequence[Array]) -> Array:
         """Return the derivative of the Jacobian along directions (as in `along`), shape (points, count, columns.width)."""
         inputs = tuple(columns.inputs.tolist())
         if self.interpreted is not None:
@@ -296,9 +294,7 @@ class Batch:
     def _tangents(self, places: Sequence[int], number: int) -> list[int]:
         """Return the derivatives of operations along the direction of a number."""
         recording = self._known()
-        along = {
-            place: recording.tape.input(("direction", number, slot)).place for slot, place in enumerate(recording.inputs)
-        }
+        along = {place: recording.tape.input(("direction", number, slot)).place for slot, place in enumerate(recording.inputs)}
         return derivatives.tangents(recording.tape, places, along)
 
     def _along(self, order: int) -> Program:

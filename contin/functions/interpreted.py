@@ -24,13 +24,13 @@ from contin.functions.signature import Signature, named_values
 _PACKAGE = __name__.partition(".")[0] + "."
 #: The complex step: small enough that its square is nothing.
 _STEP = 1e-30
-#: First length of differences, relative to the size of an input. Errors of fourth order and of round-off are below 1e-11 where a
-#: function changes over lengths of its input's size.
+#: First length of differences, relative to the size of an input. Errors of fourth order and of round-off are below 1e-11
+#: where a function changes over lengths of its input's size.
 _DIFFERENCE = 2e-4
 #: Least size of an input that counts: at a zero of an input its size is not known.
 _LEAST = 1e-4
-#: Differences of second and of fourth order that differ by a larger part of the derivative are taken again over a shorter length.
-#: Ten times larger, the error of fourth order may be 1e-8.
+#: Differences of second and of fourth order that differ by a larger part of the derivative are taken again over a shorter
+#: length. Ten times larger, the error of fourth order may be 1e-8.
 _ROUGH = 1e-5
 #: Factor of that length, and how often. Five times an eighth reach features 1e-5 times as wide as their input.
 _SHORTER = 1 / 8
@@ -90,7 +90,8 @@ class Interpreted:
     def entries(
         self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, rows: Indices, places: Indices
     ) -> tuple[Array, Array]:
-        """Return the values at one place, and the derivatives of the values ``rows`` by the inputs in the columns ``places``."""
+        """Return the values at one place, and the derivatives of the values ``rows`` by the inputs in the columns
+        ``places``."""
         x, starts = self._joined(u, v, p), np.zeros(len(rows))
         at = {entry: number for number, entry in enumerate(zip(rows.tolist(), places.tolist()))}
         for group, mine, columns in self._groups(inputs, self._coloured(inputs)):
@@ -110,9 +111,7 @@ class Interpreted:
         x = self._joined(u, v, p)
         return self._along(t, x, [np.broadcast_to(direction, x.shape) for direction in directions])
 
-    def jacobian_along(
-        self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, directions: Sequence[Array]
-    ) -> Array:
+    def jacobian_along(self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, directions: Sequence[Array]) -> Array:
         """Return the derivative of the Jacobian along directions, shape (places, count, inputs)."""
         x = self._joined(u, v, p)
         given = [np.broadcast_to(direction, x.shape) for direction in directions]
@@ -125,9 +124,7 @@ class Interpreted:
     def _say(self) -> None:
         names = " and ".join(self._name(index) for index in range(len(self._functions)))
         how = "the complex step" if self._complex else f"differences (an estimated error of {self.error:.0e})"
-        text = (
-            f"{names} is evaluated in Python, 10 to 1000 times as slow as recorded, with derivatives by {how}: {self.reason}"
-        )
+        text = f"{names} is evaluated in Python, 10 to 1000 times as slow as recorded, with derivatives by {how}: {self.reason}"
         warnings.warn(text, InterpretedWarning, stacklevel=_users_level())
 
     # --- derivatives ---------------------------------------------------------------------------------------------
@@ -169,8 +166,14 @@ class Interpreted:
             return self._values(t, x)
         *others, last = directions
         if not others and self._complex:
-            return self._values(t, x + 1j * _STEP * last).imag / _STEP
+            return self._complex_step(t, x, last)
         return self._difference(lambda t, x: self._along(t, x, others), t, x, last)
+
+    def _complex_step(self, t: Array, x: Array, direction: Array) -> Array:
+        """Return the derivative along a direction from one evaluation with complex numbers."""
+        moved: Any = x + 1j * _STEP * direction
+        found: Array = self._values(t, moved).imag / _STEP
+        return found
 
     def _difference(self, function: Callable[[Array, Array], Array], t: Array, x: Array, direction: Array) -> Array:
         """Return the derivative of a function along a direction, by differences as long as its error estimate allows."""
@@ -215,7 +218,7 @@ class Interpreted:
                 direction = np.broadcast_to(unit, places.shape)
                 difference = self._difference(self._values, times, places, direction)
                 known = np.all(np.isfinite(difference), axis=1)
-                step = self._values(times[known], places[known] + 1j * _STEP * direction[known]).imag / _STEP
+                step = self._complex_step(times[known], places[known], direction[known])
                 scale = 1 + np.abs(difference[known])
                 if not np.all(np.abs(step - difference[known]) <= _AGREES * scale):
                     self.error = 0.0

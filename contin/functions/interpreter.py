@@ -79,7 +79,8 @@ class Widths(NamedTuple):
     jac: int
 
 
-# --- one instruction in LLVM's language -----------------------------------------------------------------------------------------
+# --- one instruction in LLVM's language
+# -----------------------------------------------------------------------------------------
 
 
 class _Writer:
@@ -297,9 +298,7 @@ def interpret(builder: Any, memory: Memory, widths: Widths, lanes: int, first: i
     builder.cbranch(builder.icmp_signed("<", now, last), body, end)
     builder.position_at_end(body)
     row = builder.add(memory.code, builder.mul(now, _number(_ROW)))
-    code, write.d, write.a, write.b, write.c = (
-        write.load(builder.add(row, _number(8 * column)), _WORD) for column in range(5)
-    )
+    code, write.d, write.a, write.b, write.c = (write.load(builder.add(row, _number(8 * column)), _WORD) for column in range(5))
     following = builder.append_basic_block()
     choice = builder.switch(code, end)
     for name, case in _cases(write).items():
@@ -316,7 +315,8 @@ def interpret(builder: Any, memory: Memory, widths: Widths, lanes: int, first: i
     return stopped
 
 
-# --- the rest of the kernel, and the kernel -------------------------------------------------------------------------------------
+# --- the rest of the kernel, and the kernel
+# -------------------------------------------------------------------------------------
 
 
 @helper
@@ -367,8 +367,8 @@ def _direction(work, at, k, minimum, lane, scratch):
     """Solve for Newton's step in one lane, and return its slope: of the potential, or of half the squared residual.
 
     ``at`` is the register of [unknowns (k) | value | G (k) | A | before (k) | step (k) | ...]: A is the lower triangle of the
-    Hessian by rows, or the Jacobian. Pivots of a Hessian that are not positive are replaced, so that the step leads downhill; the
-    lower left entry of ``scratch`` is 0 where there was one, else 1.
+    Hessian by rows, or the Jacobian. Pivots of a Hessian that are not positive are replaced, so that the step leads downhill;
+    the lower left entry of ``scratch`` is 0 where there was one, else 1.
     """
     first, matrix = at + k + 1, at + 2 * k + 1
     for i in range(k):
@@ -426,7 +426,8 @@ def _value(work, at, k, minimum, lane):
 def _begin(work, lists, row, lanes):
     """Put the unknowns of all lanes where their search starts.
 
-    ``lists`` has from ``row`` on: k, 0 for a root, 1 for a minimum, 2 for one that may be a saddle, the first instruction of the program for value, gradient
+    ``lists`` has from ``row`` on: k, 0 for a root, 1 for a minimum, 2 for one that may be a saddle, the first instruction of
+    the program for value, gradient
     and matrix, its end, the register described in `_direction` (behind the step: value before, slope, part of the step that is
     tried: -1 at the start, 0 where the search has arrived), and the registers of the starts.
     """
@@ -529,9 +530,7 @@ class Room(NamedTuple):
 
 
 @kernel(reorder=False)
-def evaluate(
-    instructions: Instructions, first: int, last: int, points: Points, room: Room, out: Matrix, jac: Stack
-) -> None:
+def evaluate(instructions: Instructions, first: int, last: int, points: Points, room: Room, out: Matrix, jac: Stack) -> None:
     """Run a program: its first stretch once, its second, up to the instruction ``last``, for each block of points.
 
     ``out`` (K, values) and ``jac`` (K, values, columns) are filled where instructions store something.
@@ -577,8 +576,9 @@ def run(program: Program, points: tuple[Array, Array, Array], p: Array, out: Arr
     """Run a program at points (t, u, v) with parameters p; see `evaluate`."""
     scalars = program.scalars.copy()
     scalars[program.parameters : program.parameters + len(p)] = p
-    room = np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1))
-    evaluate((program.code, program.lists, scalars, program.tables), program.first, program.last, points, room, out, jac)
+    room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
+    instructions = Instructions(program.code, program.lists, scalars, program.tables)
+    evaluate(instructions, program.first, program.last, Points(*points), room, out, jac)
 
 
 def evaluated(program: Program, u: Array, count: int) -> Array:
@@ -600,8 +600,8 @@ SHORTEST = 1e-12
 SETTLED = 1e-9
 #: Square of the size below which an unknown counts as this large. Smaller unknowns are found to 1e-9 of this size squared.
 SMALLEST = 1.0
-#: A potential that rises by less than this part of 1 + itself may have fallen: large terms of it cancel. The step is accepted if
-#: the slope along it is at most `FLATTER` times the former one uphill (approximate Wolfe condition, Hager & Zhang 2005).
+#: A potential that rises by less than this part of 1 + itself may have fallen: large terms of it cancel. The step is accepted
+#: if the slope along it is at most `FLATTER` times the former one uphill (approximate Wolfe condition, Hager & Zhang 2005).
 CANCELLED = 1e-10
 FLATTER = 0.9
 #: Pivots of a Hessian below this part of its diagonal are round-off of its elimination, which makes 1e-16 to 1e-14. Ten times

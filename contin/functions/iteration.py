@@ -1,9 +1,10 @@
 """Unknowns that are found by iteration at each point, as operations of a tape.
 
-`minimum` and `root` are called inside a user's function. They record the potential or the residual with unknowns of its own on the
+`minimum` and `root` are called inside a user's function. They record the potential or the residual with unknowns of its own
+on the
 same tape; the interpreter finds the unknowns by Newton's method in all points of a block (`contin.functions.interpreter`).
-Derivatives follow from the theorem on implicit functions, with operations on the tape: with A w = b the linearized equations at the
-solution, dw/dz = -A^-1 dG/dz. They are exact, and can be differentiated again.
+Derivatives follow from the theorem on implicit functions, with operations on the tape: with A w = b the linearized equations
+at the solution, dw/dz = -A^-1 dG/dz. They are exact, and can be differentiated again.
 """
 
 from __future__ import annotations
@@ -63,8 +64,9 @@ class Search:
 
     def moved(self, places: Mapping[int, int]) -> Search:
         """Return the same search with other places."""
-        tuples = [tuple(places[place] for place in group) for group in (self.unknowns, self.slopes, self.matrix, self.starts)]
-        return Search(self.minimum, tuples[0], places[self.potential], *tuples[1:], self.saddles)
+        groups = (self.unknowns, self.slopes, self.matrix, self.starts)
+        unknowns, slopes, matrix, starts = (tuple(places[place] for place in group) for group in groups)
+        return Search(self.minimum, unknowns, places[self.potential], slopes, matrix, starts, self.saddles)
 
     def entry(self, i: int, j: int) -> int:
         """Return the place of an entry of the matrix."""
@@ -75,7 +77,9 @@ class Search:
 
     def partials(self, tape: Tape, index: int, operands: Sequence[Number]) -> list[Any]:
         """Return the derivatives of one unknown by what the equations read."""
-        found = tape.kept(("implicit", self, tuple(operand.place for operand in operands)), lambda: self._implicit(tape, operands))
+        found = tape.kept(
+            ("implicit", self, tuple(operand.place for operand in operands)), lambda: self._implicit(tape, operands)
+        )
         return [column[index] for column in found]
 
     def _implicit(self, tape: Tape, operands: Sequence[Number]) -> list[list[Any]]:
@@ -106,7 +110,8 @@ class Search:
         return {unknown: number.place for unknown, number in zip(self.unknowns, found)}
 
     def slopes_of_least(self, tape: Tape, operands: Sequence[Number]) -> list[Any]:
-        """Return the derivatives of the least value by what the potential reads: those at fixed unknowns, as it is stationary."""
+        """Return the derivatives of the least value by what the potential reads: those at fixed unknowns, as it is
+        stationary."""
         by = derivatives.jacobian(tape, [self.potential], [operand.place for operand in operands])
         moved = tape.substitute(list(by.values()), self.solution(tape, operands))
         slopes = {number: Number(tape, place) for (_, number), place in zip(by, moved)}
@@ -114,8 +119,8 @@ class Search:
 
 
 def solved(matrix: Sequence[Sequence[Any]], right: Sequence[Any], symmetric: bool) -> list[Any]:
-    """Return the solution of a small linear system of recorded numbers: by elimination, with pivots chosen unless it is symmetric
-    and definite."""
+    """Return the solution of a small linear system of recorded numbers: by elimination, with pivots chosen unless it is
+    symmetric and definite."""
     k = len(right)
     a, b = [list(row) for row in matrix], list(right)
     for i in range(k):
@@ -292,21 +297,20 @@ def recorded_search(
     unknowns = [tape.input(("unknown", tape.searches, i)) for i in range(k)]
     tape.searches += 1
 
-
     def call(copy: Any) -> Sequence[Any]:
         result = copy(tuple(unknowns))
         return list(result) if isinstance(result, (tuple, list, np.ndarray)) else [result]
 
     values = [Number(tape, place) for place in recorded_paths(tape, function, call)]
     if len(values) != (1 if minimal else k):
-        raise ProblemError(f"{'potential' if minimal else 'residual'} returns {len(values)} values, must return {1 if minimal else k}")
+        raise ProblemError(
+            f"{'potential' if minimal else 'residual'} returns {len(values)} values, must return {1 if minimal else k}"
+        )
     search = search_of(tape, [each.place for each in unknowns], [each.place for each in values], starts, minimal)
     return search, operands_of(tape, search)
 
 
-def search_of(
-    tape: Tape, unknowns: Sequence[int], values: Sequence[int], starts: Sequence[Any], minimal: bool
-) -> Search:
+def search_of(tape: Tape, unknowns: Sequence[int], values: Sequence[int], starts: Sequence[Any], minimal: bool) -> Search:
     """Return the search for places of unknowns, with the potential or the residuals at ``values``."""
     k, zero = len(unknowns), tape.constant(0.0)
     if minimal:
@@ -342,9 +346,7 @@ def operands_of(tape: Tape, search: Search) -> list[Number]:
     return [Number(tape, place) for place in operands if tape.value(place) is None]
 
 
-def _in_python(
-    tape: Tape, function: Callable[..., Any], starts: Sequence[float], minimal: bool
-) -> tuple[Search, list[float]]:
+def _in_python(tape: Tape, function: Callable[..., Any], starts: Sequence[float], minimal: bool) -> tuple[Search, list[float]]:
     """Return the search on an empty tape, and the unknowns for ordinary numbers."""
     try:
         search, _ = recorded_search(tape, function, starts, minimal)

@@ -176,7 +176,8 @@ def contents(*files: Path) -> str:
     return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
 
 
-#: Files that decide what machine code is made of, besides the one in which a kernel stands and those of its helpers in `linalg`.
+#: Files that decide what machine code is made of, besides the one in which a kernel stands and those of its helpers in
+#: `linalg`.
 _MADE_BY = ("compiler", "kernel", "kernel_parts", "machine_code", "primitives", "program")
 
 

@@ -3,8 +3,8 @@
 `TABLE` has a `Primitive` for every name. A rule of derivatives gets the operands and the result as recorded numbers and returns
 the derivative by each operand, recorded as well, so that derivatives have derivatives.
 
-Kernel code is one of three kinds. ``vector`` names an instruction of `contin.functions.interpreter` for eight numbers at a time.
-``scalar`` is the text of an expression of x (and y) for one number. Operations with neither are written out there.
+Kernel code is one of three kinds. ``vector`` names an instruction of `contin.functions.interpreter` for eight numbers at a
+time. ``scalar`` is the text of an expression of x (and y) for one number. Operations with neither are written out there.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ def _quiet(function: Callable[..., Any]) -> Callable[..., float]:
     return evaluate
 
 
-# --- simplifications: the value is the same; zero times a number only where it is finite, so not of what a user wrote -------------------------------------------------------------
+# --- simplifications: the value is the same; zero times a number only where it is finite, so not of what a user wrote
+# -------------------------------------------------------------
 
 
 def _simple_add(tape: Any, places: tuple[int, ...]) -> int | None:

@@ -298,7 +298,7 @@ class _Stretch:
         """Write the instruction of an operation, and free the registers that no later one needs."""
         operation = self.operations[place]
         if place in self.registers:  # found with another unknown
-            name, given = "", []
+            name, given = "", list[int]()
         elif operation.name == "input":
             name, given = self._load(operation.data)
         elif operation.name == "root":
@@ -383,12 +383,9 @@ class _Stretch:
         for result, targets in pinned.items():
             if not depends[result] or result in unknowns:
                 for target in targets:
-                    row = (
-                        ["fill", target, self.scalar[result]]
-                        if result in self.scalar
-                        else ["copy", target, {**varying, **unknowns}[result]]
-                    )
-                    sub.code.append([CODES[str(row[0])], int(row[1]), int(row[2]), 0, 0])
+                    scalar = result in self.scalar
+                    source = self.scalar[result] if scalar else {**varying, **unknowns}[result]
+                    sub.code.append([CODES["fill" if scalar else "copy"], target, source, 0, 0])
         self.most = sub.most
         start, begin = len(shared.lists), len(shared.searches)
         shared.searches += sub.code

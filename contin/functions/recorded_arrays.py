@@ -1,8 +1,9 @@
 """NumPy on recorded numbers: arrays of them, and the functions of NumPy that become operations of a tape.
 
-`Numbers` is an array of objects, so that indexing, slices, `np.concatenate`, `np.roll` and their like work as they are. Universal
-functions become operations for each element. Sums, scalar products, and products with constant matrices (dense, or sparse ones of
-SciPy) become one operation for each result.
+`Numbers` is an array of objects, so that indexing, slices, `np.concatenate`, `np.roll` and their like work as they are.
+Universal
+functions become operations for each element. Sums, scalar products, and products with constant matrices (dense, or sparse
+ones of SciPy) become one operation for each result.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class Numbers(np.ndarray):
     def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
         return function_of_numbers(function, inputs, options)
 
-    def dot(self, other: Any, out: Any = None) -> Any:  # type: ignore[override]
+    def dot(self, other: Any, out: Any = None) -> Any:
         """Return the product with a vector or matrix."""
         return matrix_product(self, other)
 
@@ -95,7 +96,8 @@ def _nested(value: Any) -> Any:
     return value.view(np.ndarray) if isinstance(value, Numbers) else value
 
 
-# --- functions of numbers -------------------------------------------------------------------------------------------------------
+# --- functions of numbers
+# -------------------------------------------------------------------------------------------------------
 
 
 def operation(name: str) -> Callable[..., Any]:
@@ -161,7 +163,8 @@ UFUNCS: dict[str, Callable[..., Any]] = {
     "maximum": largest, "fmax": largest, "minimum": smallest, "fmin": smallest, "less": lambda a, b: a < b,
     "less_equal": lambda a, b: a <= b, "greater": lambda a, b: a > b, "greater_equal": lambda a, b: a >= b,
     "equal": lambda a, b: a == b, "not_equal": lambda a, b: a != b, "logical_not": _not,
-    "logical_and": lambda a, b: select(a, select(b, 1.0, 0.0), 0.0), "logical_or": lambda a, b: select(a, 1.0, select(b, 1.0, 0.0)),
+    "logical_and": lambda a, b: select(a, select(b, 1.0, 0.0), 0.0),
+    "logical_or": lambda a, b: select(a, 1.0, select(b, 1.0, 0.0)),
     "bitwise_and": lambda a, b: a & b, "bitwise_or": lambda a, b: a | b, "invert": lambda a: ~a, "conjugate": lambda a: a,
     "heaviside": lambda a, b: select(a < 0, 0.0, select(a == 0, b, 1.0)), "clip": lambda a, low, high: clip(a, low, high),
     "deg2rad": lambda a: a * (math.pi / 180), "radians": lambda a: a * (math.pi / 180),
@@ -175,11 +178,16 @@ _RENAMED = {
     "arctan2": "atan2",
 }  # fmt: skip
 _SAME = (
-    "sqrt", "exp", "exp2", "expm1", "log", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "sinh", "cosh", "tanh", "hypot",
+    "sqrt", "exp", "exp2", "expm1", "log", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "sinh", "cosh", "tanh",
+    "hypot",
     "sign", "floor", "ceil", "trunc", "rint", "erf", "erfc", "gamma",
 )  # fmt: skip
 UFUNCS |= {name: operation(name) for name in _SAME} | {name: operation(own) for name, own in _RENAMED.items()}
-UFUNCS |= {"gammaln": operation("lgamma"), "psi": lambda a: a.tape.apply("polygamma", a, data=0), "expit": lambda a: 1.0 / (1.0 + operation("exp")(-a))}
+UFUNCS |= {
+    "gammaln": operation("lgamma"),
+    "psi": lambda a: a.tape.apply("polygamma", a, data=0),
+    "expit": lambda a: 1.0 / (1.0 + operation("exp")(-a)),
+}
 
 
 def clip(a: Any, low: Any = None, high: Any = None) -> Any:
@@ -260,7 +268,8 @@ def total(values: Sequence[Any]) -> Any:
     return terms[0] if len(terms) == 1 else tape.apply("sum", *terms)
 
 
-# --- products with matrices -----------------------------------------------------------------------------------------------------
+# --- products with matrices
+# -----------------------------------------------------------------------------------------------------
 
 
 def matrix_product(a: Any, b: Any) -> Any:
@@ -343,7 +352,8 @@ class SparseConstant:
         return self.dot(factor) if recorded(factor) is not None and np.ndim(factor) else NotImplemented
 
 
-# --- functions of NumPy ---------------------------------------------------------------------------------------------------------
+# --- functions of NumPy
+# ---------------------------------------------------------------------------------------------------------
 
 
 def function_of_numbers(function: Any, inputs: Any, options: dict[str, Any]) -> Any:

@@ -66,14 +66,16 @@ class RecordedFunction:
             values += _flat(argument)
         slots = [self._tape.operations[place].data for place in self._inputs]
         columns = [np.asarray(value, dtype=float) for value in np.broadcast_arrays(*values)]
-        found = program(self._tape, list(zip(self._results, range(len(self._results)))), Inputs(dict(zip(slots, range(len(slots)))), {}, {}))
+        found = program(
+            self._tape, list(zip(self._results, range(len(self._results)))), Inputs(dict(zip(slots, range(len(slots)))), {}, {})
+        )
         u = np.ascontiguousarray(np.stack([column.ravel() for column in columns], axis=1))
         out = evaluated(found, u, len(self._results))
         return tuple(np.ascontiguousarray(out.T).reshape(-1, *columns[0].shape))
 
     def text(self) -> str:
         """Return the operations as lines of Python."""
-        return "\n".join(self._tape.lines(self._results, {place: name for place, name in zip(self._inputs, self._labels())}))
+        return "\n".join(self._tape.lines(self._results, dict(zip(self._inputs, self._labels()))))
 
     def _labels(self) -> list[str]:
         labels: list[str] = []

@@ -227,7 +227,7 @@ def _compare(function: Function, count: int, signature: Signature, recording: Re
                     expected = np.array(found if count else [found], dtype=float)
         except Exception:  # it has no value there; whatever it raises
             continue
-        values = {TIME: time, **dict(enumerate(inputs))}
+        values: dict[Any, float] = {TIME: time, **dict(enumerate(inputs))}
         computed = np.array(recording.tape.evaluate(places, values))
         known = np.isfinite(expected)
         scale = 1 + np.abs(expected[known]).max(initial=0.0)

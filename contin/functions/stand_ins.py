@@ -66,7 +66,7 @@ class _Copies:
             return self._copy(function)
         found = self.value(function)
         if found is function and not isinstance(function, type):
-            call = getattr(type(function), "__call__", None)
+            call = vars(type(function)).get("__call__")
             if isinstance(call, types.FunctionType):
                 return types.MethodType(self.function(call), self._object(function))
             raise Unrecordable(f"{getattr(function, '__name__', type(function).__name__)} is no plain Python function")
@@ -234,7 +234,7 @@ def _of_scipy(value: Any) -> Any:
         if np.ndim(value.c) == 2 and value.extrapolate is True:
             return _for_all(value, tabulated(Table.piecewise(value.x, value.c)))
     elif type(value).__name__ == "BSpline" and np.ndim(value.c) == 1 and value.extrapolate is True:
-        from scipy.interpolate import PPoly
+        from scipy.interpolate import PPoly  # type: ignore[import-untyped]
 
         pieces = PPoly.from_spline(value)
         inside = [i for i, (a, b) in enumerate(zip(pieces.x, pieces.x[1:])) if b > a]
@@ -337,7 +337,8 @@ def _distance(p: Any, q: Any) -> Any:
 #: Functions of ``math`` under the same name on the tape, or under another one.
 _RENAMED = {"fabs": "abs"}
 _OF_MATH = (
-    "sqrt", "exp", "exp2", "expm1", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh",
+    "sqrt", "exp", "exp2", "expm1", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh",
+    "cosh",
     "tanh", "asinh", "acosh", "atanh", "atan2", "erf", "erfc", "gamma", "lgamma", "fabs", "floor", "ceil", "trunc",
 )  # fmt: skip
 
@@ -355,7 +356,8 @@ _STAND_INS: dict[Any, Any] = {getattr(math, name): _of_math(name) for name in _O
 _STAND_INS |= {
     math.log: _unless_recorded(math.log, _log), math.hypot: _unless_recorded(math.hypot, _hypot),
     math.pow: _unless_recorded(math.pow, _pow_of_math), math.copysign: _unless_recorded(math.copysign, _copysign),
-    math.radians: _unless_recorded(math.radians, lambda x: x * (math.pi / 180)), math.ldexp: _unless_recorded(math.ldexp, _ldexp),
+    math.radians: _unless_recorded(math.radians, lambda x: x * (math.pi / 180)),
+    math.ldexp: _unless_recorded(math.ldexp, _ldexp),
     math.degrees: _unless_recorded(math.degrees, lambda x: x * (180 / math.pi)),
     math.isfinite: _unless_recorded(math.isfinite, lambda x: abs(x) < math.inf),
     math.isnan: _unless_recorded(math.isnan, lambda x: x != x),
@@ -374,4 +376,3 @@ _STAND_INS |= {
 _STAND_INS |= {each: own for each, own in FUNCTIONS.items() if each not in _STAND_INS and each is not np.asarray}
 #: Built-in functions that have a stand-in, by name.
 _BUILTINS = {name: _STAND_INS[getattr(builtins, name)] for name in ("max", "min", "float")}
-

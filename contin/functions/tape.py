@@ -46,7 +46,8 @@ class Tape:
     ----------
     operations : list of Operation
     arrays : optional
-        NumPy for recorded numbers, `contin.functions.recorded_arrays.NUMPY`: ``arrays.universal(...)``, ``arrays.function(...)``.
+        NumPy for recorded numbers, `contin.functions.recorded_arrays.NUMPY`: ``arrays.universal(...)``,
+        ``arrays.function(...)``.
     decide : callable, optional
         ``decide(condition)`` returns the outcome that the present recording assumes where a function asks for the truth of a
         number. Without it such a question raises `Unrecordable`.
@@ -368,7 +369,7 @@ class Number:
     def _refuse(self, *_: object) -> Any:
         raise Unrecordable("it needs the value of a number (float, int, an index, or foreign compiled code)")
 
-    __float__ = __int__ = __index__ = __complex__ = __round__ = __hash__ = _refuse  # type: ignore[assignment]
+    __float__ = __int__ = __index__ = __complex__ = __round__ = __hash__ = _refuse
     __trunc__ = _refuse
 
     def __floor__(self) -> Any:
@@ -434,7 +435,15 @@ def _whole_power(base: Number, exponent: int) -> Number:
 
 
 #: Operations that are written with a sign between their operands, and how tightly it binds.
-_SIGNS = {"add": (" + ", 1), "sub": (" - ", 1), "mul": (" * ", 2), "div": (" / ", 2), "lt": (" < ", 0), "le": (" <= ", 0), "eq": (" == ", 0)}
+_SIGNS = {
+    "add": (" + ", 1),
+    "sub": (" - ", 1),
+    "mul": (" * ", 2),
+    "div": (" / ", 2),
+    "lt": (" < ", 0),
+    "le": (" <= ", 0),
+    "eq": (" == ", 0),
+}
 #: The binding of a negative sign and of names.
 _NEGATIVE, _NAME = 1, 9
 
@@ -480,7 +489,7 @@ class _Printer:
             return f"({a} if {condition} else {b})", _NAME
         if name in ("sum", "dot", "linear"):
             half = len(operands) // 2
-            given = zip(operands[:half], operands[half:]) if name == "dot" else [(each,) for each in operands]
+            given: Any = zip(operands[:half], operands[half:]) if name == "dot" else [(each,) for each in operands]
             if name == "linear":
                 given = [((f"{factor:.17g}", _NAME), *each) for factor, each in zip(operation.data, given)]
             return " + ".join(" * ".join(_within(factor, 2) for factor in term) for term in given), 1

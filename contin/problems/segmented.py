@@ -138,7 +138,10 @@ class SegmentedProblem(BoundaryValueProblem):
         names, parameters = [piece.names for piece in self.pieces], tuple(self.parameters)
         found: dict[str, Any] = {"boundary": [names, names, parameters]}
         for number, piece in enumerate(self.pieces):
-            found |= {f"rhs {number}": [None, piece.names, parameters], f"functionals {number}": [None, piece.names, parameters]}
+            found |= {
+                f"rhs {number}": [None, piece.names, parameters],
+                f"functionals {number}": [None, piece.names, parameters],
+            }
             found |= {f"length {number}": [parameters], f"begin {number}": [parameters]}
         return found
 

@@ -127,7 +127,8 @@ def _importable(function: Any) -> bool:
 
 
 def _carried(value: Any, arguments: Arguments | None, keep: Callable[[Any], bool]) -> Any:
-    """Return a value with recordings in the place of functions, except of those to keep and of those that cannot be recorded."""
+    """Return a value with recordings in the place of functions, except of those to keep and of those that cannot be
+    recorded."""
     if isinstance(value, Mapping):
         return {name: _carried(each, arguments, keep) for name, each in value.items()}
     if arguments is None or not callable(value) or keep(value):

@@ -1,4 +1,5 @@
-"""Which states depend on which: read off the recording, used by the elimination and by the Jacobian, which must not change by it."""
+"""Which states depend on which: read off the recording, used by the elimination and by the Jacobian, which must not change by
+it."""
 
 import math
 

@@ -25,7 +25,8 @@ def test_gradient_knows_functions_that_sympy_has_not():
 
 
 def test_the_side_that_is_not_taken_may_have_no_derivatives():
-    """(1 - sqrt(x))/x has none at 0; second derivatives of a selection between it and 1 + x**2 are those of the latter there."""
+    """(1 - sqrt(x))/x has none at 0; second derivatives of a selection between it and 1 + x**2 are those of the latter
+    there."""
 
     def chosen(x):
         return 1 + x**2 if x < 1 else (1 - x**0.5) / x

@@ -40,7 +40,7 @@ def test_values_and_derivatives_of_a_least_value():
 def test_least_values_of_ordinary_numbers():
     assert least(lambda w: potential(w[0], 8.0, 0.7), [8.0]) == pytest.approx(state(8.0, 0.7)[0], rel=1e-14)
     assert minimum(lambda w: potential(w[0], 8.0, 0.7), [8.0])[0] == pytest.approx(-state(8.0, 0.7)[1], rel=1e-14)
-    assert np.isnan(least(lambda w: -w[0] ** 2, [1.0]))
+    assert np.isnan(least(lambda w: -(w[0] ** 2), [1.0]))
 
 
 def test_a_saddle_is_no_minimum():

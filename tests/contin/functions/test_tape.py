@@ -42,16 +42,21 @@ def of_one(function, x, parameters=()):
 
 ELEMENTARY = {
     "sqrt": (math.sqrt, mpmath.sqrt), "exp": (math.exp, mpmath.exp), "expm1": (math.expm1, mpmath.expm1),
-    "log": (math.log, mpmath.log), "log1p": (math.log1p, lambda x: mpmath.log(1 + x)), "log2": (math.log2, lambda x: mpmath.log(x, 2)),
-    "log10": (math.log10, mpmath.log10), "cbrt": (np.cbrt, mpmath.cbrt), "sin": (np.sin, mpmath.sin), "cos": (math.cos, mpmath.cos),
+    "log": (math.log, mpmath.log), "log1p": (math.log1p, lambda x: mpmath.log(1 + x)),
+    "log2": (math.log2, lambda x: mpmath.log(x, 2)),
+    "log10": (math.log10, mpmath.log10), "cbrt": (np.cbrt, mpmath.cbrt), "sin": (np.sin, mpmath.sin),
+    "cos": (math.cos, mpmath.cos),
     "tan": (np.tan, mpmath.tan), "asin": (math.asin, mpmath.asin), "acos": (np.arccos, mpmath.acos),
     "atan": (np.arctan, mpmath.atan), "sinh": (math.sinh, mpmath.sinh), "cosh": (np.cosh, mpmath.cosh),
-    "tanh": (math.tanh, mpmath.tanh), "asinh": (math.asinh, mpmath.asinh), "acosh": (lambda x: math.acosh(x + 1), lambda x: mpmath.acosh(x + 1)),
+    "tanh": (math.tanh, mpmath.tanh), "asinh": (math.asinh, mpmath.asinh),
+    "acosh": (lambda x: math.acosh(x + 1), lambda x: mpmath.acosh(x + 1)),
     "atanh": (np.arctanh, mpmath.atanh), "erf": (math.erf, mpmath.erf), "erfc": (special.erfc, mpmath.erfc),
-    "gamma": (math.gamma, mpmath.gamma), "lgamma": (math.lgamma, mpmath.loggamma), "psi": (special.psi, mpmath.psi0 if hasattr(mpmath, "psi0") else mpmath.digamma),
+    "gamma": (math.gamma, mpmath.gamma), "lgamma": (math.lgamma, mpmath.loggamma),
+    "psi": (special.psi, mpmath.psi0 if hasattr(mpmath, "psi0") else mpmath.digamma),
     "power": (lambda x: x**2.7, lambda x: x ** mpmath.mpf(2.7)), "whole": (lambda x: x**-3, lambda x: x**-3),
     "base": (lambda x: 2.5**x, lambda x: mpmath.mpf(2.5) ** x), "self": (lambda x: x**x, lambda x: x**x),
-    "atan2": (lambda x: math.atan2(x, 1 - x), lambda x: mpmath.atan2(x, 1 - x)), "hypot": (lambda x: math.hypot(x, 2.0), lambda x: mpmath.hypot(x, 2)),
+    "atan2": (lambda x: math.atan2(x, 1 - x), lambda x: mpmath.atan2(x, 1 - x)),
+    "hypot": (lambda x: math.hypot(x, 2.0), lambda x: mpmath.hypot(x, 2)),
     "expit": (special.expit, lambda x: 1 / (1 + mpmath.exp(-x))), "exp2": (np.exp2, lambda x: mpmath.mpf(2) ** x),
 }  # fmt: skip
 
@@ -83,7 +88,8 @@ def test_polygamma_functions(x):
             assert abs(found - exact) <= 3e-14 * max(abs(exact), 1)
 
 
-# --- decisions ------------------------------------------------------------------------------------------------------------------
+# --- decisions
+# ------------------------------------------------------------------------------------------------------------------
 
 
 def test_decisions_are_joined():
@@ -99,7 +105,9 @@ def test_decisions_are_joined():
 
     x = [-2.0, -0.5, 0.1, 2.0]
     value, slope, _ = of_one(function, x)
-    assert np.allclose(value, [-12, -0.25 * math.sqrt(0.75), 3 * math.log(0.1), math.log(2) * math.sqrt(1 + math.log(2))], rtol=1e-15)
+    assert np.allclose(
+        value, [-12, -0.25 * math.sqrt(0.75), 3 * math.log(0.1), math.log(2) * math.sqrt(1 + math.log(2))], rtol=1e-15
+    )
     root_of = math.sqrt(0.75)
     left = (0.5 * 2 * 0.5) * 0 + (-2 * -0.5) * (root_of + -0.25 / (2 * root_of))
     right = math.sqrt(1 + math.log(2))
@@ -151,7 +159,8 @@ def test_a_loop_of_known_length_and_a_search():
     assert batch.interpreted is not None and "loop that ends by a comparison" in batch.describe()
 
 
-# --- what functions may do --------------------------------------------------------------------------------------------------------
+# --- what functions may do
+# --------------------------------------------------------------------------------------------------------
 
 
 MATRIX = np.array([[1.0, 2.0, 0.0], [0.5, -1.0, 3.0], [0.0, 4.0, 1.0]])
@@ -178,15 +187,18 @@ ARRAYS = {
     "sum": lambda u, p: np.sum(np.exp(u) * [1, 2, 3]), "matrix": lambda u, p: np.sum(np.sin(MATRIX @ u)),
     "sparse": lambda u, p: u @ (SPARSE @ u) + (SPARSE.T @ u)[0], "dot": lambda u, p: np.dot(u, MATRIX).sum(),
     "roll": lambda u, p: np.sum((np.roll(u, 1) - 2 * u + np.roll(u, -1)) ** 2), "max": lambda u, p: np.max(u) - u.min(),
-    "concatenate": lambda u, p: np.sum(np.cumsum(np.concatenate([[p.a], u])) ** 2), "diff": lambda u, p: np.sum(np.diff(u) ** 3),
+    "concatenate": lambda u, p: np.sum(np.cumsum(np.concatenate([[p.a], u])) ** 2),
+    "diff": lambda u, p: np.sum(np.diff(u) ** 3),
     "where": lambda u, p: np.where(u > 0.5, u, u**2).sum(), "spline": lambda u, p: np.sum(SPLINE(u)) * MONOTONE(u[1]),
     "interp": lambda u, p: np.interp(u, [0, 1, 3], [0, 2, 1]).sum() * np.interp(p.a, [0, 1], [1, 3]),
     "stack": lambda u, p: np.prod(np.stack([u, 2 * u]).sum(axis=0)), "einsum": lambda u, p: np.trapezoid(u**2, dx=0.1),
     "object": lambda u, p: LAW.force(u[0]) + LAW.stiffness * u[1], "zeros": lambda u, p: _filled(u).sum(),
     "partial": functools.partial(lambda k, u, p: k * u[0] * u[2], 2.5), "outer": lambda u, p: np.outer(u, u).sum(),
     "complex": lambda u, p: u.real[0] * u[1], "polynomial": lambda u, p: np.polyval([1, -2, 3], u).sum(),
-    "cross": lambda u, p: np.cross(u, [1.0, 2.0, 3.0]) @ u + np.cross(u, u**2)[0], "vectorized": lambda u, p: sum(map(math.cos, u)),
-    "cached": lambda u, p: _cached(u[0]), "float": lambda u, p: float(u[0]) * np.float64(2.0) * (1.0 if isinstance(u[1], float) else 2.0),
+    "cross": lambda u, p: np.cross(u, [1.0, 2.0, 3.0]) @ u + np.cross(u, u**2)[0],
+    "vectorized": lambda u, p: sum(map(math.cos, u)),
+    "cached": lambda u, p: _cached(u[0]),
+    "float": lambda u, p: float(u[0]) * np.float64(2.0) * (1.0 if isinstance(u[1], float) else 2.0),
 }  # fmt: skip
 
 
@@ -226,7 +238,8 @@ def test_arrays_and_objects(case):
 
 
 def test_random_expressions():
-    """Two hundred random formulas of three inputs: value bit for bit as Python, gradient and Hessian against tangents of tangents."""
+    """Two hundred random formulas of three inputs: value bit for bit as Python, gradient and Hessian against tangents of
+    tangents."""
     source = random.Random(5)
 
     def formula(depth):
@@ -330,7 +343,8 @@ def test_a_root_and_its_derivatives():
 
 
 def test_a_minimum_of_two_unknowns():
-    """The least of (a - x)^2 + cosh(b) - x b + a b: its gradient vanishes, and derivatives agree with those of the equations."""
+    """The least of (a - x)^2 + cosh(b) - x b + a b: its gradient vanishes, and derivatives agree with those of the
+    equations."""
 
     def found(u, p):
         a, b = minimum(lambda w: (w[0] - u.x) ** 2 + math.cosh(w[1]) - u.x * w[1] + 0.5 * w[0] * w[1], [0.0, 0.0])
@@ -364,7 +378,8 @@ def test_searches_in_plain_python_and_their_refusals():
         root(lambda w: (w[0], w[0]), [0.0])
 
 
-# --- the machinery ---------------------------------------------------------------------------------------------------------------
+# --- the machinery
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def test_equal_operations_are_stored_once():
@@ -393,10 +408,17 @@ def test_the_same_bits_alone_in_blocks_and_in_threads(monkeypatch):
     """A point has the same bits in a block of any length, and the mesh may be divided among threads."""
 
     def field(t, u, p):
-        return u.y * math.exp(-u.x) + t, math.sin(u.x * p.k) / (1 + u.y**2) + root(lambda w: (w[0] ** 3 + w[0] - u.x,), [0.0])[0]
+        return u.y * math.exp(-u.x) + t, math.sin(u.x * p.k) / (1 + u.y**2) + root(lambda w: (w[0] ** 3 + w[0] - u.x,), [0.0])[
+            0
+        ]
 
     batch = Batch([field], [2], ["x", "y"], ["k"])
-    u, t, p, none = np.random.default_rng(2).standard_normal((999, 2)), np.linspace(0, 1, 999), np.array([1.3]), np.empty((0, 2))
+    u, t, p, none = (
+        np.random.default_rng(2).standard_normal((999, 2)),
+        np.linspace(0, 1, 999),
+        np.array([1.3]),
+        np.empty((0, 2)),
+    )
     columns = batch.columns([0])
     whole = batch.jacobian(t, u, none, p, columns)
     for a, b in ((0, 1), (5, 6), (100, 131), (900, 999)):
