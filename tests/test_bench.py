@@ -8,7 +8,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "scripts"))
 
-from benchmarks import cost, cycles, defaults, fold, many, report, startup  # noqa: E402
+from benchmarks import cost, cycles, defaults, fold, many, problems, report, startup  # noqa: E402
+from benchmarks.statements import LARGE, NEWCOMERS, VARIATIONAL, Statement  # noqa: E402
 from peers import auto_07p, scipy_bvp  # noqa: E402
 
 BRANCH_FILE = """\
@@ -128,3 +129,41 @@ def test_the_best_setting_is_the_fastest_that_is_accurate():
     }
     times, best, equal = defaults._best(runs)
     assert times[7, 1e-8] == 1.2 and best == (7, 1e-8) and equal == (6, 1e-12)
+
+
+def test_every_run_of_a_program_has_a_name_of_its_own():
+    """A version that keeps what it made for a function would otherwise be timed with what it kept."""
+    assert [len(group) for group in (NEWCOMERS, VARIATIONAL, LARGE)] == [30, 10, 4]
+    for statement in (*NEWCOMERS, *VARIATIONAL, *LARGE):
+        one, other = (compile(problems.renamed(statement, end), "program", "exec") for end in ("_1", "_2"))
+        assert one.co_consts != other.co_consts, statement.name
+
+
+def test_a_new_name_stands_in_functions_only():
+    text = 'f = lambda p: p["p"] + p.p + np.exp(p.a) * p[0]'
+    assert problems.renamed(Statement("", text, ""), "_1") == 'f = lambda p_1: p_1["p"] + p_1.p + np.exp(p_1.a) * p_1[0]'
+    assert problems.renamed(Statement("", '{"load": p.load}', "", word="load"), "_1") == '{"load_1": p.load_1}'
+
+
+def test_a_program_that_finds_another_solution_is_not_timed():
+    """x^2 = 4 from 1 has the solution 2."""
+    text = "found = contin.solve(contin.AlgebraicProblem(lambda u, p: (u.x**2 - p.a,), ['x'], {'a': 4.0}), [1.0])"
+    assert problems.time_of(Statement("right", text, "abs(found.x[0] - 2) < 1e-9"), 0) > 0
+    with pytest.raises(AssertionError, match="wrong: not the known solution"):
+        problems.time_of(Statement("wrong", text, "abs(found.x[0] + 2) < 1e-9"), 0)
+
+
+def test_the_table_of_new_problems():
+    """Medians over a group, ratios of two versions, and a program that the earlier version cannot run."""
+    first = [{"name": s.name, "now": 0.004, "before": 1.2} for s in NEWCOMERS[:2]]
+    first.append({"name": NEWCOMERS[2].name, "now": 0.01, "before": None})
+    results = {"first": first, "ns": [{"name": "exp", "now": 48.0, "before": 96.0}], "versions": {"now": "1", "before": "2"}}
+    text = problems.table(results)
+    assert (
+        "| docs/outside.md | now | 4 ms | 10 ms | 0 |" in text
+        and "| docs/outside.md | before | 1200 ms | 1200 ms | 1 |" in text
+    )
+    assert "| 1 Troesch | 4 ms | 1200 ms | 300.0 |" in text and "| 3 Falkner-Skan | 10 ms | – | – |" in text
+    assert "| exp | 48 ns | 96 ns | 2.0 |" in text and "now: 1, before: 2. Times are processor times." in text
+    alone = problems.table({"first": first, "ns": results["ns"], "versions": {"now": "1"}})
+    assert "before" not in alone and "| exp | 48 ns |" in alone

@@ -47,6 +47,11 @@ class Columns:
         """Number of columns of the Jacobian."""
         return self.inputs.size
 
+    @functools.cached_property
+    def key(self) -> tuple[int, ...]:
+        """The inputs as whole numbers of Python."""
+        return tuple(self.inputs.tolist())
+
 
 class Batch:
     """Functions of a point, prepared together: values and exact Jacobian at many points in one call.
@@ -127,7 +132,7 @@ class Batch:
         if self.interpreted is not None:
             return f"evaluated in Python, because {self.interpreted.reason}"
         every = self.columns(range(len(self.signature.parameters)))
-        both = self._slopes(tuple(every.inputs.tolist()))[0].operations
+        both = self._slopes(every.key)[0].operations
         return f"recorded, {self._values_program().operations} operations, {both} with all first derivatives"
 
     def text(self, labels: Sequence[str], time: str = "t") -> list[str]:
@@ -161,7 +166,7 @@ class Batch:
         if self.interpreted is not None:
             return self.interpreted.jacobian(t, u, v, p, columns.inputs)
         out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, columns.width))
-        self._run(self._slopes(tuple(columns.inputs.tolist()))[0], t, u, v, p, out, jac)
+        self._run(self._slopes(columns.key)[0], t, u, v, p, out, jac)
         return out, jac
 
     def entries(self, t: Array, u: Array, v: Array, p: Array, columns: Columns) -> tuple[Array, Array]:
@@ -169,7 +174,7 @@ class Batch:
         if self.interpreted is not None:
             return self.interpreted.entries(t, u, v, p, columns.inputs, columns.rows, columns.places)
         out, jac = np.empty((1, self.count)), np.empty((1, 1, columns.rows.size))
-        self._run(self._slopes(tuple(columns.inputs.tolist()), packed=True)[0], t, u, v, p, out, jac)
+        self._run(self._slopes(columns.key, packed=True)[0], t, u, v, p, out, jac)
         return out[0], jac[0, 0]
 
     def columns(self, free: Sequence[int] | Indices, order: Sequence[int] | Indices | None = None) -> Columns:
@@ -216,7 +221,7 @@ class Batch:
 
     def jacobian_along(self, t: Array, u: Array, v: Array, p: Array, columns: Columns, directions: Sequence[Array]) -> Array:
         """Return the derivative of the Jacobian along directions (as in `along`), shape (points, count, columns.width)."""
-        inputs = tuple(columns.inputs.tolist())
+        inputs = columns.key
         if self.interpreted is not None:
             return self.interpreted.jacobian_along(t, u, v, p, columns.inputs, directions)
         jac = np.zeros((len(u), self.count, columns.width))
@@ -240,7 +245,7 @@ class Batch:
             along = self.interpreted.jacobian_along(t, u, v, p, columns.inputs, [direction])
             contracted: Array = np.einsum("ka,kaj->kj", weights, along)
             return contracted
-        inputs = tuple(columns.inputs.tolist())
+        inputs = columns.key
         given = np.hstack([v[: len(u)] if self.signature.ends else u[:, :0], direction, weights])
         jac = np.zeros((len(u), 1, columns.width))
         self._run(self._bent(inputs), t, u, given, p, np.empty((len(u), 0)), jac)

@@ -1,10 +1,9 @@
 """New problems: processor time from the statement to the first solution, and ns a point for f and its Jacobian.
 
-Kernels of the engine are compiled before. A process solves every program of `benchmarks.statements` once, which loads modules,
-and then again with functions that it has not seen: they are made by ``exec``, and a name in them is a new one each time, so
-that
-nothing that was kept for other functions serves them. With ``--before`` an earlier version of contin runs the same programs, in
-turns with this one. Times are processor times, so that other programs hardly matter.
+Kernels of the engine are compiled before. A process solves every program of `benchmarks.statements` once, which loads
+modules, and then again with functions that it has not seen: they are made by ``exec``, and a name in them is a new one each
+time, so that nothing that was kept for other functions serves them. With ``--before`` an earlier version of contin runs the
+same programs, in turns with this one. Times are processor times, so that other programs hardly matter.
 """
 
 from __future__ import annotations
@@ -35,8 +34,7 @@ LONG = 5.0
 SHORT = 1.0
 #: Points of a 40 x 4 mesh.
 POINTS = 160
-#: Most states of a vector field of the bank whose cycles are evaluated: larger ones are grids, whose steady states are
-#: followed.
+#: Most states of a vector field of the bank whose cycles are evaluated: larger ones are grids, of which steady states count.
 FEW = 5
 #: Calls whose median counts: 160 points take 2 to 600 us.
 CALLS = 200

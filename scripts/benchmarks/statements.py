@@ -1,8 +1,8 @@
 """Programs that state a problem and find its first solution, as text: each run makes their functions anew.
 
 The thirty problems are those of docs/outside.md, in the style of their authors, up to the first solution; where the known
-answer there is a bifurcation, the check is of a state that is known in closed form or by SciPy. Ten are variational, and four
-are large. Every text ends with its solution, ``found``.
+answer there is a bifurcation, the check is of a state that is known in closed form or by SciPy. Ten are variational, and
+four are large. Every text ends with its solution, ``found``.
 """
 
 from __future__ import annotations
@@ -369,8 +369,8 @@ def stretch(w, p):
     return math.sqrt(p.span**2 + w.y**2)
 problem = contin.VariationalProblem(
     energy=lambda t, x, w, p: (x.y + p.height) * stretch(w, p), states=["y"],
-    parameters={"span": 1.0, "length": 1.2, "height": 2.0}, ends=lambda a, b, p: (a.y, b.y), integrals={"length": lambda t, x,
-    w, p: stretch(w, p) - p.length})
+    parameters={"span": 1.0, "length": 1.2, "height": 2.0}, ends=lambda a, b, p: (a.y, b.y),
+    integrals={"length": lambda t, x, w, p: stretch(w, p) - p.length})
 found = contin.solve(problem, lambda t: [-1.0 * t * (1 - t)])
 """, "abs(u(0.5)[0] - CATENARY) < 1e-7", word="span"),
     Statement("geodesic on a hill", """
