@@ -120,10 +120,11 @@ def _called(tape: Tape, what: str, function: Function, arguments: Sequence[Any],
     if count is not None and len(found) != count:
         raise ProblemError(f"{what} returns {len(found)} values, must return {count}")
     for value in found:
-        for place in tape.needed([value.place]):
-            known = tape.value(place)
-            if known is not None and not math.isfinite(known):
-                raise ProblemError(f"{what} has no finite real value: it contains {known}")
+        known = [tape.value(place) for place in tape.needed([value.place])]
+        if any(number is not None and math.isnan(number) for number in known):
+            raise ProblemError(f"{what} has no finite real value: it contains nan")
+        if value.known is not None and math.isinf(value.known):
+            raise ProblemError(f"{what} has no finite real value: {value.known}")
     return found
 
 
