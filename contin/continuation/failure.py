@@ -15,9 +15,10 @@ from contin.stepping.settings import Settings
 from contin.stepping.state import State, Stop
 from contin.stepping.step import corrected, predict, turn
 
-#: A shorter step is this part of ``min_step``, and a looser tolerance so many times the one that failed. With larger factors
-#: the advice would be good for more, and say less.
-_SHORTER, _LOOSER = 1e-2, 1e3
+#: A shorter step that is tried, as a part of ``min_step``. With a smaller one the advice would be good for more, and say less.
+_SHORTER = 1e-2
+#: Looser tolerances that are tried, as multiples of the one that failed: the smallest that succeeds is told.
+_LOOSER = (1e3, 1e4, 1e5)
 #: The way along the tangent on which a corner is looked for, and the part that its bend has of the usual change of the residual
 #: on such a way: for a smooth function, it is about as large as the way.
 _CORNER, _JUMP = 1e-4, 0.1
@@ -54,9 +55,10 @@ def _meets_corner(state: State) -> bool:
 def advice(state: State, settings: Settings) -> str:
     """Return what lets the step of length ``min_step`` from a state succeed, or what else may help, as a clause."""
     least, newton = settings.min_step, settings.newton
-    loose = dataclasses.replace(newton, tolerance=_LOOSER * newton.tolerance)
-    if _succeeds(state, least, settings, loose):
-        return f"a step succeeds with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
+    for times in _LOOSER:
+        loose = dataclasses.replace(newton, tolerance=times * newton.tolerance)
+        if _succeeds(state, least, settings, loose):
+            return f"a step succeeds with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
     shorter = _SHORTER * least
     if _succeeds(state, shorter, settings, newton):
         return f"a step of {shorter:g} succeeds: set min_step to that or less"

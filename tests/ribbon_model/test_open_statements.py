@@ -115,18 +115,6 @@ def test_what_nothing_determines_is_rejected(what):
     assert_sentence(str(caught.value))
 
 
-@pytest.mark.full
-def test_strips_of_one_law_share_compiled_code():
-    """The equations depend on the law and on loads along the strip, not on the ends; a new scene compiles its ends only."""
-    strips = [
-        OpenStrip(MATERIALS[1]), OpenStrip(MATERIALS[3], finish=End("free", held=())), OpenStrip(MATERIALS[1], finish=hinge()),
-        OpenStrip(MATERIALS[1], finish=End("free", held=()), numbers={"force_width": 0.1}),
-    ]  # fmt: skip
-    assert len({strip.problem.batch("field")._evaluate for strip in strips}) == 1
-    clamps = [OpenStrip(MATERIALS[1]), OpenStrip(MATERIALS[2])]
-    assert len({strip.problem.batch("boundary")._evaluate for strip in clamps}) == 1
-
-
 @pytest.mark.parametrize(
     "make, sentence",
     [
