@@ -35,8 +35,8 @@ _AT_START = 1e-6
 #: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
 #: larger, points that are distinct in the digits shown could change places.
 _AT_ONCE = 1e-8
-#: A zero of a test function that also vanishes at a fold or branch point nearer than this part of the step is that point: the place
-#: of a fold is known to 2e-4 of a step. Ten times larger, a second zero beside it could be passed.
+#: A zero of a test function that also vanishes at a fold or branch point nearer than this part of the step is that point: the
+#: place of a fold is known to 2e-4 of a step. Ten times larger, a second zero beside it could be passed.
 _CLOSE = 1e-3
 #: This close to a branch point tangents are round-off: the square root of it, times ten.
 _BLURRED = 1e-7

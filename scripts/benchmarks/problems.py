@@ -224,7 +224,7 @@ def table(results: dict) -> str:
 
 
 def _summary(rows: list[dict], both: bool) -> list[str]:
-    lines = ["| first solution | version | median | worst | not solved |", "|---|---|---|---|---|"]
+    lines = ["| first solution | version | median | worst | without a time |", "|---|---|---|---|---|"]
     for group, statements in GROUPS.items():
         names = {statement.name for statement in statements}
         for version in ("now", "before")[: 1 + both]:
