@@ -1,8 +1,8 @@
 """CPU time and memory of a large equilibrium problem, by what is known of its Jacobian.
 
-``python scripts/given_jacobian.py [N ...]``: Bratu's problem by finite differences with N unknowns, with the traced pattern,
+``python scripts/given_jacobian.py [N ...]``: Bratu's problem by finite differences with N unknowns, with the recorded pattern,
 with a given pattern, and with a given Jacobian. Each run is a process of its own, after a small run that loads what all need.
-The first solution includes the pattern, its colouring and the comparison; compiled code is there from a run before. A
+The first solution includes the pattern and the comparison; compiled kernels are there from a run before. A
 linearization is the residual, the Jacobian and its factors.
 """
 
