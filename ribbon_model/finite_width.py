@@ -34,7 +34,8 @@ from typing import NamedTuple
 #: derivative. The closed form loses 1e-13 of the fourth derivative there, and ten times more at 16.
 SERIES_LIMIT = 64.0
 _TERMS = 9
-#: Poles of g that are summed for the series: the next is 1e-17 of the sum of the first two terms.
+#: Poles of g that are summed for the series. The coefficients but the first, which is exact, are then known to round-off: their
+#: terms fall like k**-10 and faster. Ten times fewer would leave 1e-8 of the second coefficient.
 _POLES = 60
 
 
@@ -89,8 +90,7 @@ def foundation(x):
     return 2 * (1 + e * e - 2 * e * math.cos(x)) / (x * (1 - e * e + 2 * e * math.sin(x)))
 
 
-# --- the energy
-# -----------------------------------------------------------------------------------------------------------------
+# --- the energy -------------------------------------------------------------------------------------------------------------
 
 
 class Section(NamedTuple):
@@ -176,8 +176,7 @@ def strain_energy(w1, w3, kappa_n, nu, Gamma) -> tuple:
     return section_derivatives(w1, w3, kappa_n, isotropic(nu, Gamma))
 
 
-# --- circles and arcs
-# -----------------------------------------------------------------------------------------------------------
+# --- circles and arcs -------------------------------------------------------------------------------------------------------
 
 
 def on_circle(ratio, nu, width) -> tuple:
@@ -246,8 +245,7 @@ def first_zero_of_t(nu: float, width: float) -> float | None:
     return float(brentq(t, grid[below[0] - 1], grid[below[0]], xtol=1e-15)) if below.size else None
 
 
-# --- the Legendre transform
-# -----------------------------------------------------------------------------------------------------
+# --- the Legendre transform -------------------------------------------------------------------------------------------------
 
 
 def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
@@ -313,11 +311,10 @@ def ribbon_strains(M1, M3, kappa_n, section: Section):
 def start(M1, M3, kappa_n, section: Section):
     """Return the strains at which the search for the minimum of U - M.omega starts, and whether they are the ribbon's.
 
-    They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as
-    long as
-    there is a minimum. They are the flat rod's where the ribbon has none, and where the ribbon's other root, a < 0, has
-    omega_1 > 0
-    and M1 is negative: that root is no minimum of the ribbon's U, but a strip of finite width, nearly planar there, has one.
+    They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as long
+    as there is a minimum. They are the flat rod's where the ribbon has none, and where the ribbon's other root, a < 0, has
+    omega_1 > 0 and M1 is negative: that root is no minimum of the ribbon's U, but a strip of finite width, nearly planar there,
+    has one.
     """
     import numpy as np
 
@@ -339,10 +336,12 @@ def flat_rod_strains(M1, M3, kappa_n, section: Section):
     return kappa_n + M1 / section.plane, M3 / (2 * section.twist)
 
 
-#: Part of the moment below which the ribbon's a is round-off; it has no bending then.
+#: Part of the moment below which the ribbon's a is round-off, 1e-16 of p: it has no bending then. Larger values leave states of
+#: little bending to the flat rod's start.
 _LEAST = 1e-12
-#: Rounds in which the strains of a ribbon are computed with the part of its membrane energy that a strip of this width has.
-#: With two, the branches (9, 5) and (1, 5) of the tests are followed; with none they end at jumps to another minimum.
+#: Rounds in which the strains of a ribbon are computed with the part of its membrane energy that a strip of this width has. With
+#: two, the branches (9, 5) and (1, 5) of the tests are followed; with none they end at jumps to another minimum.
 _ROUNDS = 2
-#: x**4 from which the search starts like a ribbon.
+#: x**4 from which the search starts like a ribbon; .1 to 1 follow the same branches. With 0 (measured without rounds) branches
+#: are lost beside their circles.
 _WIDE = 1.0

@@ -138,8 +138,7 @@ def test_the_response_carries_derivatives():
 
 
 def test_limits_of_the_response():
-    """Gamma = 0: the flat rod with modulus 1 - nu^2, to 3 units in the last place, with an error O(Gamma^2); ribbon:
-    O(1/sqrt(Gamma))."""
+    """Gamma = 0: the flat rod with modulus 1 - nu^2, to 3 units in the last place; its error is O(Gamma^2); ribbon: O(1/sqrt(Gamma))."""
     plane = 1 - NU**2
     for M1, M3, kappa_n in ((0.4, 0.3, 1.5), (-1.0, 0.5, 2.0)):
         H, w1, _, w3, star = FLAT_ROD.response(M1 / plane, 0, M3 / plane, kappa_n, NU)
@@ -225,8 +224,7 @@ def test_a_branch_stops_where_the_law_ends():
 
 
 def test_a_branch_on_which_the_energy_has_two_minima():
-    """(1, 5), nu = .4, Gamma = 40: the minimum of U - M.omega of the neighbouring places is kept, to the circle at the other
-    end.
+    """(1, 5), nu = .4, Gamma = 40: the minimum of U - M.omega of neighbouring places is kept, to the circle at the other end.
 
     Its kappa_n is the closed form; the folds are those of `exact_finite_width.curve`, which takes 40 s.
     """
