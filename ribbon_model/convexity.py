@@ -16,16 +16,14 @@ from ribbon_model.domains import StripProblem
 from ribbon_model.equilibrium import moment_with_force, moment_without_force
 from ribbon_model.laws import Law
 
-#: Parts of a line between strains at neighbouring nodes. U is concave on a tenth of a jump at least (measured on (3, 1)).
-_PARTS = 16
 NAME = "the end of the convex strain energy"
 
 
 def margin(law: Law) -> Callable | None:
     """``margin(system, x)``: the least det D2U / (U_11 U_33) along the strip, 1 on planar circles, -1 without a response.
 
-    It is computed for the strains at the nodes and on straight lines between neighbouring nodes, which detects jumps. None
-    for a law whose H is a closed expression, because its domain is known.
+    It is computed for the strains at the nodes and halfway between neighbouring nodes, which detects jumps. None for a law
+    whose H is a closed expression, because its domain is known.
     """
     return _least if law.ends_with_convexity else None
 
@@ -34,7 +32,7 @@ def _least(system, x):
     problem, p, u = system.problem, system.all_parameters(x), system.states(x)
     names = tuple(problem.parameters)
     w = _strains(problem).values(system.nodes, np.ascontiguousarray(u), u[:0], p)
-    w = np.concatenate([w[:-1] + part * np.diff(w, axis=0) for part in np.arange(_PARTS) / _PARTS] + [w[-1:]])
+    w = np.concatenate([w, (w[1:] + w[:-1]) / 2])
     law, known = problem.law, dict(zip(names, p))
     stiffness = law.strain_energy(w, known["kappa_n"], *(known[name] for name in law.parameters))[2]
     U11, U13, U33 = stiffness[:, 0, 0], stiffness[:, 0, 2], stiffness[:, 2, 2]

@@ -45,7 +45,7 @@ def moments(random, Gamma):
 def test_the_membrane_function_against_its_definition():
     """g and four derivatives, by mpmath with 120 digits, on both sides of the series' limit and where cosh overflows.
 
-    Measured: 4e-16 of g, 7e-16, 2e-15, 8e-15 and 1e-13 of its derivatives at most.
+    Measured: 3e-16 of g, 9e-16, 2e-15, 3e-15 and 2e-14 of its derivatives at most.
     """
     orders = [finite_width.membrane]
     for _ in range(4):
@@ -60,7 +60,7 @@ def test_the_membrane_function_against_its_definition():
         for z in (0.01, 3.0, 16.0, 40.0, limit * (1 - 1e-15), limit, 100.0, 200.0, 1e5, 1e13):
             exact = [mpmath.diff(g, mpmath.mpf(z), k, h=mpmath.mpf(z) * mpmath.mpf(10) ** -20) for k in range(5)]
             errors = [abs(float(order(z) / value - 1)) for order, value in zip(orders, exact)]
-            assert np.all(np.array(errors) < [1e-15, 3e-15, 1e-14, 4e-14, 3e-13]), (z, errors)
+            assert np.all(np.array(errors) < [1e-15, 3e-15, 8e-15, 2e-14, 6e-14]), (z, errors)
     exact = (1 / 180, -1 / 22680, 2 * 2879 / 8172964800)
     assert [order(0.0) for order in orders[:3]] == pytest.approx(exact, rel=3e-15)
 
@@ -138,7 +138,7 @@ def test_the_response_carries_derivatives():
 
 
 def test_limits_of_the_response():
-    """Gamma = 0: the flat rod with modulus 1 - nu^2, to 3 units in the last place; its error is O(Gamma^2); ribbon: O(1/sqrt(Gamma))."""
+    """Gamma = 0: the flat rod with modulus 1 - nu^2, to 3 units in the last place; O(Gamma^2); ribbon: O(1/sqrt(Gamma))."""
     plane = 1 - NU**2
     for M1, M3, kappa_n in ((0.4, 0.3, 1.5), (-1.0, 0.5, 2.0)):
         H, w1, _, w3, star = FLAT_ROD.response(M1 / plane, 0, M3 / plane, kappa_n, NU)
