@@ -28,7 +28,8 @@ from contin.discretization.connections import ConnectionCollocation
 from contin.linalg.orientation import oriented
 from contin.stepping.trial import TestFunction, Trial
 
-#: A null vector's part at an end below this part of its length is round-off: the orbit is long.
+#: A null vector's part at an end below this part of its length is round-off: the orbit is long. So is the component of a vector
+#: along another one, below this part of both lengths: where equations separate it is that everywhere, with any sign.
 _NOTHING = 1e-12
 #: With a larger gap the orbit is not close to a homoclinic one.
 _FAR = 0.2
@@ -137,9 +138,15 @@ def _flip(label: str, name: str, side: int, function: Callable[[ConnectionColloc
     return TestFunction(label, name, value)
 
 
+def _component(unit: Array, vector: Array) -> float:
+    """Return the component of a vector along one of unit length; 0 where it is round-off."""
+    component = float(unit @ vector)
+    return component if abs(component) > _NOTHING * float(np.linalg.norm(vector)) else 0.0
+
+
 def _orbit_flip(side: int) -> TestFunction:
     def component(system: ConnectionCollocation, x: Array) -> float:
-        return float(_leading_vectors(system, x, side)[1] @ system.apart(x)[1 - side])
+        return _component(_leading_vectors(system, x, side)[1], system.apart(x)[1 - side])
 
     return _flip("OFU" if side else "OFS", "orbit flip", side, component)
 
@@ -150,7 +157,7 @@ def _inclination_flip(side: int) -> TestFunction:
         if not np.linalg.norm(system.adjoint_at_ends(x, known)[side]) > _NOTHING:
             return float("nan")
         adjoint = system.adjoint_at_ends(x, _left_null_vector(system, x, known))[side]
-        return float(_leading_vectors(system, x, side)[0] @ adjoint)
+        return _component(_leading_vectors(system, x, side)[0], adjoint)
 
     return _flip("IFU" if side else "IFS", "inclination flip", side, component)
 

@@ -30,6 +30,8 @@ _HALVINGS = 4
 _UNITS = 16
 #: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
 _FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
+#: ... or one that leads further than this from the point of the coarser mesh, in units of the arclength.
+_AWAY = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,4 +145,6 @@ def _zero_again(system: Discretization, x: Array, tangent: Array, test: TestFunc
         if value == before:
             break  # it does not depend on the place, and is not zero
         s, last = s - value * (s - last) / (value - before), s
+        if abs(s) > _AWAY:
+            break  # such a zero is another one, or the function is round-off
     raise ConvergenceError("the point was not found again on the finer mesh")

@@ -113,7 +113,7 @@ class ConnectionCollocation(Conditioned):
             A = field[()] = self._jacobian_at(place[0], p)
             Q = self._bases[end]
             left = _left_subspace(A, self.problem.conditions[end], stable=end == 0)
-            L = np.linalg.solve(left @ Q.T, left)
+            L = _normalized(left, Q)
             known: dict[Numbers, Array] = {(): L}
             N = null_space(Q) if len(Q) else np.eye(n)
             inside, own = N.T @ (A - A @ Q.T @ L) @ N, L @ A @ Q.T
@@ -287,6 +287,21 @@ def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:
     if found != count:
         raise ConvergenceError(f"the equilibrium has not {count} eigenvalues of one kind")
     return np.ascontiguousarray(vectors[:, :count].T)
+
+
+def _normalized(left: Array, basis: Array) -> Array:
+    """Return the basis L of the space of ``left`` with L Q^T = I, for the basis Q of a space near by.
+
+    Raises
+    ------
+    ConvergenceError
+        A direction of one space is orthogonal to the other one: L has no finite entries.
+    """
+    try:
+        found: Array = np.linalg.solve(left @ basis.T, left)
+    except np.linalg.LinAlgError:
+        raise ConvergenceError("the eigenvectors of the equilibrium have turned by 90 degrees within one step") from None
+    return found
 
 
 def _orthonormal(left: Array) -> Array:

@@ -7,11 +7,14 @@ eigenvalues are a + 1 and a - 1.
 import functools
 import math
 
+import numpy as np
 import pytest
 from cycles.noted import NOTES
 
 import contin
 from contin import AlgebraicProblem, ConnectionProblem, ProblemError
+from contin.detection import homoclinic_points
+from contin.discretization import connections
 
 #: Where AUTO-07p locates the flips it does so at the tolerance 1e-7 of the demo; at tighter ones it gives up.
 AUTO = 2e-6
@@ -137,3 +140,15 @@ def test_an_orbit_in_one_parameter_has_none():
     assert [point.label for point in branch if point.label] == ["EP", "EP"]
     with pytest.raises(ProblemError, match="must be"):
         contin.curve(orbit, "a")
+
+
+def test_a_component_that_is_round_off_has_no_sign():
+    """z and w do not act on x and y: the orbit's components along them are 0 everywhere, and no flip is found."""
+    vector = np.array([0.6, 0.8, 1e-30, -1e-55])
+    assert homoclinic_points._component(np.array([0, 0, 0.6, 0.8]), vector) == 0
+    assert homoclinic_points._component(np.array([1.0, 0, 0, 0]), vector) == 0.6
+
+
+def test_a_space_that_turned_by_a_right_angle_is_an_error_of_the_step():
+    with pytest.raises(contin.ConvergenceError, match="turned by 90 degrees"):
+        connections._normalized(np.array([[0.0, 0, 0.6, 0.8]]), np.array([[1.0, 0, 0, 0]]))
