@@ -298,10 +298,9 @@ def _normalized(left: Array, basis: Array) -> Array:
         A direction of one space is orthogonal to the other one: L has no finite entries.
     """
     try:
-        found: Array = np.linalg.solve(left @ basis.T, left)
+        return np.asarray(np.linalg.solve(left @ basis.T, left), dtype=float)
     except np.linalg.LinAlgError:
         raise ConvergenceError("the eigenvectors of the equilibrium have turned by 90 degrees within one step") from None
-    return found
 
 
 def _orthonormal(left: Array) -> Array:

@@ -240,7 +240,10 @@ class Interpreted:
             for index in range(len(self._functions)):
                 columns.append(self._function_values(index, t, x))
         shapes = [(len(x), max(count, 1)) for count in self._counts]
-        return np.hstack([column.reshape(shape) for column, shape in zip(columns, shapes)])
+        found = np.hstack([column.reshape(shape) for column, shape in zip(columns, shapes)])
+        if np.iscomplexobj(found) and not np.iscomplexobj(x):  # Python's (-1.0) ** 0.5 is complex: it has no real value
+            found = np.where(found.imag == 0, found.real, np.nan)
+        return found
 
     def _function_values(self, index: int, t: Array, x: Array) -> Array:
         if len(x) > 1 and self._takes_arrays(index, t, x):

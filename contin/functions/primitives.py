@@ -53,11 +53,10 @@ class Primitive:
 
 
 def _quiet(function: Callable[..., Any]) -> Callable[..., float]:
-    """Return a NumPy function of numbers after ``data``, without warnings."""
+    """Return a NumPy function of numbers after ``data``. It warns; callers silence it, once for all operations."""
 
     def evaluate(data: Any, *operands: Any) -> float:
-        with np.errstate(all="ignore"):
-            return float(function(*map(np.float64, operands)))
+        return float(function(*map(np.float64, operands)))
 
     return evaluate
 

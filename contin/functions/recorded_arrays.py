@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import functools
 import math
+import operator
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex, is_complex, part
 from contin.functions.tables import Table
 from contin.functions.tape import Number, Tape, Unrecordable, power
 
@@ -32,6 +34,22 @@ class Numbers(np.ndarray):
         """Return the product with a vector or matrix."""
         return matrix_product(self, other)
 
+    @property  # type: ignore[misc]
+    def real(self) -> Any:
+        """The real parts."""
+        return _parts(self, "real")
+
+    @property  # type: ignore[misc]
+    def imag(self) -> Any:
+        """The imaginary parts."""
+        return _parts(self, "imag")
+
+    def conj(self) -> Any:
+        """Return the conjugate numbers."""
+        return _parts(self, "conjugate")
+
+    conjugate = conj
+
 
 def numbers(values: Any) -> Any:
     """Return an array of objects as `Numbers`."""
@@ -42,15 +60,15 @@ def numbers(values: Any) -> Any:
     return array.view(Numbers)
 
 
-def recorded(*values: Any) -> Number | None:
+def recorded(*values: Any) -> Number | ComplexNumber | None:
     """Return the first recorded number among values and the elements of arrays, lists and tuples; None without any."""
     for value in values:
-        if isinstance(value, Number):
+        if isinstance(value, (Number, ComplexNumber)):
             return value
         if isinstance(value, (list, tuple)):
             found = recorded(*value)
         elif isinstance(value, np.ndarray) and value.dtype == object:
-            found = next((each for each in value.flat if isinstance(each, Number)), None)
+            found = next((each for each in value.flat if isinstance(each, (Number, ComplexNumber))), None)
         else:
             continue
         if found is not None:
@@ -71,7 +89,7 @@ def elementwise(function: Callable[..., Any], *inputs: Any) -> Any:
 
 def _plain(value: Any) -> Any:
     """Return an array without our own class, so that NumPy's functions act on it as they are."""
-    if isinstance(value, Number):
+    if isinstance(value, (Number, ComplexNumber)):
         array = np.empty((), dtype=object)
         array[()] = value
         return array
@@ -96,14 +114,15 @@ def _nested(value: Any) -> Any:
     return value.view(np.ndarray) if isinstance(value, Numbers) else value
 
 
-# --- functions of numbers
-# -------------------------------------------------------------------------------------------------------
+# --- functions of numbers -----------------------------------------------------------------------------------------------
 
 
 def operation(name: str) -> Callable[..., Any]:
     """Return the function of numbers that records an operation, and computes it for ordinary numbers."""
 
     def apply(*values: Any) -> Any:
+        if any(map(is_complex, values)):
+            return function_of_complex(name, *values[:1])
         tape = _tape(values)
         if tape is None:
             scratch = Tape()
@@ -123,6 +142,9 @@ def select(condition: Any, a: Any, b: Any) -> Any:
     tape = _tape((condition, a, b))
     if tape is None or not isinstance(condition, Number):
         return a if condition else b
+    if is_complex(a) or is_complex(b):
+        a, b = complex_number(tape, a), complex_number(tape, b)
+        return ComplexNumber(tape, select(condition, a.real, b.real), select(condition, a.imag, b.imag))
     return tape.apply("select", condition, a, b)
 
 
@@ -136,7 +158,14 @@ def smallest(a: Any, b: Any) -> Any:
     return select(b < a, b, a)
 
 
+def _parts(values: Any, name: str) -> Any:
+    """Return a part of every number, or its conjugate."""
+    return elementwise(lambda value: part(value, name), values)
+
+
 def _power(a: Any, b: Any) -> Any:
+    if is_complex(a) or is_complex(b):
+        return a**b
     if isinstance(a, Number):
         return power(a, b)
     return power(b.tape.number(a), b) if isinstance(b, Number) else a**b
@@ -165,7 +194,8 @@ UFUNCS: dict[str, Callable[..., Any]] = {
     "equal": lambda a, b: a == b, "not_equal": lambda a, b: a != b, "logical_not": _not,
     "logical_and": lambda a, b: select(a, select(b, 1.0, 0.0), 0.0),
     "logical_or": lambda a, b: select(a, 1.0, select(b, 1.0, 0.0)),
-    "bitwise_and": lambda a, b: a & b, "bitwise_or": lambda a, b: a | b, "invert": lambda a: ~a, "conjugate": lambda a: a,
+    "bitwise_and": lambda a, b: a & b, "bitwise_or": lambda a, b: a | b, "invert": lambda a: ~a,
+    "conjugate": lambda a: part(a, "conjugate"),
     "heaviside": lambda a, b: select(a < 0, 0.0, select(a == 0, b, 1.0)), "clip": lambda a, low, high: clip(a, low, high),
     "deg2rad": lambda a: a * (math.pi / 180), "radians": lambda a: a * (math.pi / 180),
     "rad2deg": lambda a: a * (180 / math.pi), "degrees": lambda a: a * (180 / math.pi),
@@ -261,6 +291,8 @@ def total(values: Sequence[Any]) -> Any:
     tape = _tape(values)
     if tape is None:
         return sum(values)
+    if any(map(is_complex, values)):
+        return functools.reduce(lambda a, b: a + b, values)
     known = [value for value in values if not isinstance(value, Number)]
     terms = [value for value in values if isinstance(value, Number)]
     constant = math.fsum(map(float, known))
@@ -268,8 +300,7 @@ def total(values: Sequence[Any]) -> Any:
     return terms[0] if len(terms) == 1 else tape.apply("sum", *terms)
 
 
-# --- products with matrices
-# -----------------------------------------------------------------------------------------------------
+# --- products with matrices ---------------------------------------------------------------------------------------------
 
 
 def matrix_product(a: Any, b: Any) -> Any:
@@ -294,7 +325,7 @@ def scalar_product(a: Sequence[Any], b: Sequence[Any]) -> Any:
     if len(a) != len(b):
         raise ValueError(f"vectors of {len(a)} and {len(b)} numbers have no product")
     tape = _tape([*a, *b])
-    if tape is None:
+    if tape is None or any(map(is_complex, [*a, *b])):
         return sum(x * y for x, y in zip(a, b))
     if any(isinstance(x, Number) and isinstance(y, Number) for x, y in zip(a, b)):
         return tape.number(0.0) if not a else (a[0] * b[0] if len(a) == 1 else tape.apply("dot", *a, *b))
@@ -336,9 +367,14 @@ class SparseConstant:
         if given.ndim != 1 or given.size != rows.shape[1]:
             raise ValueError(f"a matrix of shape {rows.shape} times an array of shape {given.shape}")
         values, result = given.tolist(), np.empty(rows.shape[0], dtype=object)
+        mixed = rows.dtype.kind == "c" or any(map(is_complex, values))
         for i, (first, last) in enumerate(zip(rows.indptr, rows.indptr[1:])):
-            terms = zip(rows.data[first:last].tolist(), rows.indices[first:last].tolist())
-            result[i] = linear(tape, [(factor, values[j]) for factor, j in terms])
+            terms = list(zip(rows.data[first:last].tolist(), rows.indices[first:last].tolist()))
+            result[i] = (
+                sum(factor * values[j] for factor, j in terms)
+                if mixed
+                else linear(tape, [(factor, values[j]) for factor, j in terms])
+            )
         return result.view(Numbers)
 
     def dot(self, vector: Any) -> Any:
@@ -352,8 +388,7 @@ class SparseConstant:
         return self.dot(factor) if recorded(factor) is not None and np.ndim(factor) else NotImplemented
 
 
-# --- functions of NumPy
-# ---------------------------------------------------------------------------------------------------------
+# --- functions of NumPy -------------------------------------------------------------------------------------------------
 
 
 def function_of_numbers(function: Any, inputs: Any, options: dict[str, Any]) -> Any:
@@ -367,7 +402,7 @@ def function_of_numbers(function: Any, inputs: Any, options: dict[str, Any]) -> 
 
 
 def _without_class(value: Any) -> Any:
-    if isinstance(value, (Number, Numbers)):
+    if isinstance(value, (Number, ComplexNumber, Numbers)):
         return _plain(value)
     if type(value) in (list, tuple):
         return type(value)(_without_class(part) for part in value)
@@ -393,6 +428,8 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
     if axis is not None or keepdims or (ord not in (None, 2) or (ord == 2 and values.ndim != 1)):
         raise Unrecordable("it calls np.linalg.norm with an order or an axis")
     listed = values.ravel().tolist()
+    if any(map(is_complex, listed)):
+        listed = [each for value in listed for each in (value.real, value.imag)]
     return operation("sqrt")(scalar_product(listed, listed))
 
 
@@ -455,13 +492,22 @@ def _like(value: Any) -> Callable[..., Any]:
 #: Functions of NumPy that are not universal, and are written for recorded numbers here.
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _where, np.linalg.norm: _norm, np.interp: _interp, np.clip: _clip, np.cross: _cross, np.dot: matrix_product,
-    np.vdot: lambda a, b: scalar_product(_plain(a).ravel().tolist(), _plain(b).ravel().tolist()),
+    np.vdot: lambda a, b: scalar_product(np.ravel(_plain(_parts(a, "conjugate"))).tolist(), _plain(b).ravel().tolist()),
     np.inner: matrix_product, np.polyval: _polyval, np.zeros_like: _like(0.0), np.ones_like: _like(1.0),
     np.empty_like: _like(0.0), np.full_like: _like(0.0),
     np.sum: _reduction("add"), np.prod: _reduction("multiply"), np.mean: _mean, np.max: _reduction("maximum"),
     np.min: _reduction("minimum"), np.amax: _reduction("maximum"), np.amin: _reduction("minimum"),
     np.any: _reduction("logical_or"), np.all: _reduction("logical_and"),
-    np.real: lambda a: a, np.imag: lambda a: 0.0 * a, np.asarray: lambda a, *_, **__: numbers(_plain(a)),
+    np.real: lambda a: _parts(a, "real"), np.imag: lambda a: _parts(a, "imag"),
+    np.angle: lambda z: elementwise(lambda value: operation("atan2")(value.imag, value.real), z),
+    np.asarray: lambda a, *_, **__: numbers(_plain(a)),
+}  # fmt: skip
+
+
+#: Operations of complex numbers by the names of those of real ones.
+_OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
+    "add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv, "pow": operator.pow,
+    "eq": operator.eq,
 }  # fmt: skip
 
 
@@ -470,6 +516,16 @@ class NumPy:
 
     universal = staticmethod(ufunc_of_numbers)
     function = staticmethod(function_of_numbers)
+
+    @staticmethod
+    def complex_operation(name: str, a: Any, b: Any) -> Any:
+        """Return an operation of a recorded and a complex number."""
+        function = _OPERATORS.get(name)
+        if function is None:
+            raise Unrecordable("it orders complex numbers")
+        tape = _tape((a, b))
+        assert tape is not None
+        return function(complex_number(tape, a), complex_number(tape, b))
 
 
 NUMPY = NumPy()

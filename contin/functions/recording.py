@@ -18,6 +18,7 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.program import TIME
 from contin.functions.recorded_arrays import NUMPY, _plain, numbers
+from contin.functions.recorded_complex import ComplexNumber
 from contin.functions.recorded_function import RecordedFunction
 from contin.functions.signature import Arguments, Signature, argument_count, named_values, takes_arrays
 from contin.functions.stand_ins import prepared
@@ -167,15 +168,24 @@ def _joined(tape: Tape, condition: int, values: list[int], others: list[int]) ->
 def _places(tape: Tape, call: Callable[[Any], Sequence[Any]], copy: Any) -> list[int]:
     """Return the places of a function's values on one path; none where Python raises an error of arithmetic."""
     try:
-        return [tape.number(value).place for value in call(copy)]
+        return [tape.number(_real(value)).place for value in call(copy)]
+    except ProblemError:
+        raise
     except (ArithmeticError, ValueError) as error:
         if isinstance(error, ValueError) and "domain" not in str(error):
             raise Unrecordable(_sentence(error)) from error
         return []
-    except ProblemError:
-        raise
     except Exception as error:  # a user's function may raise anything when it is not given floating-point numbers
         raise Unrecordable(_sentence(error)) from error
+
+
+def _real(value: Any) -> Any:
+    """Return a value that a function returns; of a complex number without an imaginary part, the real one."""
+    if not isinstance(value, ComplexNumber):
+        return value
+    if value.imag.known == 0:
+        return value.real
+    raise ProblemError("a function returns a complex number; it must return its real and its imaginary part as two numbers")
 
 
 #: Most decisions on one path.

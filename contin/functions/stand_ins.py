@@ -7,6 +7,7 @@ stand for functions that take both. Everything else is what it was: globals, clo
 from __future__ import annotations
 
 import builtins
+import cmath
 import functools
 import math
 import types
@@ -28,6 +29,8 @@ from contin.functions.recorded_arrays import (
     smallest,
     tabulated,
 )
+from contin.functions.recorded_complex import FUNCTIONS as COMPLEX
+from contin.functions.recorded_complex import ComplexNumber, complex_number, function_of_complex
 from contin.functions.recorded_function import RecordedFunction
 from contin.functions.tables import Table
 from contin.functions.tape import Number, Unrecordable, power
@@ -98,7 +101,7 @@ class _Copies:
 
     def value(self, value: Any) -> Any:
         """Return what stands for a value."""
-        if isinstance(value, (Number, Numbers, RecordedFunction, _Module, _Object)):
+        if isinstance(value, (Number, ComplexNumber, Numbers, RecordedFunction, _Module, _Object)):
             return value
         own = _own(value)
         if own is not None:
@@ -202,8 +205,8 @@ def _may_hold_functions(value: Any) -> bool:
 def _is_object(value: Any) -> bool:
     """Return whether a value is an object of a user's class."""
     module = type(value).__module__
-    if module.partition(".")[0] in ("numpy", "scipy", "builtins") or module.startswith(_HERE):
-        return isinstance(value, types.SimpleNamespace)
+    if module.partition(".")[0] in ("numpy", "scipy") or module.startswith(_HERE):
+        return False
     if isinstance(value, (tuple, list, dict, type, float, int, str)):
         return False
     return isinstance(value, types.SimpleNamespace) or bool(type(value).__flags__ & _HEAP_TYPE)
@@ -298,7 +301,8 @@ def _maker(original: Any) -> Any:
         if original in (np.array, np.asarray, np.asanyarray, np.ascontiguousarray):
             return made
         kind = options.get("dtype")
-        return made.astype(object).view(Numbers) if made.dtype.kind == "f" and kind in (None, float, np.float64) else made
+        wide = kind in (None, float, np.float64, complex, np.complex128)
+        return made.astype(object).view(Numbers) if made.dtype.kind in "fc" and wide else made
 
     return make
 
@@ -315,6 +319,25 @@ class _FloatKind(type):
 
 class _Float(metaclass=_FloatKind):
     """The stand-in of ``float``: a recorded number stays what it is."""
+
+
+class _ComplexKind(type):
+    """The class of `_Complex`."""
+
+    def __call__(cls, real: Any = 0.0, imag: Any = 0.0) -> Any:
+        return complex(real, imag) if recorded(real, imag) is None else real + 1j * imag
+
+    def __instancecheck__(cls, value: Any) -> bool:
+        return isinstance(value, (complex, ComplexNumber))
+
+
+class _Complex(metaclass=_ComplexKind):
+    """The stand-in of ``complex``."""
+
+
+def _of_cmath(name: str) -> Any:
+    original = getattr(cmath, name)
+    return lambda z: original(z) if recorded(z) is None else function_of_complex(name, complex_number(recorded(z).tape, z))  # type: ignore[union-attr]
 
 
 def _ldexp(x: Any, n: Any) -> Any:
@@ -338,8 +361,7 @@ def _distance(p: Any, q: Any) -> Any:
 _RENAMED = {"fabs": "abs"}
 _OF_MATH = (
     "sqrt", "exp", "exp2", "expm1", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh",
-    "cosh",
-    "tanh", "asinh", "acosh", "atanh", "atan2", "erf", "erfc", "gamma", "lgamma", "fabs", "floor", "ceil", "trunc",
+    "cosh", "tanh", "asinh", "acosh", "atanh", "atan2", "erf", "erfc", "gamma", "lgamma", "fabs", "floor", "ceil", "trunc",
 )  # fmt: skip
 
 
@@ -364,8 +386,11 @@ _STAND_INS |= {
     math.fmod: _unless_recorded(math.fmod, lambda x, y: x - y * operation("trunc")(x / y)),
     math.dist: _unless_recorded(math.dist, _distance),
     max: _most(largest, max), min: _most(smallest, min),
-    float: _Float, np.float64: _Float,
+    float: _Float, np.float64: _Float, complex: _Complex, np.complex128: _Complex,
+    cmath.phase: _unless_recorded(cmath.phase, FUNCTIONS[np.angle]),
+    cmath.rect: _unless_recorded(cmath.rect, lambda r, phi: r * (operation("cos")(phi) + 1j * operation("sin")(phi))),
 }  # fmt: skip
+_STAND_INS |= {getattr(cmath, name): _of_cmath(name) for name in COMPLEX if hasattr(cmath, name)}
 _STAND_INS |= {
     each: _maker(each)
     for each in (
@@ -375,4 +400,4 @@ _STAND_INS |= {
 }  # fmt: skip
 _STAND_INS |= {each: own for each, own in FUNCTIONS.items() if each not in _STAND_INS and each is not np.asarray}
 #: Built-in functions that have a stand-in, by name.
-_BUILTINS = {name: _STAND_INS[getattr(builtins, name)] for name in ("max", "min", "float")}
+_BUILTINS = {name: _STAND_INS[getattr(builtins, name)] for name in ("max", "min", "float", "complex")}

@@ -130,7 +130,8 @@ class Tape:
         if primitive.constant is not None:
             known = [self.value(place) for place in places]
             if places and None not in known:
-                return self.constant(primitive.constant(data, *known))
+                with np.errstate(all="ignore"):
+                    return self.constant(primitive.constant(data, *known))
         if primitive.simplify is not None:
             simpler = primitive.simplify(self, places)
             if simpler is not None:
@@ -213,7 +214,12 @@ class Tape:
     def evaluate(self, places: Sequence[int], values: Mapping[Any, float]) -> list[float]:
         """Return the values of operations in Python, for ``values`` of the inputs by slot."""
         found: dict[int, Any] = {}
-        for place in self.needed(places):
+        with np.errstate(all="ignore"):
+            self._evaluate(found, self.needed(places), values)
+        return [float(found[place]) for place in places]
+
+    def _evaluate(self, found: dict[int, Any], needed: Iterable[int], values: Mapping[Any, float]) -> None:
+        for place in needed:
             operation = self.operations[place]
             if operation.name == "input":
                 found[place] = values[operation.data]
@@ -224,7 +230,6 @@ class Tape:
             else:
                 evaluate = primitives.TABLE[operation.name].evaluate
                 found[place] = evaluate(operation.data, *(found[operand] for operand in operation.operands))
-        return [float(found[place]) for place in places]
 
     def lines(self, places: Sequence[int], labels: Mapping[int, str]) -> list[str]:
         """Return operations as lines of text, with ``labels`` of inputs by place; what is used once stands where it is used."""
@@ -273,9 +278,11 @@ class Number:
         return self
 
     def _with(self, name: str, *operands: Any) -> Any:
-        if any(not _is_scalar(operand) for operand in operands):
-            return NotImplemented
-        return self.tape.apply(name, *operands)
+        if all(_is_scalar(operand) for operand in operands):
+            return self.tape.apply(name, *operands)
+        if any(isinstance(operand, (complex, np.complexfloating)) for operand in operands):
+            return self._arrays.complex_operation(name, *operands)
+        return NotImplemented
 
     def __add__(self, other: Any) -> Any:
         return self._with("add", self, other)
@@ -314,10 +321,10 @@ class Number:
         return _floor_of(self._with("div", other, self))
 
     def __pow__(self, other: Any) -> Any:
-        return power(self, other) if _is_scalar(other) else NotImplemented
+        return power(self, other) if _is_scalar(other) else self._with("pow", self, other)
 
     def __rpow__(self, other: Any) -> Any:
-        return power(self.tape.number(other), self) if _is_scalar(other) else NotImplemented
+        return power(self.tape.number(other), self) if _is_scalar(other) else self._with("pow", other, self)
 
     def __neg__(self) -> Number:
         return self.tape.apply("neg", self)
