@@ -574,11 +574,14 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
 
 def run(program: Program, points: tuple[Array, Array, Array], p: Array, out: Array, jac: Array) -> None:
     """Run a program at points (t, u, v) with parameters p; see `evaluate`."""
-    scalars = program.scalars.copy()
-    scalars[program.parameters : program.parameters + len(p)] = p
-    room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
-    instructions = Instructions(program.code, program.lists, scalars, program.tables)
+    try:
+        instructions, room = program.rooms.pop()  # another thread has its own
+    except IndexError:
+        instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables)
+        room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
+    instructions.scalars[program.parameters : program.parameters + len(p)] = p
     evaluate(instructions, program.first, program.last, Points(*points), room, out, jac)
+    program.rooms.append((instructions, room))
 
 
 def evaluated(program: Program, u: Array, count: int) -> Array:

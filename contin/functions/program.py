@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Container, Hashable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -68,6 +68,8 @@ class Program:
         Piecewise polynomials.
     unknowns : int
         Largest number of unknowns that are found together.
+    rooms : list
+        What the interpreter works in: one for each thread that has run the program.
     """
 
     code: Indices
@@ -80,6 +82,7 @@ class Program:
     operations: int
     tables: Array
     unknowns: int
+    rooms: list[Any] = field(default_factory=list, compare=False, repr=False)
 
 
 class Slope(NamedTuple):
