@@ -81,6 +81,8 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a + slack or not given[-1] >= b - slack:
             raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
     system = discretized(problem, mesh, options.degree, options.free, options.parameters)
+    if not isinstance(guess, Point):
+        system = system.on_breaks()
     if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
         return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
     states = _sampled(guess, system.nodes / order, len(problem.state_names))

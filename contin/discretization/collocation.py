@@ -16,7 +16,7 @@ import numpy as np
 from contin.arrays import Array, Indices
 from contin.discretization.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.discretization.basis import basis, interpolation
-from contin.discretization.mesh import MeshControl, adapted_mesh
+from contin.discretization.mesh import MeshControl, adapted_mesh, with_breaks
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
@@ -417,8 +417,21 @@ class Collocation(System):
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
         """Return the same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
-        mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control) if control.every else None
+        states = self._scaled_states(x)
+        mesh = adapted_mesh(self.basis, self.mesh, states, control, self.breaks) if control.every else None
         return None if mesh is None else self.on_mesh(mesh)
+
+    @functools.cached_property
+    def breaks(self) -> Array:
+        """Places where the equations have jumps or corners in t, whatever the states are: points of a good mesh."""
+        values = self.parameters
+        names = ["field", *(["functionals"] if self.problem.functionals else [])]
+        found = [self.problem.batch(name).switches(*self.problem.domain, values, self._free) for name in names]
+        return np.unique(np.concatenate(found))
+
+    def on_breaks(self) -> Collocation:
+        """Return the same problem on a mesh of as many intervals, with the breaks among its points."""
+        return self._with(mesh=with_breaks(self.mesh, self.breaks)) if len(self.breaks) else self
 
     def with_parameters(self, values: Mapping[str, float]) -> Collocation:
         """Return the same problem with other values of parameters that are not free."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -38,6 +39,10 @@ _DRIFTED = 1e-6
 _SHRUNK = 1e-7
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
 _MOVED = 1e-6
+
+
+#: Free parameters are multiplied by this to see whether a break of the forcing moves; it stands still within so much.
+_OTHERWISE, _STILL = 1.01, 1e-9
 
 
 class PeriodicCollocation(Collocation):
@@ -241,6 +246,15 @@ class ForcedCollocation(PeriodicCollocation):
     def with_reference(self, x: Array) -> ForcedCollocation:
         """Return the same: nothing needs a reference."""
         return self
+
+    @functools.cached_property
+    def breaks(self) -> Array:
+        """Places on the unit interval where the forcing has jumps or corners that no free parameter moves: t = s T(p)."""
+        moved = self.parameters.copy()
+        moved[self._free] *= _OTHERWISE
+        here, there = (self.problem.batch("field").switches(*self.problem.domain, p) for p in (self.parameters, moved))
+        still = np.abs(here[:, None] - there) <= _STILL if there.size else np.zeros((here.size, 1), dtype=bool)
+        return here[still.any(axis=1)]
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a torus bifurcation; None near a double multiplier -1."""

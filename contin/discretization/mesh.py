@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,12 @@ class MeshControl:
         checks.whole("every", self.every, 0, 1_000_000)
 
 
-def density(basis: Basis, mesh: Array, states: Array) -> Array:
+#: Part of the domain within which a mesh point lies on a break.
+_ON_IT = 1e-12
+_NOWHERE = np.empty(0)
+
+
+def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) -> Array:
     """Return the (d+1)-th root of the size of the (d+1)-th derivative, by interval, shape (N,).
 
     The derivative comes from differences of the d-th ones of neighbouring intervals (de Boor 1973, as in AUTO and COLSYS),
@@ -71,6 +77,8 @@ def density(basis: Basis, mesh: Array, states: Array) -> Array:
     mesh : ndarray, shape (N + 1,)
     states : ndarray, shape (N d + 1, n)
         At the nodes.
+    breaks : ndarray, optional
+        Places where the equations have jumps or corners: differences across them are no errors.
     """
     d, h = basis.degree, mesh[1:] - mesh[:-1]
     if h.size < 2:
@@ -79,6 +87,8 @@ def density(basis: Basis, mesh: Array, states: Array) -> Array:
     derivative = np.einsum("l,jla->ja", basis.highest, local) / h[:, None] ** d
     jumps = np.abs(derivative[1:] - derivative[:-1]) / ((h[1:] + h[:-1]) / 2)[:, None]
     jumps = (jumps / np.maximum(1.0, np.abs(states).max(axis=0))).max(axis=1)
+    if len(breaks):
+        jumps = _without_breaks(jumps, mesh, breaks)
     both = np.empty((2, h.size))
     both[0, 1:], both[1, :-1] = jumps, jumps
     both[0, 0], both[1, -1] = jumps[0], jumps[-1]
@@ -86,21 +96,54 @@ def density(basis: Basis, mesh: Array, states: Array) -> Array:
     return result
 
 
-def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl) -> Array | None:
+def _without_breaks(jumps: Array, mesh: Array, breaks: Array) -> Array:
+    """Return the jumps at inner mesh points, that at a break no larger than the next ones on both sides."""
+    inside = _near(mesh[1:-1], breaks, mesh[-1] - mesh[0])
+    beside = np.concatenate([[-1.0], np.where(inside, -1.0, jumps), [-1.0]])
+    largest = np.maximum(beside[:-2], beside[2:])  # -1 where there is none
+    found: Array = np.where(inside & (largest >= 0), np.minimum(jumps, largest), jumps)
+    return found
+
+
+def _near(places: Array, breaks: Array, length: float) -> Array:
+    """Return which places lie on a break."""
+    found: Any = (np.abs(places[:, None] - breaks) <= _ON_IT * length).any(axis=1)
+    return np.asarray(found)
+
+
+def with_breaks(mesh: Array, breaks: Array) -> Array:
+    """Return a mesh of as many intervals whose points hold the breaks, as far as there are points for them."""
+    mesh, length = mesh.copy(), mesh[-1] - mesh[0]
+    taken = np.zeros(mesh.size, dtype=bool)
+    taken[[0, -1]] = True
+    for place in breaks:
+        at = int(np.searchsorted(mesh, place))
+        for j in sorted((at - 1, at), key=lambda j: abs(mesh[j] - place)):
+            if not taken[j]:
+                mesh[j], taken[j] = place, True
+                break
+            if abs(mesh[j] - place) <= _ON_IT * length:
+                break
+    return mesh
+
+
+def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl, breaks: Array = _NOWHERE) -> Array | None:
     """Return a better mesh for a solution, given by its states at the nodes, or None where the present one is good enough.
 
     It equidistributes the density (smoothed, and raised to at least a tenth of its mean so that no interval grows without
     bound) over as many intervals as ``control.tolerance`` takes.
     """
     h = np.diff(mesh)
-    phi = _raised(density(basis, mesh, states), h)
+    phi = _raised(density(basis, mesh, states, breaks), h)
     total = float(phi @ h)
     allowed = share(basis, control.tolerance)
     wanted = int(min(max(np.ceil(total / allowed), control.min_intervals), control.max_intervals))
     enough = wanted <= h.size <= max(_TOO_MANY * wanted, control.min_intervals)
+    there = breaks[_near(breaks, mesh, mesh[-1] - mesh[0])] if len(breaks) else breaks
+    enough = enough and len(there) == len(breaks)
     if enough and (phi * h).max() <= _TOO_LARGE * max(total / h.size, allowed * wanted / h.size):
         return None
-    return _equidistributed(mesh, phi, h.size if enough else wanted)
+    return _equidistributed(mesh, phi, max(h.size if enough else wanted, len(breaks) + 1), breaks)
 
 
 def share(basis: Basis, tolerance: float) -> float:
@@ -122,13 +165,21 @@ def _raised(phi: Array, h: Array) -> Array:
     return raised
 
 
-def _equidistributed(mesh: Array, phi: Array, intervals: int) -> Array:
-    """Return a mesh whose intervals have equal shares of the density."""
+def _equidistributed(mesh: Array, phi: Array, intervals: int, breaks: Array = _NOWHERE) -> Array:
+    """Return a mesh whose intervals have equal shares of the density; between breaks, which are mesh points, about equal."""
     h = np.diff(mesh)
     total = phi @ h
     if not total > 0:
-        return np.linspace(mesh[0], mesh[-1], intervals + 1)
+        return with_breaks(np.linspace(mesh[0], mesh[-1], intervals + 1), breaks)
     share = np.concatenate([[0.0], np.cumsum(phi * h)]) / total
-    new: Array = np.interp(np.linspace(0, 1, intervals + 1), share, mesh)
+    places = np.linspace(0, 1, intervals + 1)
+    if len(breaks):
+        ends = np.concatenate([[0.0], np.interp(breaks, mesh, share), [1.0]])
+        counts = np.maximum(np.rint(np.diff(ends) * intervals).astype(int), 1)
+        pieces = [np.linspace(a, b, count, endpoint=False) for a, b, count in zip(ends, ends[1:], counts)]
+        places = np.append(np.concatenate(pieces), 1.0)
+    new: Array = np.interp(places, share, mesh)
+    if len(breaks):
+        new[np.cumsum(counts)[:-1]] = breaks
     new[0], new[-1] = mesh[0], mesh[-1]
     return new

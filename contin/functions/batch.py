@@ -23,6 +23,7 @@ from contin.functions.interpreter import LANES, run
 from contin.functions.program import Inputs, Program, Slope, program
 from contin.functions.recording import Recording, checked, record
 from contin.functions.signature import Signature, named_values, takes_arrays
+from contin.functions.switches import switches, zeros
 from contin.functions.tape import Number, Unrecordable
 
 
@@ -201,6 +202,32 @@ class Batch:
         every = self.columns(range(len(self.signature.parameters)))
         pattern[every.rows, every.places] = True
         return pattern
+
+    def switches(self, low: float, high: float, p: Array, free: Sequence[int] | Indices = ()) -> Array:
+        """Return the times between ``low`` and ``high`` at which a condition on time alone changes, increasing.
+
+        ``free`` are parameters that may change: conditions on them move, and do not count. Empty for functions evaluated in
+        Python.
+        """
+        if self.recording is None or not self.signature.times:
+            return np.empty(0)
+        states, recording = len(self.signature.states), self.recording
+        tape, slots = recording.tape, (*range(states), *(states + int(slot) for slot in free))
+        moving = [recording.inputs[slot] for slot in slots]
+        found = self._kept(("switches", slots), lambda: switches(tape, recording.results, recording.time, moving))
+        if not found:
+            return np.empty(0)
+        run_at = self._kept(
+            ("switches of", slots),
+            lambda: program(tape, [(each.place, column) for column, each in enumerate(found)], self._inputs()),
+        )
+
+        def values(t: Array) -> Array:
+            out = np.empty((len(t), len(found)))
+            run(run_at, (t, np.zeros((len(t), states)), np.empty((0, states))), p, out, _NO_JACOBIAN)
+            return out
+
+        return zeros(found, values, low, high)
 
     # --- higher derivatives ------------------------------------------------------------------------------------------
 

@@ -1,0 +1,96 @@
+"""Where recorded functions have jumps and corners in time: places that belong to the mesh.
+
+A condition on time alone (``t < 0.4``, ``max(0, t - 1)``, a table of time) switches at the zeros of a function of time and of
+parameters that stand still. Conditions on states switch where the solution goes; nothing is known of them before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.functions.tape import Tape
+
+#: Places at which the sign of a switch is looked at first. Two switches closer than this part of the domain are missed unless
+#: one of them is known from another condition.
+_SAMPLES = 1000
+#: Halvings of an interval with a switch: down to the last digit of its ends.
+_HALVINGS = 60
+#: More switches than this are no corners but a curve: tables of so many knots.
+_MOST = 200
+#: Operations of one number with a corner or a jump at its zero, and those with one at every whole number.
+_AT_ZERO, _AT_WHOLE = ("abs", "sign"), ("floor", "ceil", "trunc")
+#: Conditions: they switch where their operands are equal.
+_CONDITIONS = ("lt", "le", "eq")
+
+
+class Switch(NamedTuple):
+    """A function of time whose sign matters: ``place`` on the tape, less the number ``level``; or its ``whole`` part."""
+
+    place: int
+    level: float = 0.0
+    whole: bool = False
+
+
+def switches(tape: Tape, results: Sequence[int], time: int, moving: Sequence[int]) -> list[Switch]:
+    """Return the switches of time alone that operations depend on; ``moving`` are inputs other than it that may change."""
+    needed = tape.needed(results)
+    every = [*results, time, *moving]
+    timely, changed = tape.reading(every, [time]), tape.reading(every, moving)
+    found: list[Switch] = []
+
+    def alone(*places: int) -> bool:
+        return any(timely[place] for place in places) and not any(changed[place] for place in places)
+
+    for place in needed:
+        name, operands, data = tape.operations[place]
+        if not operands or not alone(*operands):
+            continue
+        if name in _CONDITIONS:
+            found.append(Switch(tape.at("sub", (operands[0], operands[1]))))
+        elif name in _AT_ZERO:
+            found.append(Switch(operands[0]))
+        elif name in _AT_WHOLE:
+            found.append(Switch(operands[0], whole=True))
+        elif name == "mod":
+            found.append(Switch(tape.at("div", (operands[0], operands[1])), whole=True))
+        elif name == "table":
+            found += [Switch(operands[0], knot) for knot in data.breaks]
+    return list(dict.fromkeys(found)) if len(found) <= _MOST else []
+
+
+def zeros(found: Sequence[Switch], values: Callable[[Array], Array], low: float, high: float) -> Array:
+    """Return where switches happen inside a domain, increasing.
+
+    Parameters
+    ----------
+    values : callable
+        ``values(t)`` returns the values of all switches' places at times (K,), shape (K, switches).
+    """
+    levels, whole = np.array([each.level for each in found]), np.array([each.whole for each in found])
+
+    def signs(t: Array) -> Array:
+        value = values(t) - levels
+        return np.asarray(np.where(whole, np.floor(value), np.sign(value)))
+
+    places, edge = np.linspace(low, high, _SAMPLES + 1), 1e-12 * (high - low)
+    known = np.empty(0)
+    for _ in range(3):  # a switch may lie close to another one: looked for again beside those that are known
+        sampled = np.unique(np.concatenate([places, known, (known[1:] + known[:-1]) / 2]))
+        there = signs(sampled)
+        at, which = np.nonzero(there[1:] != there[:-1])
+        a, b, first = sampled[at], sampled[at + 1], there[at, which]
+        for _ in range(_HALVINGS):
+            middle = (a + b) / 2
+            same = signs(middle)[np.arange(len(middle)), which] == first if len(middle) else np.zeros(0, dtype=bool)
+            a, b = np.where(same, middle, a), np.where(same, b, middle)
+        merged = np.unique(np.concatenate([known, b]))
+        merged = merged[(merged > low + edge) & (merged < high - edge)]
+        merged = merged[np.append(True, np.diff(merged) > edge)] if merged.size else merged
+        if merged.size == known.size:
+            break
+        known = merged
+    return known if known.size <= _MOST else np.empty(0)
