@@ -225,7 +225,7 @@ def _describe_stage(config, event) -> str:
     label, error = event["label"].decode(), event[f"error_{name}"] * config.factor(name)
     found = label in ("LP", "BP") and not math.isnan(error)
     others = "".join(f", {text}" for text in (_with_error(config, event, column) for column in _shown(name)) if text)
-    place = f"{name} = {event[name] * config.factor(name):.10g}" + (f" (± {error:.0e})" if found else "")
+    place = f"{name} = {_rounded(event[name] * config.factor(name), error)}" + (f" (± {error:.0e})" if found else "")
     what = event["name"].decode()
     change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
     broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""
@@ -247,7 +247,12 @@ def _with_error(config, event, column: str) -> str:
         return ""
     value, error = (event[field] * config.factor(column) for field in (column, f"error_{column}"))
     unit = config.unit(column)
-    return f"{column} = {value:.10g}{f' {unit}' if unit else ''} (± {error:.0e})"
+    return f"{column} = {_rounded(value, error)}{f' {unit}' if unit else ''} (± {error:.0e})"
+
+
+def _rounded(value: float, error: float) -> str:
+    """Return a number with ten digits; 0 where it is smaller than its error."""
+    return "0" if abs(value) < error else f"{value:.10g}"
 
 
 def _describe(config, event) -> str:
