@@ -331,6 +331,8 @@ def start(M1, M3, kappa_n, section: Section):
     planar = (p < -abs(m3)) & (np.sqrt(p * p + m3 * m3) - p < 2 * section.nu * kappa_n)
     known = known & (section.C * w1 * w1 > _WIDE) & ~planar
     flat1, flat3 = flat_rod_strains(M1, M3, kappa_n, section)
+    stiffer = section.C * (section.nu * kappa_n) ** 2 / (180 * section.plane)
+    flat1 = np.where(planar & (stiffer < _STIFF), flat1 / (1 + stiffer), flat1)
     return np.where(known, w1, flat1), np.where(known, w3, flat3), known
 
 
@@ -344,5 +346,9 @@ _LEAST = 1e-12
 #: Rounds in which the strains of a ribbon are computed with the part of its membrane energy that a strip of this width has.
 #: With two, the branches (9, 5) and (1, 5) of the tests are followed; with none they end at jumps to another minimum.
 _ROUNDS = 2
+#: Stiffness of a small curvature by the membrane, g = 1/180, over that of the flat rod, below which U of a planar strip has one
+#: minimum or a second one that is shallow: the search then starts where this stiffness leads. Beyond, the circles may be the
+#: outer minimum (13 and more on (1, 5), (1, 7), (1, 10) of wide strips); on (2, 10), nu = .28, Gamma = 1.212, it is 2.9 to 4.
+_STIFF = 8.0
 #: x**4 from which the search starts like a ribbon.
 _WIDE = 1.0

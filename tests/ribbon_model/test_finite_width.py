@@ -224,6 +224,19 @@ def test_a_branch_stops_where_the_law_ends():
     assert not convexity.test_functions(RIBBON)
 
 
+@pytest.mark.parametrize(("nu", "Gamma", "fold"), [(0.28, 1.212, 45.619411), (0.32, 1.2, 43.075197)])
+def test_a_second_minimum_that_is_shallow_is_not_taken(nu, Gamma, fold):
+    """(2, 10): at the planar place of the cell U - M.omega has a second minimum; the fold lies beyond where it appears.
+
+    The fold is that of degree 4 on 40 intervals. `exact_finite_width.curve` follows the branch to within 3e-4 and .05 of it.
+    """
+    ends = convexity.test_functions(FINITE_WIDTH)
+    for intervals, degree in ((10, 7), (40, 4)):
+        system, x, tangent = primary_branch(FINITE_WIDTH, 2, 10, nu, intervals, degree, Gamma=Gamma)
+        found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, test_functions=ends), tangent)
+        assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([fold], abs=1e-6)
+
+
 def test_a_branch_on_which_the_energy_has_two_minima():
     """(1, 5), nu = .4, Gamma = 40: the minimum of U - M.omega of the neighbouring places is kept, to the circle at the other
     end.
