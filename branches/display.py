@@ -12,7 +12,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from branches.labels import label_of
+from branches.labels import CONJUGATE, label_of
 
 if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this module before it knows what to do
     from contin import Point
@@ -236,8 +236,6 @@ def _describe_stage(config, event) -> str:
 
 def _shown(name: str) -> tuple[str, ...]:
     """Return the columns that a labelled point is shown with: the energy, and what is conjugate to the followed number."""
-    from branches.open_branch import CONJUGATE  # not for --help
-
     return tuple(dict.fromkeys(("energy", CONJUGATE.get(name, "energy"))))
 
 

@@ -37,6 +37,13 @@ LABELS = {
     "EP": Label("end", "end", "o", END, 45),
     "MX": Label("end", "lost", "x", END, 40),
 }
+#: What a person feels or sees where a number of an open strip is followed: its conjugate, up to a sign. Others are shown with
+#: the energy.
+CONJUGATE = {
+    "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
+    "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
+    "weight": "rise", "roller": "F_roller",
+}  # fmt: skip
 #: Labels of points at which the pieces of a branch begin and end.
 SPECIAL = ("LP", "BP", "SB", "EP", "MX")
 #: Marks of kinds in diagrams: marker, colour, size.

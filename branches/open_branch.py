@@ -9,12 +9,11 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator
 
 from branches.config import dump
 from branches.draw_strip import standing
 from branches.files import StoreError
-from branches.labels import SPECIAL
+from branches.labels import CONJUGATE, SPECIAL
 from branches.open_config import OpenConfig
 from branches.read_closed import StoredBranch
 from ribbon_model.ends import DIRECTIONS
@@ -22,12 +21,7 @@ from ribbon_model.equilibrium import strains_of
 from ribbon_model.open_strip import OpenStrip
 from ribbon_model.shape import Shape, interpolated, shape_of
 
-#: What a person feels or sees where a number is followed: its conjugate, up to a sign. Others are shown with the energy.
-CONJUGATE = {
-    "distance": "F_tangent", "rise": "F_normal", "shear": "F_width", "turn": "M_tangent", "bend": "M_width",
-    "swing": "M_normal", "force_tangent": "distance", "force_normal": "rise", "force_width": "shear",
-    "weight": "rise", "roller": "F_roller",
-}  # fmt: skip
+# fmt: skip
 #: Two values of a number that is not followed are the same if they differ by less than this, relative to 1 + their size.
 _SAME = 1e-6
 
@@ -244,6 +238,8 @@ class OpenBranch(StoredBranch):
 
     def _between(self, rows: np.ndarray, i: int, name: str, value: float, column: np.ndarray) -> float:
         """Return a column where a number has a value between points i and i + 1 of a piece, from the points around."""
+        from scipy.interpolate import BarycentricInterpolator  # type: ignore[import-untyped]  # .2 s; only values between points need it
+
         near = rows[max(i - 1, 0) : i + 3]
         return float(BarycentricInterpolator(self.points[name][near], column[near])(value))
 

@@ -73,7 +73,7 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
         if not np.any(normal):
             break
         normal[np.diag_indices_from(normal)] += _LITTLE * np.trace(normal)
-        step = np.linalg.solve(normal, -gradient)
+        step = _solved(normal, -gradient, lam.size, (system.degree + 1) * lam.shape[1])
         part = 1.0
         for _ in range(_HALVINGS):
             new_lam = lam + part * step[: lam.size].reshape(lam.shape)
@@ -89,6 +89,21 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
         if gained <= _SETTLED * np.linalg.norm(residual) or np.linalg.norm(residual) < _SETTLED:
             break
     return lam, multipliers
+
+
+def _solved(normal: Array, right: Array, count: int, width: int) -> Array:
+    """Solve with a matrix that couples its first ``count`` unknowns, nodes in order, over less than ``width`` places only."""
+    from scipy.linalg import solve_banded  # type: ignore[import-untyped]  # .1 s; only this needs it
+
+    width = min(width, count)
+    bands = np.zeros((2 * width - 1, count))
+    for offset in range(1 - width, width):
+        diagonal = np.diagonal(normal[:count, :count], offset)
+        bands[width - 1 - offset, max(offset, 0) : max(offset, 0) + diagonal.size] = diagonal
+    border = normal[:count, count:]
+    inner = solve_banded((width - 1, width - 1), bands, np.column_stack([right[:count], border]))
+    last = np.linalg.solve(normal[count:, count:] - border.T @ inner[:, 1:], right[count:] - border.T @ inner[:, 0])
+    return np.append(inner[:, 0] - inner[:, 1:] @ last, last)
 
 
 def _equations(system: Collocation, states: Array, lam: Array, multipliers: Array, share: float) -> tuple[Array, Array, Array]:
