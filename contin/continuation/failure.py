@@ -10,19 +10,26 @@ import numpy as np
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
 from contin.names import exact_text
-from contin.stepping.newton import Newton
 from contin.stepping.settings import Settings
 from contin.stepping.state import State, Stop
 from contin.stepping.step import corrected, predict, turn
+from contin.stepping.trial import Trial
 
-#: A shorter step that is tried, as a part of ``min_step``. With a smaller one the advice would be good for more, and say less.
-_SHORTER = 1e-2
-#: Looser tolerances that are tried, as multiples of the one that failed: the smallest that succeeds is told.
+#: Shorter steps that are tried, as parts of ``min_step``: the largest that goes on is told.
+_SHORTER = (1e-2, 1e-4)
+#: Looser tolerances that are tried, as multiples of the one that failed: the smallest that goes on is told.
 _LOOSER = (1e3, 1e4, 1e5)
+#: An advice must let the run go on for so many steps, and over so many times ``min_step``: one step may succeed right before
+#: what ends the run. No more than the third number of steps are tried.
+_STEPS, _WAY, _MOST = 10, 2, 100
+#: Each of them is tried so much longer than the one before.
+_LONGER = 1.5
 #: The way along the tangent on which a corner is looked for, and the part that its bend has of the usual change of the residual
 #: on such a way: for a smooth function, it is about as large as the way.
 _CORNER, _JUMP = 1e-4, 0.1
-_OTHERWISE = "more intervals, a smaller min_step, scales for unknowns far from one, or a start elsewhere may help"
+#: On a tenth of the way the bend of a corner is a tenth, more than this part, and that of a smooth curve a hundredth, however
+#: small its radius.
+_LIKE = 0.05
 
 
 def no_convergence(state: State, settings: Settings, error: ConvergenceError) -> Stop:
@@ -33,47 +40,72 @@ def no_convergence(state: State, settings: Settings, error: ConvergenceError) ->
             "no convergence", f"the equations have no finite value a step of min_step = {least} further on",
             "look for what they divide by, or take a root or logarithm of: their domain ends there",
         )  # fmt: skip
-    if _meets_corner(state):
+    known = advice(state, settings)
+    if not known and _meets_corner(state):
         return Stop(
             "no convergence", f"the derivatives of the equations jump a step of min_step = {least} further on",
             "abs, max, min, if and tables have corners; a smooth form such as sqrt(x**2 + d**2) for abs(x) can be followed",
         )  # fmt: skip
-    return Stop("no convergence", f"the step became smaller than min_step = {least} ({error})", advice(state, settings))
+    return Stop(
+        "no convergence", f"the step became smaller than min_step = {least} ({error})", known or _as_it_is(state, settings)
+    )
 
 
 def _meets_corner(state: State) -> bool:
     """Return whether the residual bends within a short way along the tangent as only a corner does."""
-    system, x, way = state.system, state.x, _CORNER * state.tangent
+    bend, usual = _bend(state, _CORNER)
+    return bool(bend > _JUMP * usual and _bend(state, _CORNER / 10)[0] > _LIKE * bend)
+
+
+def _bend(state: State, length: float) -> tuple[float, float]:
+    """Return by how much the residual bends on a short way along the tangent, and its usual change on such a way."""
+    system, x, way = state.system, state.x, length * state.tangent
     here = system.residual(x)
     forth, back = (system.residual(x + sign * way) - here for sign in (1, -1))
     across = np.random.default_rng(17).standard_normal(system.size)
-    across *= _CORNER / np.sqrt(inner(system, across, across))
-    usual = np.max(np.abs(system.residual(x + across) - here), initial=0.0)
-    return bool(np.max(np.abs(forth + back), initial=0.0) > _JUMP * usual)
+    across *= length / np.sqrt(inner(system, across, across))
+    usual = system.residual(x + across) - here
+    return float(np.max(np.abs(forth + back), initial=0.0)), float(np.max(np.abs(usual), initial=0.0))
 
 
 def advice(state: State, settings: Settings) -> str:
-    """Return what lets the step of length ``min_step`` from a state succeed, or what else may help, as a clause."""
-    least, newton = settings.min_step, settings.newton
+    """Return what lets the run go on from a state, as a clause; empty where nothing that is tried does.
+
+    So it is where steps succeed as they are: then what lies on them is the reason.
+    """
+    way = settings.min_step
+    if _goes_on(state, settings, way):
+        return ""
     for times in _LOOSER:
-        loose = dataclasses.replace(newton, tolerance=times * newton.tolerance)
-        if _succeeds(state, least, settings, loose):
-            return f"a step succeeds with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
-    shorter = _SHORTER * least
-    if _succeeds(state, shorter, settings, newton):
-        return f"a step of {shorter:g} succeeds: set min_step to that or less"
+        loose = dataclasses.replace(settings.newton, tolerance=times * settings.newton.tolerance)
+        if loose.tolerance < 1 and _goes_on(state, dataclasses.replace(settings, newton=loose), way):
+            return f"the run goes on with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
+    for part in _SHORTER:
+        shorter = part * settings.min_step
+        if _goes_on(state, dataclasses.replace(settings, min_step=shorter, step=max(shorter, settings.step)), way):
+            return f"the run goes on with steps of {shorter:g}: set min_step to that or less"
     finer = _on_finer_mesh(state)
-    if finer is not None and _succeeds(finer, least, settings, newton):
-        return _mesh_advice(finer.system, settings)
-    return _OTHERWISE
+    return _mesh_advice(finer.system, settings) if finer is not None and _goes_on(finer, settings, way) else ""
+
+
+def _as_it_is(state: State, settings: Settings) -> str:
+    """Return what has been tried in vain, and what the last point looks like."""
+    system = state.system
+    tried = [f"steps of {_SHORTER[-1] * settings.min_step:g}", f"a tolerance of {_LOOSER[-1] * settings.newton.tolerance:g}"]
+    tried += ["twice the intervals"] if system.refined() else []
+    place = [f"{name} = {system.parameter(state.x, name):.6g}" for name in system.free]
+    place.append(f"its largest state is {np.max(np.abs(system.states(state.x)), initial=0.0):.3g}")
+    return f"tried in vain: {', '.join(tried)}; at the last point {', '.join(place)}"
 
 
 def _mesh_advice(system: Discretization, settings: Settings) -> str:
     """Return what allows the mesh of a system."""
     number = system.intervals
     if settings.mesh.every and number > settings.mesh.max_intervals:
-        return f"a step succeeds on {number} intervals: mesh=MeshControl(max_intervals={number}) or more, or a higher degree"
-    return f"a step succeeds on {number} intervals: mesh=MeshControl(min_intervals={number}) or a smaller tolerance of the mesh"
+        return f"the run goes on with {number} intervals: mesh=MeshControl(max_intervals={number}) or more, or a higher degree"
+    return (
+        f"the run goes on with {number} intervals: mesh=MeshControl(min_intervals={number}) or a smaller tolerance of the mesh"
+    )
 
 
 def _on_finer_mesh(state: State) -> State | None:
@@ -87,12 +119,31 @@ def _on_finer_mesh(state: State) -> State | None:
     return dataclasses.replace(state, system=system, x=carry(state.x), tangent=tangent, previous_tangent=previous)
 
 
-def _succeeds(state: State, step: float, settings: Settings, newton: Newton) -> bool:
-    """Return whether a step is corrected to a point that the tangents at both ends allow."""
-    guess = predict(state, step)
+def _goes_on(state: State, settings: Settings, way: float) -> bool:
+    """Return whether a run with these settings makes some steps from a state, and some times a ``way``."""
+    step, gone, way = settings.min_step, 0.0, _WAY * way
+    for number in range(_MOST):
+        if number >= _STEPS and gone >= way:
+            return True
+        trial = _next(state, step, settings)
+        while trial is None:
+            step /= 2
+            if step < settings.min_step:
+                return False
+            trial = _next(state, step, settings)
+        state = dataclasses.replace(
+            state, x=trial.x, tangent=trial.tangent, previous_tangent=state.tangent, previous_step=step, singular=False
+        )
+        gone += step
+        step = min(_LONGER * step, settings.max_step)
+    return False
+
+
+def _next(state: State, step: float, settings: Settings) -> Trial | None:
+    """Return the point at the end of a step; None where it is not found, or the tangent turns too far."""
     try:
-        trial = corrected(state, guess, step, newton)
+        trial = corrected(state, predict(state, step), step, settings.newton)
     except ConvergenceError:
-        return False
+        return None
     finite = np.all(np.isfinite(trial.system.residual(trial.x))) and np.isfinite(inner(state.system, trial.x, trial.x))
-    return bool(finite and turn(state, trial) <= settings.angle)
+    return trial if finite and turn(state, trial) <= settings.angle else None

@@ -89,21 +89,42 @@ def test_advice_for_a_step_that_is_too_long():
     circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 0.0025,), ["x"], {"a": 0.0})
     start = contin.solve(circle, [0.05])
     failed = contin.trace(start, free=["a"], min_step=0.2, step=0.2)
-    assert failed.points[-1].label == "MX" and failed.stop.advice == "a step of 0.002 succeeds: set min_step to that or less"
+    assert (
+        failed.points[-1].label == "MX"
+        and failed.stop.advice == "the run goes on with steps of 0.002: set min_step to that or less"
+    )
     assert contin.trace(start, free=["a"], min_step=1e-4, step=0.002).stop.reason == "closed"
 
 
 def test_advice_for_a_mesh(monkeypatch):
-    """Where the step succeeds on the mesh halved only, the advice names the setting that allows that mesh."""
+    """Where the run goes on with the mesh halved only, the advice names the setting that allows that mesh."""
     start = contin.trace(contin.solve(bratu(), [0, 0]), free=["lam"], limits={"lam": (0.1, 3)}).points[0]
     run = contin.Continuation(start.system, start.x)
     count = run.state.system.intervals
-    monkeypatch.setattr(failure, "_succeeds", lambda state, *_: state.system.intervals > count)
+    monkeypatch.setattr(failure, "_goes_on", lambda state, *_: state.system.intervals > count)
     for control, words in ((MeshControl(max_intervals=count), "max_intervals"), (MeshControl(), "min_intervals")):
         said = failure.advice(run.state, contin.Settings(mesh=control))
-        assert said.startswith(f"a step succeeds on {2 * count} intervals: mesh=MeshControl({words}={2 * count})")
-    monkeypatch.setattr(failure, "_succeeds", lambda *_: False)
-    assert failure.advice(run.state, contin.Settings()).startswith("more intervals, a smaller min_step, scales")
+        assert said.startswith(f"the run goes on with {2 * count} intervals: mesh=MeshControl({words}={2 * count})")
+    monkeypatch.setattr(failure, "_goes_on", lambda *_: False)
+    assert failure.advice(run.state, contin.Settings()) == ""
+    said = str(failure.no_convergence(run.state, contin.Settings(), contin.ConvergenceError("no")))
+    assert "tried in vain: steps of 1e-10, a tolerance of 1e-07, twice the intervals; at the last point lam = 1," in said
+
+
+def test_a_small_smooth_circle_has_no_corner():
+    """A circle of radius 1e-6 with steps of 1e-6 at least: shorter steps go on, and nobody speaks of corners."""
+    circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1e-12,), ["x"], {"a": 0.0})
+    for scales in ({}, {"a": 1, "x": 1}):
+        assert "corner" not in str(contin.trace(contin.solve(circle, [1e-6]), free=["a"], scales=scales).stop)
+
+
+def test_an_advice_holds_for_more_than_a_step():
+    """x = |a - 1|, and a root at a = 1: steps of 1e-8 succeed right before, but nothing leads past it."""
+    for residual, x in ((lambda u, p: u.x - abs(p.a - 1), 0.7), (lambda u, p: u.x**3 + 3 * abs(p.a - 1) ** 0.5 - 2 - p.a, 0.5)):
+        problem = AlgebraicProblem(residual, ["x"], {"a": 0.3})
+        branch = contin.trace(contin.solve(problem, [x]), free=["a"], limits={"a": (0, 2)})
+        assert branch.stop.reason == "no convergence" and branch.points[-1]["a"] == pytest.approx(1, abs=1e-5)
+        assert "goes on" not in str(branch.stop)
 
 
 @pytest.mark.full
