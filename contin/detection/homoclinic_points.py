@@ -31,6 +31,11 @@ from contin.stepping.trial import TestFunction, Trial
 #: A null vector's part at an end below this part of its length is round-off: the orbit is long. So is the component of a vector
 #: along another one, below this part of both lengths: where equations separate it is that everywhere, with any sign.
 _NOTHING = 1e-12
+#: A sum of eigenvalues below this part of their sizes is round-off: of a reversible or conservative system it is zero
+#: everywhere. Equilibria are known to Newton's tolerance, 1e-10; ten times larger, a neutral saddle is located to 1e-8 only.
+_NEUTRAL = 1e-9
+#: An orbit that comes nearer to the saddle, over its largest state, has no direction there: Newton's error is 1e-10 of it.
+_TOO_NEAR = 1e-8
 #: With a larger gap the orbit is not close to a homoclinic one.
 _FAR = 0.2
 #: An eigenvalue with a smaller imaginary part, relative to its size, is real.
@@ -43,7 +48,7 @@ def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
     counts = n - unstable, unstable
     found = [
         TestFunction("EP", "the ends of the orbit are far from the saddle: it needs a longer time", _closeness, terminal=True),
-        TestFunction("NSS", "neutral saddle", lambda trial: _leading(trial, 0)[0].real + _leading(trial, 1)[0].real),
+        TestFunction("NSS", "neutral saddle", lambda trial: _total(_leading(trial, 0)[0].real, _leading(trial, 1)[0].real)),
         *(_ends(side) for side in (0, 1)),
     ]
     for side in (0, 1):
@@ -101,6 +106,12 @@ def _is_complex(value: complex) -> bool:
     return abs(value.imag) > _REAL * abs(value)
 
 
+def _total(first: float, second: float) -> float:
+    """Return the sum of two real parts; 0 where it is round-off."""
+    total = float(first + second)
+    return total if abs(total) > _NEUTRAL * (abs(first) + abs(second)) else 0.0
+
+
 def _ends(side: int) -> TestFunction:
     """Return the test function that ends a curve: a leading eigenvalue of one side reaches the imaginary axis."""
     sign = 1 if side else -1
@@ -120,7 +131,7 @@ def _double(side: int) -> TestFunction:
 
 def _divergent(side: int) -> TestFunction:
     def total(trial: Trial) -> float:
-        return float(2 * _leading(trial, side)[0].real + _leading(trial, 1 - side)[0].real)
+        return _total(2 * _leading(trial, side)[0].real, _leading(trial, 1 - side)[0].real)
 
     return TestFunction(
         "NDU" if side else "NDS", "neutrally divergent saddle-focus", total,
@@ -146,7 +157,10 @@ def _component(unit: Array, vector: Array) -> float:
 
 def _orbit_flip(side: int) -> TestFunction:
     def component(system: ConnectionCollocation, x: Array) -> float:
-        return _component(_leading_vectors(system, x, side)[1], system.apart(x)[1 - side])
+        gap = system.apart(x)[1 - side]
+        if not np.linalg.norm(gap) > _TOO_NEAR * np.max(np.abs(x[: system.state_size])):
+            return float("nan")
+        return _component(_leading_vectors(system, x, side)[1], gap)
 
     return _flip("OFU" if side else "OFS", "orbit flip", side, component)
 

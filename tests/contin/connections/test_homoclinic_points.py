@@ -149,6 +149,20 @@ def test_a_component_that_is_round_off_has_no_sign():
     assert homoclinic_points._component(np.array([1.0, 0, 0, 0]), vector) == 0.6
 
 
+def test_a_sum_of_eigenvalues_that_is_round_off_has_no_sign():
+    """The saddle of a reversible or conservative system is neutral everywhere."""
+    assert homoclinic_points._total(-1.3, 1.3 + 1e-12) == homoclinic_points._total(1.3, -1.3) == 0
+    assert homoclinic_points._total(-1.3, 1.3 + 1e-6) == pytest.approx(1e-6, rel=1e-6)
+
+
+def test_no_orbit_flip_where_the_orbit_ends_too_near_to_the_saddle():
+    """After a time of 60 the leaf is 1e-12 away from the saddle: the direction there is Newton's error."""
+    problem = ConnectionProblem(flipping, ["x", "y", "z"], {"a": 0.0, "nu": 0.0, "mu": 0.3}, unstable=1)
+    orbit = contin.solve(problem, lambda t: (*leaf(60)(t), 0.0), {"time": 60}, free=["nu"], intervals=60)
+    branch = contin.trace(orbit, free=["a", "nu"], direction=-1, limits={"a": (-0.1, 1)})
+    assert not branch.labelled("OFS")
+
+
 def test_a_space_that_turned_by_a_right_angle_is_an_error_of_the_step():
     with pytest.raises(contin.ConvergenceError, match="turned by 90 degrees"):
         connections._normalized(np.array([[0.0, 0, 0.6, 0.8]]), np.array([[1.0, 0, 0, 0]]))
