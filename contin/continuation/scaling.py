@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,8 +37,9 @@ from contin.stepping.trial import Linearization, Trial, linearization
 _ITERATIONS = 12
 #: A mean growth below this part of the largest one is round-off of a nilpotent matrix: its eigenvalues are zero.
 _NILPOTENT = 1e-6
-#: Part of a state in an eigenvector that two iterations leave, at least. Less is what is left of other eigenvectors.
-_LASTS = 0.5
+#: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are close;
+#: at .5 what it leaves of others counts as their size.
+_LASTS = 0.1
 #: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16.
 _NOTHING = 1e-10
 #: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
@@ -60,12 +62,26 @@ def scaled(
         first = _FirstPoint(system, x, linear, primary, settings.newton)
         sizes = first.sizes(np.array([stated.get(name, 0.0) for name in names]), _said(primary, settings))
     alike: Mapping[str, str] = getattr(problem, "alike", {})
-    sizes = np.array([size or sizes[names.index(alike.get(name, name))] for name, size in zip(names, sizes)])
+    sizes = np.array([sizes[names.index(alike.get(name, name))] for name in names])
     sizes = np.array([stated.get(name, size) for name, size in zip(names, sizes)])
     values = dict(zip(problem.parameters, map(float, system.parameters)))
     all_sizes = {**values, **stated, **dict(zip(system.free, map(float, sizes[len(states) :])))}
     found = usual(sizes[: len(states)]), usual(np.array([all_sizes[name] for name in problem.parameters]))
     return (system, x) if all(np.all(each == 1) for each in found) else system.with_scales(x, *found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Mode:
+    """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order."""
+
+    vector: Array
+    rate: float
+    order: int
+
+    @property
+    def distance(self) -> float:
+        """Change of the primary parameter up to the singular point."""
+        return float(self.rate ** (-1 / self.order))
 
 
 class _FirstPoint:
@@ -86,21 +102,20 @@ class _FirstPoint:
         """Return sizes; 0 where nothing is known. ``stated`` are those that are given, ``said`` bounds that of the primary."""
         error, error_of_tangent = self._errors()
         values = _largest(self.system, self.x)
-        values = np.where(stated > 0, stated, np.where(values > error, values, 0.0))
+        known = np.where(stated > 0, stated, np.where(values > error, values, 0.0))
         self.tangent = self._kept(self.tangent, _largest(self.system, self.tangent) > error_of_tangent)
         if not self.tangent.any() or any(batch.interpreted is not None for batch in self.system._evaluated):
-            return values  # differences are taken over lengths of order one: they show no other sizes
-        terms = list(self._terms(self.tangent, 3))
-        modes = list(self._modes(values == 0))
-        reach = min([_reach(self._by_name(terms)), *(distance for distance, _ in modes)])
-        natural = np.zeros_like(values)
+            return known  # differences are taken over lengths of order one: they show no other sizes
+        terms = self._by_name(list(self._terms(self.tangent, 3)))
+        others = np.where(np.arange(known.size) == self.at, 0.0, known)
+        modes = list(self._modes(known))
+        reach = min([_reach(terms, others), *(distance for distance, _ in modes)])
+        natural = np.zeros_like(known)
         natural[self.at] = min(reach if np.isfinite(reach) else 1.0, said)
-        change = values[self.at] if values[self.at] > _NOTHING * natural[self.at] else natural[self.at]
-        for power, term in enumerate(self._by_name(terms), 1):
-            natural = np.maximum(natural, np.where(np.arange(natural.size) == self.at, 0.0, term * change**power))
-        for _, mode in modes:
-            natural = np.maximum(natural, mode)
-        return np.where((values > _NOTHING * natural) | (stated > 0), values, natural)
+        change = min(natural[self.at], known[self.at] or np.inf)
+        for sizes in (*(term * change**power for power, term in enumerate(terms, 1)), *(sizes for _, sizes in modes)):
+            natural = np.maximum(natural, np.where(np.arange(known.size) == self.at, 0.0, sizes))
+        return np.where((known > _NOTHING * natural) | (stated > 0), known, natural)
 
     # --- the expansion -------------------------------------------------------------------------------------------
 
@@ -120,55 +135,89 @@ class _FirstPoint:
             return np.zeros_like(found)
         return self._kept(found, _largest(self.system, found) > UNITS * _largest(self.system, found - other))
 
-    def _modes(self, unknown: Array) -> Iterator[tuple[float, Array]]:
+    def _modes(self, known: Array) -> Iterator[tuple[float, Array]]:
         """Return distances to singular points, and sizes of states on the branches that leave there.
 
         The nearest one first, then those of states that take no part in it.
         """
-        left = np.ones_like(unknown)
-        while np.any(left & unknown):
-            distance, mode = self._nearest(self._kept(self._random.standard_normal(self.x.size), left))
-            part = _largest(self.system, mode) > 0
+        left = np.ones(known.size, dtype=bool)
+        while np.any(left & (known == 0)):
+            mode = self._nearest(self._kept(self._random.standard_normal(self.x.size), left))
+            if mode is None:
+                return
+            yield mode.distance, self._amplitude(mode, known)
+            part = self._by_name([mode.vector])[0] > 0
             if not np.any(part & left):
                 return
-            yield distance, self._amplitude(mode)
             left = left & ~part
 
-    def _nearest(self, start: Array) -> tuple[float, Array]:
-        """Return the distance to the nearest singular point, infinity if there is none, and the null vector there, or zeros.
+    def _nearest(self, start: Array) -> _Mode | None:
+        """Return the nearest singular point and the null vector there; None where there is none.
 
         The derivative of F_x by the primary parameter is that of first or second order along the branch.
         """
-        nearest, found = np.inf, np.zeros_like(start)
+        found: _Mode | None = None
         for order in (1, 2):
-            mode, earlier, growth = start / np.linalg.norm(start), start, []
+            v, growth = start, []
             for _ in range(_ITERATIONS):
-                image = self._solved([*[self.tangent] * order, mode]) / math.factorial(order)
-                growth.append(float(np.linalg.norm(image)))
+                image = self._changed(v, order)
+                growth.append(float(np.linalg.norm(image) / np.linalg.norm(v)))
                 if not growth[-1] > 0:
                     break
-                mode, earlier, before = image / growth[-1], mode, earlier
+                v = image / np.linalg.norm(image)
             else:
                 rate = float(np.exp(np.mean(np.log(growth[-4:]))))
-                distance = rate ** (-1 / order)
-                if rate > _NILPOTENT * max(growth[2:]) and distance < nearest:
-                    lasting = _largest(self.system, mode) > _LASTS * _largest(self.system, before)
-                    nearest, found = distance, self._kept(mode, lasting)
-        return nearest, found
-
-    def _amplitude(self, mode: Array) -> Array:
-        """Return sizes of the states that take part in a null vector, directly or by terms of second order; 0 of others."""
-        first, second, third = self._terms(mode, 3)
-        terms = [first, second, third - self._solved([mode, second])]
-        for order in range(4, _HIGHEST + 1):
-            if np.isfinite(_reach(self._by_name(terms))):
-                break
-            terms.append(self._solved([mode] * order) / math.factorial(order))
-        size = _reach(self._by_name(terms))
-        if not np.isfinite(size):
-            return np.zeros_like(self._by_name([mode])[0])
-        found: Array = np.max([term * size**power for power, term in enumerate(self._by_name(terms), 1)], axis=0)
+                nearer = found is None or rate ** (-1 / order) < found.distance
+                if rate > _NILPOTENT * max(growth[2:]) and nearer:
+                    found = _Mode(self._eigenvector(v, rate, order), rate, order)
         return found
+
+    def _changed(self, v: Array, order: int) -> Array:
+        """Return F_x^-1 of the change of F_x v along the branch, in first or second order."""
+        return self._solved([*[self.tangent] * order, v]) / math.factorial(order)
+
+    def _eigenvector(self, v: Array, rate: float, order: int) -> Array:
+        """Return the part of v that belongs to the eigenvalue ``rate`` or its negative; zeros for complex ones.
+
+        Both occur, where the parameter couples two states only; v is then in turn of one state and of the other.
+        """
+        image = self._changed(v, order) / rate
+        mode, sign = max(((v + image, 1.0), (v - image, -1.0)), key=lambda pair: float(np.linalg.norm(pair[0])))
+        missed = self._changed(mode, order) / rate - sign * mode
+        return self._kept(mode, _largest(self.system, missed) < _LASTS * _largest(self.system, mode))
+
+    def _amplitude(self, mode: _Mode, known: Array) -> Array:
+        """Return sizes of the states that take part in a null vector v, directly or by terms of second order; 0 of others.
+
+        On the branch x + a v + ..., the terms of higher order along v, as large as the change of F_x v up to the singular
+        point, are as large as a v. No known state changes by more than its size.
+        """
+        first, second, third = self._terms(mode.vector, 3)
+        terms = [first, second, third - self._solved([first, second])]
+        sizes = [self._equal(term, power, mode) for power, term in enumerate(terms[1:], 1)]
+        for order in range(4, _HIGHEST + 1):
+            if np.isfinite(min(sizes)):
+                break
+            terms.append(self._solved([first] * order) / math.factorial(order))
+            sizes.append(self._equal(terms[-1], order - 1, mode))
+        parts = self._by_name(terms)
+        moved = (known > 0) & (parts[0] > 0)
+        size = min([*sizes, *(known[moved] / parts[0][moved])])
+        if not np.isfinite(size):
+            return np.zeros_like(known)
+        found: Array = np.max([part * size**power for power, part in enumerate(parts, 1)], axis=0)
+        return found
+
+    def _equal(self, term: Array, power: int, mode: _Mode) -> float:
+        """Return the amplitude a at which a^(power + 1) times a term is as large, along a null vector, as a times that vector.
+
+        The component along it is what the power method leaves of the term. Infinity where that is round-off.
+        """
+        left = term
+        for _ in range(_ITERATIONS if term.any() and mode.vector.any() else 0):
+            left = self._changed(left, mode.order) / mode.rate
+        size = np.linalg.norm(left)
+        return float((np.linalg.norm(mode.vector) / size) ** (1 / power)) if size > _NOTHING * np.linalg.norm(term) else np.inf
 
     # --- errors --------------------------------------------------------------------------------------------------
 
@@ -209,14 +258,18 @@ def _largest(system: Discretization, v: Array) -> Array:
     return np.append(states, np.abs(v[system.state_size :]))
 
 
-def _reach(terms: Sequence[Array]) -> float:
-    """Return the factor with which a term of higher order is as large as the linear one, in all states that both have."""
+def _reach(terms: Sequence[Array], known: Array) -> float:
+    """Return the factor with which an expansion leaves where it is linear.
+
+    A term of higher order is then as large as the linear one, in a state that both have, or a state changes by its size.
+    """
     found = [np.inf]
     for power, term in enumerate(terms[1:], 1):
         both = (terms[0] > 0) & (term > 0)
         if both.any():
-            found.append(float(np.max(terms[0][both] / term[both]) ** (1 / power)))
-    return min(found)
+            found.append(float(np.min(terms[0][both] / term[both]) ** (1 / power)))
+    moved = (known > 0) & (terms[0] > 0)
+    return min([*found, *(known[moved] / terms[0][moved])])
 
 
 def _said(name: str, settings: Settings) -> float:
