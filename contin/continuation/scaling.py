@@ -37,11 +37,12 @@ from contin.stepping.trial import Linearization, Trial, linearization
 _ITERATIONS = 12
 #: A mean growth below this part of the largest one is round-off of a nilpotent matrix: its eigenvalues are zero.
 _NILPOTENT = 1e-6
-#: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are close;
-#: at .5 what it leaves of others counts as their size.
+#: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are
+#: close; at .5 what it leaves of others counts as their size.
 _LASTS = 0.1
-#: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16.
-_NOTHING = 1e-10
+#: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16, the finite
+#: time of a homoclinic orbit 2e-11. A true value that is smaller is known to four digits with the size of the expansion.
+_NOTHING = 1e-8
 #: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
 _HIGHEST = 5
 
@@ -109,13 +110,13 @@ class _FirstPoint:
         terms = self._by_name(list(self._terms(self.tangent, 3)))
         others = np.where(np.arange(known.size) == self.at, 0.0, known)
         modes = list(self._modes(known))
-        reach = min([_reach(terms, others), *(distance for distance, _ in modes)])
+        reach = _held(min([_reach(terms), *(distance for distance, _ in modes)]), terms[0], others)
         natural = np.zeros_like(known)
         natural[self.at] = min(reach if np.isfinite(reach) else 1.0, said)
         change = min(natural[self.at], known[self.at] or np.inf)
         for sizes in (*(term * change**power for power, term in enumerate(terms, 1)), *(sizes for _, sizes in modes)):
             natural = np.maximum(natural, np.where(np.arange(known.size) == self.at, 0.0, sizes))
-        return np.where((known > _NOTHING * natural) | (stated > 0), known, natural)
+        return np.where(_counts(known, natural) | (stated > 0), known, natural)
 
     # --- the expansion -------------------------------------------------------------------------------------------
 
@@ -184,7 +185,9 @@ class _FirstPoint:
         image = self._changed(v, order) / rate
         mode, sign = max(((v + image, 1.0), (v - image, -1.0)), key=lambda pair: float(np.linalg.norm(pair[0])))
         missed = self._changed(mode, order) / rate - sign * mode
-        return self._kept(mode, _largest(self.system, missed) < _LASTS * _largest(self.system, mode))
+        found = self._kept(mode, _largest(self.system, missed) < _LASTS * _largest(self.system, mode))
+        alone, left_out = self._by_name([found, self._changed(found, order)])
+        return np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found
 
     def _amplitude(self, mode: _Mode, known: Array) -> Array:
         """Return sizes of the states that take part in a null vector v, directly or by terms of second order; 0 of others.
@@ -201,8 +204,7 @@ class _FirstPoint:
             terms.append(self._solved([first] * order) / math.factorial(order))
             sizes.append(self._equal(terms[-1], order - 1, mode))
         parts = self._by_name(terms)
-        moved = (known > 0) & (parts[0] > 0)
-        size = min([*sizes, *(known[moved] / parts[0][moved])])
+        size = _held(min(sizes), parts[0], known)
         if not np.isfinite(size):
             return np.zeros_like(known)
         found: Array = np.max([part * size**power for power, part in enumerate(parts, 1)], axis=0)
@@ -258,18 +260,27 @@ def _largest(system: Discretization, v: Array) -> Array:
     return np.append(states, np.abs(v[system.state_size :]))
 
 
-def _reach(terms: Sequence[Array], known: Array) -> float:
-    """Return the factor with which an expansion leaves where it is linear.
-
-    A term of higher order is then as large as the linear one, in a state that both have, or a state changes by its size.
-    """
+def _reach(terms: Sequence[Array]) -> float:
+    """Return the factor with which a term of higher order is as large as the linear one, in a state that has both."""
     found = [np.inf]
     for power, term in enumerate(terms[1:], 1):
         both = (terms[0] > 0) & (term > 0)
         if both.any():
             found.append(float(np.min(terms[0][both] / term[both]) ** (1 / power)))
-    moved = (known > 0) & (terms[0] > 0)
-    return min([*found, *(known[moved] / terms[0][moved])])
+    return min(found)
+
+
+def _held(reach: float, direction: Array, known: Array) -> float:
+    """Return a factor, made smaller where it changes a known state by more than its size."""
+    natural = np.where(direction > 0, direction * reach, 0.0) if np.isfinite(reach) else np.zeros_like(direction)
+    moved = (direction > 0) & (known > 0) & _counts(known, natural)
+    return min([reach, *(known[moved] / direction[moved])])
+
+
+def _counts(values: Array, natural: Array) -> Array:
+    """Return which values are more than nothing, compared with the sizes that the expansion gives."""
+    found: Array = (values >= USUAL[0]) | (values > _NOTHING * natural)
+    return found
 
 
 def _said(name: str, settings: Settings) -> float:
