@@ -40,9 +40,11 @@ _NILPOTENT = 1e-6
 #: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are
 #: close; at .5 what it leaves of others counts as their size.
 _LASTS = 0.1
-#: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16, the finite
-#: time of a homoclinic orbit 2e-11. A true value that is smaller is known to four digits with the size of the expansion.
+#: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16, the
+#: finite time of a homoclinic orbit 2e-11. A true value that is smaller is known to four digits with the larger size.
 _NOTHING = 1e-8
+#: Largest number of states that are looked at one by one: more would take longer than the run.
+_MOST = 200
 #: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
 _HIGHEST = 5
 
@@ -107,24 +109,31 @@ class _FirstPoint:
         self.tangent = self._kept(self.tangent, _largest(self.system, self.tangent) > error_of_tangent)
         if not self.tangent.any() or any(batch.interpreted is not None for batch in self.system._evaluated):
             return known  # differences are taken over lengths of order one: they show no other sizes
-        terms = self._by_name(list(self._terms(self.tangent, 3)))
-        others = np.where(np.arange(known.size) == self.at, 0.0, known)
+        at = np.arange(known.size) == self.at
+        terms = [_largest(self.system, term) for term in self._terms()]
         modes = list(self._modes(known))
-        reach = _held(min([_reach(terms), *(distance for distance, _ in modes)]), terms[0], others)
-        natural = np.zeros_like(known)
-        natural[self.at] = min(reach if np.isfinite(reach) else 1.0, said)
+        reach = min([_reach(terms), *(mode.distance for mode in modes)])
+        reach = _held(reach, terms[0], np.where(at, 0.0, known))
+        natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
         change = min(natural[self.at], known[self.at] or np.inf)
-        for sizes in (*(term * change**power for power, term in enumerate(terms, 1)), *(sizes for _, sizes in modes)):
-            natural = np.maximum(natural, np.where(np.arange(known.size) == self.at, 0.0, sizes))
+        natural = _larger(natural, _sizes(terms, change), ~at, error)
+        branches = [(self._branch(mode), mode) for mode in modes if mode.vector.any()]
+        for parts, equal in (branch for branch, _ in branches):
+            if np.isfinite(size := _held(equal, parts[0], known)):
+                natural = _larger(natural, _sizes(parts, size), ~at, error)
+        for parts in (parts for (parts, equal), _ in branches if not np.isfinite(_held(equal, parts[0], known))):
+            sizes = _sizes(parts, _balanced(parts, np.where(known > 0, known, natural)))
+            natural = _larger(natural, sizes, natural == 0, error)
+        natural = np.maximum(natural, self._apart((known == 0) & (natural == 0)))
         return np.where(_counts(known, natural) | (stated > 0), known, natural)
 
     # --- the expansion -------------------------------------------------------------------------------------------
 
-    def _terms(self, direction: Array, orders: int) -> Iterator[Array]:
-        """Return a direction and F_x^-1 of the derivatives of F of each order along it, over their factorials."""
-        yield direction
-        for order in range(2, orders + 1):
-            yield self._solved([direction] * order) / math.factorial(order)
+    def _terms(self) -> Iterator[Array]:
+        """Return the tangent and F_x^-1 of the derivatives of F of second and third order along it, over their factorials."""
+        yield self.tangent
+        for order in (2, 3):
+            yield self._solved([self.tangent] * order) / math.factorial(order)
 
     def _solved(self, directions: Sequence[Array]) -> Array:
         """Return F_x^-1 of the derivative of F along directions, zero in states where that is nothing but round-off."""
@@ -136,32 +145,38 @@ class _FirstPoint:
             return np.zeros_like(found)
         return self._kept(found, _largest(self.system, found) > UNITS * _largest(self.system, found - other))
 
-    def _modes(self, known: Array) -> Iterator[tuple[float, Array]]:
-        """Return distances to singular points, and sizes of states on the branches that leave there.
-
-        The nearest one first, then those of states that take no part in it.
-        """
+    def _modes(self, known: Array) -> Iterator[_Mode]:
+        """Return singular points along the branch: the nearest one, then those of states that take no part in it."""
         left = np.ones(known.size, dtype=bool)
         while np.any(left & (known == 0)):
-            mode = self._nearest(self._kept(self._random.standard_normal(self.x.size), left))
+            mode = self._nearest(self.tangent, left)
             if mode is None:
                 return
-            yield mode.distance, self._amplitude(mode, known)
-            part = self._by_name([mode.vector])[0] > 0
+            yield mode
+            part = _largest(self.system, mode.vector) > 0
             if not np.any(part & left):
                 return
             left = left & ~part
 
-    def _nearest(self, start: Array) -> _Mode | None:
-        """Return the nearest singular point and the null vector there; None where there is none.
+    def _apart(self, unknown: Array) -> Array:
+        """Return sizes of states that the branch and what leaves it do not show: their distance to where F_x is singular."""
+        found = np.zeros(unknown.size)
+        for number in np.flatnonzero(unknown) if np.count_nonzero(unknown) <= _MOST else ():
+            alone = self._kept(np.ones_like(self.x), np.arange(unknown.size) == number)
+            mode = self._nearest(alone, np.ones_like(unknown))
+            found[number] = 0.0 if mode is None else mode.distance
+        return found
 
-        The derivative of F_x by the primary parameter is that of first or second order along the branch.
+    def _nearest(self, direction: Array, kept: Array) -> _Mode | None:
+        """Return the nearest singular point in a direction and the null vector there, of some states; None where there is none.
+
+        The change of F_x is that of first or second order.
         """
         found: _Mode | None = None
         for order in (1, 2):
-            v, growth = start, []
+            v, growth = self._kept(self._random.standard_normal(self.x.size), kept), []
             for _ in range(_ITERATIONS):
-                image = self._changed(v, order)
+                image = self._changed(v, direction, order)
                 growth.append(float(np.linalg.norm(image) / np.linalg.norm(v)))
                 if not growth[-1] > 0:
                     break
@@ -170,56 +185,57 @@ class _FirstPoint:
                 rate = float(np.exp(np.mean(np.log(growth[-4:]))))
                 nearer = found is None or rate ** (-1 / order) < found.distance
                 if rate > _NILPOTENT * max(growth[2:]) and nearer:
-                    found = _Mode(self._eigenvector(v, rate, order), rate, order)
+                    found = _Mode(self._eigenvector(v, direction, rate, order), rate, order)
         return found
 
-    def _changed(self, v: Array, order: int) -> Array:
-        """Return F_x^-1 of the change of F_x v along the branch, in first or second order."""
-        return self._solved([*[self.tangent] * order, v]) / math.factorial(order)
+    def _changed(self, v: Array, direction: Array, order: int) -> Array:
+        """Return F_x^-1 of the change of F_x v in a direction, of first or second order."""
+        return self._solved([*[direction] * order, v]) / math.factorial(order)
 
-    def _eigenvector(self, v: Array, rate: float, order: int) -> Array:
+    def _eigenvector(self, v: Array, direction: Array, rate: float, order: int) -> Array:
         """Return the part of v that belongs to the eigenvalue ``rate`` or its negative; zeros for complex ones.
 
         Both occur, where the parameter couples two states only; v is then in turn of one state and of the other.
         """
-        image = self._changed(v, order) / rate
+        image = self._changed(v, direction, order) / rate
         mode, sign = max(((v + image, 1.0), (v - image, -1.0)), key=lambda pair: float(np.linalg.norm(pair[0])))
-        missed = self._changed(mode, order) / rate - sign * mode
+        missed = self._changed(mode, direction, order) / rate - sign * mode
         found = self._kept(mode, _largest(self.system, missed) < _LASTS * _largest(self.system, mode))
-        alone, left_out = self._by_name([found, self._changed(found, order)])
+        alone, left_out = (_largest(self.system, each) for each in (found, self._changed(found, direction, order)))
         return np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found
 
-    def _amplitude(self, mode: _Mode, known: Array) -> Array:
-        """Return sizes of the states that take part in a null vector v, directly or by terms of second order; 0 of others.
+    def _branch(self, mode: _Mode) -> tuple[list[Array], float]:
+        """Return the terms of the branch that leaves along a null vector v, x + a v + a^2 ..., and the size of a.
 
-        On the branch x + a v + ..., the terms of higher order along v, as large as the change of F_x v up to the singular
-        point, are as large as a v. No known state changes by more than its size.
+        At this size a term of higher order in a, there or at the singular point, is as large along v as the change of F_x v
+        from here to the singular point. It is infinity where F is linear along v.
         """
-        first, second, third = self._terms(mode.vector, 3)
-        terms = [first, second, third - self._solved([first, second])]
-        sizes = [self._equal(term, power, mode) for power, term in enumerate(terms[1:], 1)]
-        for order in range(4, _HIGHEST + 1):
-            if np.isfinite(min(sizes)):
+        v, size, parts, second = mode.vector, np.inf, [_largest(self.system, mode.vector)], np.zeros_like(mode.vector)
+        for order in range(2, _HIGHEST + 1):
+            if order > 3 and np.isfinite(size):
                 break
-            terms.append(self._solved([first] * order) / math.factorial(order))
-            sizes.append(self._equal(terms[-1], order - 1, mode))
-        parts = self._by_name(terms)
-        size = _held(min(sizes), parts[0], known)
-        if not np.isfinite(size):
-            return np.zeros_like(known)
-        found: Array = np.max([part * size**power for power, part in enumerate(parts, 1)], axis=0)
-        return found
+            here = self._solved([v] * order) / math.factorial(order)
+            there = np.zeros_like(v)
+            if order < _HIGHEST:
+                there = mode.distance * self._solved([self.tangent, *[v] * order]) / math.factorial(order)
+            if order == 2:
+                second = here + there
+            if order == 3:
+                here = here - self._solved([v, second])
+            size = min(size, *(self._equal(term, mode) ** (1 / (order - 1)) for term in (here, there)))
+            parts.append(np.maximum(_largest(self.system, here), _largest(self.system, there)))
+        return parts, size
 
-    def _equal(self, term: Array, power: int, mode: _Mode) -> float:
-        """Return the amplitude a at which a^(power + 1) times a term is as large, along a null vector, as a times that vector.
+    def _equal(self, term: Array, mode: _Mode) -> float:
+        """Return how much longer a null vector is than a term along it: what the power method leaves of the term.
 
-        The component along it is what the power method leaves of the term. Infinity where that is round-off.
+        Infinity where that is nothing but round-off.
         """
         left = term
-        for _ in range(_ITERATIONS if term.any() and mode.vector.any() else 0):
-            left = self._changed(left, mode.order) / mode.rate
-        size = np.linalg.norm(left)
-        return float((np.linalg.norm(mode.vector) / size) ** (1 / power)) if size > _NOTHING * np.linalg.norm(term) else np.inf
+        for _ in range(_ITERATIONS if term.any() else 0):
+            left = self._changed(left, self.tangent, mode.order) / mode.rate
+        size = float(np.linalg.norm(left))
+        return float(np.linalg.norm(mode.vector)) / size if size > _NOTHING * np.linalg.norm(term) else np.inf
 
     # --- errors --------------------------------------------------------------------------------------------------
 
@@ -250,9 +266,6 @@ class _FirstPoint:
         kept_states = np.tile(kept[:count], self.system.state_size // count)
         return v * np.concatenate([kept_states, kept[count:]])
 
-    def _by_name(self, vectors: Sequence[Array]) -> list[Array]:
-        return [_largest(self.system, v) for v in vectors]
-
 
 def _largest(system: Discretization, v: Array) -> Array:
     """Return the largest absolute value of each state, and that of each free parameter."""
@@ -275,6 +288,26 @@ def _held(reach: float, direction: Array, known: Array) -> float:
     natural = np.where(direction > 0, direction * reach, 0.0) if np.isfinite(reach) else np.zeros_like(direction)
     moved = (direction > 0) & (known > 0) & _counts(known, natural)
     return min([reach, *(known[moved] / direction[moved])])
+
+
+def _sizes(terms: Sequence[Array], change: float) -> Array:
+    """Return the largest term of an expansion, by state, at a change of its variable."""
+    found: Array = np.max([term * change**power for power, term in enumerate(terms, 1)], axis=0)
+    return found
+
+
+def _balanced(terms: Sequence[Array], sizes: Array) -> float:
+    """Return the change at which the terms of an expansion are as near to known sizes, or else to one, as they can be."""
+    pairs = [(power, np.log(term[i] / (sizes[i] or 1.0)), sizes[i]) for power, term in enumerate(terms, 1)
+             for i in np.flatnonzero(term)]  # fmt: skip
+    powers, gaps, _ = np.array([pair for pair in pairs if pair[2]] or pairs).T
+    return float(np.exp(-(powers @ gaps) / (powers @ powers)))
+
+
+def _larger(sizes: Array, others: Array, where: Array, error: Array) -> Array:
+    """Return sizes, the larger ones of both in some places, where they are more than errors."""
+    found: Array = np.where(where & (others > error), np.maximum(sizes, others), sizes)
+    return found
 
 
 def _counts(values: Array, natural: Array) -> Array:

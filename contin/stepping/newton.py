@@ -175,24 +175,27 @@ def _newton(
 def _settled(
     system: Equations, x: Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes, updates: list[float]
 ) -> Corrected:
-    """Go on until the update is small relative to the size of each unknown, or round-off.
+    """Go on until the update is small relative to the size of each unknown, or round-off, or leads to zero.
+
+    An unknown that is zero has no size: its updates vanish much faster than they become small.
 
     Raises
     ------
     ConvergenceError
         It does not become so; the message holds the last updates, relative to these sizes.
     """
-    rows, relative = () if row is None else (row,), []
+    rows, relative, before = () if row is None else (row,), [], np.zeros_like(x)
     for _ in range(newton.max_iterations):
         residual, factors = system.linearize(x, rows)
         update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
         relative.append(_relative(update, sizes(x)))
         if not np.all(np.isfinite(update)):
             break
-        small = relative[-1] <= newton.tolerance or np.all(
-            np.abs(update) <= np.maximum(newton.tolerance * sizes(x), UNITS * rounded_off(system, x, rows))
-        )
-        error = _move(x, update)
+        least = newton.tolerance * np.maximum(sizes(x), before)
+        if not np.all(np.abs(update) <= least):
+            least = np.maximum(least, UNITS * rounded_off(system, x, rows))
+        small = np.all(np.abs(update) <= least)
+        error, before = _move(x, update), np.abs(update)
         if small:
             return Corrected(x, factors, len(updates) + len(relative), error)
     raise _failure(relative)
