@@ -124,8 +124,10 @@ class _FirstPoint:
         for parts in (parts for (parts, equal), _ in branches if not np.isfinite(_held(equal, parts[0], known))):
             sizes = _sizes(parts, _balanced(parts, np.where(known > 0, known, natural)))
             natural = _larger(natural, sizes, natural == 0, error)
-        natural = np.maximum(natural, self._apart((known == 0) & (natural == 0)))
-        return np.where(_counts(known, natural) | (stated > 0), known, natural)
+        found = np.where(_counts(known, natural) | (stated > 0), known, natural)
+        small = (found < USUAL[0]) & (stated == 0) & ~at
+        apart = self._apart(small)
+        return np.where(small & ~_counts(found, apart), apart, found)
 
     # --- the expansion -------------------------------------------------------------------------------------------
 
@@ -158,12 +160,12 @@ class _FirstPoint:
                 return
             left = left & ~part
 
-    def _apart(self, unknown: Array) -> Array:
-        """Return sizes of states that the branch and what leaves it do not show: their distance to where F_x is singular."""
-        found = np.zeros(unknown.size)
-        for number in np.flatnonzero(unknown) if np.count_nonzero(unknown) <= _MOST else ():
-            alone = self._kept(np.ones_like(self.x), np.arange(unknown.size) == number)
-            mode = self._nearest(alone, np.ones_like(unknown))
+    def _apart(self, which: Array) -> Array:
+        """Return how far some states can change by themselves before F_x is singular; 0 where that never happens."""
+        found = np.zeros(which.size)
+        for number in np.flatnonzero(which) if np.count_nonzero(which) <= _MOST else ():
+            alone = self._kept(np.ones_like(self.x), np.arange(which.size) == number)
+            mode = self._nearest(alone, np.ones_like(which))
             found[number] = 0.0 if mode is None else mode.distance
         return found
 
