@@ -20,10 +20,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Pattern
 from contin.detection.significance import on_finer_mesh
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import USUAL, usual
@@ -60,16 +61,15 @@ def scaled(
         return system, x
     problem, states = system.problem, list(system.problem.states)
     names, stated = [*states, *system.free], settings.scales
-    sizes = _largest(system, x)
-    if np.any(sizes < USUAL[0]):
+    sizes, held = _largest(system, x), dict(zip(problem.parameters, np.abs(system.parameters)))
+    if np.any(sizes < USUAL[0]) or any(0 < size < USUAL[0] for size in held.values()):
         first = _FirstPoint(system, x, linear, primary, settings.newton)
         sizes = first.sizes(np.array([stated.get(name, 0.0) for name in names]), _said(primary, settings))
+        held = {name: size * first.counts(name, size, sizes) for name, size in held.items()}
     alike: Mapping[str, str] = getattr(problem, "alike", {})
-    sizes = np.array([sizes[names.index(alike.get(name, name))] for name in names])
-    sizes = np.array([stated.get(name, size) for name, size in zip(names, sizes)])
-    values = dict(zip(problem.parameters, map(float, system.parameters)))
-    all_sizes = {**values, **stated, **dict(zip(system.free, map(float, sizes[len(states) :])))}
-    found = usual(sizes[: len(states)]), usual(np.array([all_sizes[name] for name in problem.parameters]))
+    sizes = np.array([stated.get(name, sizes[names.index(alike.get(name, name))]) for name in names])
+    of_parameters = {**held, **stated, **dict(zip(system.free, sizes[len(states) :]))}
+    found = usual(sizes[: len(states)]), usual(np.array([of_parameters[name] for name in problem.parameters]))
     return (system, x) if all(np.all(each == 1) for each in found) else system.with_scales(x, *found)
 
 
@@ -95,6 +95,7 @@ class _FirstPoint:
 
     def __init__(self, system: System, x: Array, linear: Linearization, primary: str, newton: Newton) -> None:
         self.system, self.x, self.linear, self._newton = system, x, linear, newton
+        self._factors: Any = linear.factors
         self.place = system.parameter_index(primary)
         self.at = len(system.problem.states) + system.free.index(primary)
         rate = linear.tangent[self.place]
@@ -129,6 +130,15 @@ class _FirstPoint:
         apart = self._apart(small)
         return np.where(small & ~_counts(found, apart), apart, found)
 
+    def counts(self, name: str, size: float, sizes: Array) -> bool:
+        """Return whether a small value of a parameter is more than nothing: without it, a state would change."""
+        if size >= USUAL[0] or not size:
+            return True
+        with np.errstate(all="ignore"):
+            column = self.system.parameter_columns(self.x, (name,))[:, 0]
+            change = size * _largest(self.system, self._factors.solve(np.append(column, 0.0)))
+        return bool(np.any(change > _NOTHING * sizes))
+
     # --- the expansion -------------------------------------------------------------------------------------------
 
     def _terms(self) -> Iterator[Array]:
@@ -142,7 +152,7 @@ class _FirstPoint:
         with np.errstate(all="ignore"):
             right = np.append(self.system.along(self.x, directions), 0.0)
             rounded = right * (1 + np.finfo(float).eps * self._random.choice((-1.0, 1.0), right.size))
-            found, other = self.linear.factors.solve(np.stack([right, rounded])) if right.any() else np.zeros((2, right.size))
+            found, other = self._factors.solve(np.stack([right, rounded])) if right.any() else np.zeros((2, right.size))
         if not np.all(np.isfinite(found)):
             return np.zeros_like(found)
         return self._kept(found, _largest(self.system, found) > UNITS * _largest(self.system, found - other))
@@ -160,7 +170,7 @@ class _FirstPoint:
                 return
             left = left & ~part
 
-    def _apart(self, which: Array) -> Array:
+    def _apart(self, which: Pattern) -> Array:
         """Return how far some states can change by themselves before F_x is singular; 0 where that never happens."""
         found = np.zeros(which.size)
         for number in np.flatnonzero(which) if np.count_nonzero(which) <= _MOST else ():
@@ -169,7 +179,7 @@ class _FirstPoint:
             found[number] = 0.0 if mode is None else mode.distance
         return found
 
-    def _nearest(self, direction: Array, kept: Array) -> _Mode | None:
+    def _nearest(self, direction: Array, kept: Pattern) -> _Mode | None:
         """Return the nearest singular point in a direction and the null vector there, of some states; None where there is none.
 
         The change of F_x is that of first or second order.
@@ -262,11 +272,12 @@ class _FirstPoint:
     def _primary(self) -> str:
         return self.system.free[self.place - self.system.state_size]
 
-    def _kept(self, v: Array, kept: Array) -> Array:
+    def _kept(self, v: Array, kept: Pattern) -> Array:
         """Return a vector with zeros in all states and parameters that are not kept."""
         count = len(self.system.problem.states)
         kept_states = np.tile(kept[:count], self.system.state_size // count)
-        return v * np.concatenate([kept_states, kept[count:]])
+        result: Array = v * np.concatenate([kept_states, kept[count:]])
+        return result
 
 
 def _largest(system: Discretization, v: Array) -> Array:
@@ -289,7 +300,7 @@ def _held(reach: float, direction: Array, known: Array) -> float:
     """Return a factor, made smaller where it changes a known state by more than its size."""
     natural = np.where(direction > 0, direction * reach, 0.0) if np.isfinite(reach) else np.zeros_like(direction)
     moved = (direction > 0) & (known > 0) & _counts(known, natural)
-    return min([reach, *(known[moved] / direction[moved])])
+    return float(min([reach, *(known[moved] / direction[moved])]))
 
 
 def _sizes(terms: Sequence[Array], change: float) -> Array:
@@ -306,15 +317,15 @@ def _balanced(terms: Sequence[Array], sizes: Array) -> float:
     return float(np.exp(-(powers @ gaps) / (powers @ powers)))
 
 
-def _larger(sizes: Array, others: Array, where: Array, error: Array) -> Array:
+def _larger(sizes: Array, others: Array, where: Pattern, error: Array) -> Array:
     """Return sizes, the larger ones of both in some places, where they are more than errors."""
     found: Array = np.where(where & (others > error), np.maximum(sizes, others), sizes)
     return found
 
 
-def _counts(values: Array, natural: Array) -> Array:
+def _counts(values: Array, natural: Array) -> Pattern:
     """Return which values are more than nothing, compared with the sizes that the expansion gives."""
-    found: Array = (values >= USUAL[0]) | (values > _NOTHING * natural)
+    found: Pattern = (values >= USUAL[0]) | (values > _NOTHING * natural)
     return found
 
 
