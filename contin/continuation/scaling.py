@@ -116,7 +116,7 @@ class _FirstPoint:
         reach = min([_reach(terms), *(mode.distance for mode in modes)])
         reach = _held(reach, terms[0], np.where(at, 0.0, known))
         natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
-        change = min(natural[self.at], known[self.at] or np.inf)
+        change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
         natural = _larger(natural, _sizes(terms, change), ~at, error)
         branches = [(self._branch(mode), mode) for mode in modes if mode.vector.any()]
         for parts, equal in (branch for branch, _ in branches):
@@ -151,8 +151,8 @@ class _FirstPoint:
         """Return F_x^-1 of the derivative of F along directions, zero in states where that is nothing but round-off."""
         with np.errstate(all="ignore"):
             right = np.append(self.system.along(self.x, directions), 0.0)
-            rounded = right * (1 + np.finfo(float).eps * self._random.choice((-1.0, 1.0), right.size))
-            found, other = self._factors.solve(np.stack([right, rounded])) if right.any() else np.zeros((2, right.size))
+            both = np.stack([right, self._rounded(right)])
+            found, other = self._factors.solve(both) if right.any() else np.zeros_like(both)
         if not np.all(np.isfinite(found)):
             return np.zeros_like(found)
         return self._kept(found, _largest(self.system, found) > UNITS * _largest(self.system, found - other))
@@ -160,7 +160,7 @@ class _FirstPoint:
     def _modes(self, known: Array) -> Iterator[_Mode]:
         """Return singular points along the branch: the nearest one, then those of states that take no part in it."""
         left = np.ones(known.size, dtype=bool)
-        while np.any(left & (known == 0)):
+        while np.any(left & (known < USUAL[0])):
             mode = self._nearest(self.tangent, left)
             if mode is None:
                 return
@@ -212,7 +212,9 @@ class _FirstPoint:
         image = self._changed(v, direction, order) / rate
         mode, sign = max(((v + image, 1.0), (v - image, -1.0)), key=lambda pair: float(np.linalg.norm(pair[0])))
         missed = self._changed(mode, direction, order) / rate - sign * mode
-        found = self._kept(mode, _largest(self.system, missed) < _LASTS * _largest(self.system, mode))
+        noise = self._changed(self._rounded(v), direction, order) / rate - image
+        errors = np.maximum(_largest(self.system, missed) / _LASTS, UNITS * _largest(self.system, noise))
+        found = self._kept(mode, _largest(self.system, mode) > errors)
         alone, left_out = (_largest(self.system, each) for each in (found, self._changed(found, direction, order)))
         return np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found
 
@@ -255,8 +257,7 @@ class _FirstPoint:
         """Return errors of the values at the first point and of the tangent: of the mesh, and of round-off."""
         system, x, at = self.system, self.x, self.place
         row = system.weights * self.linear.tangent
-        rounded = x * (1 + np.finfo(float).eps * self._random.choice((-1.0, 1.0), x.size))
-        other = linearization(system, rounded, row).tangent
+        other = linearization(system, self._rounded(x), row).tangent
         error = UNITS * _largest(system, rounded_off(system, x, (row,)))
         rate = other[at] or 1.0
         error_of_tangent = UNITS * _largest(system, other / rate - self.tangent)
@@ -271,6 +272,11 @@ class _FirstPoint:
     @property
     def _primary(self) -> str:
         return self.system.free[self.place - self.system.state_size]
+
+    def _rounded(self, v: Array) -> Array:
+        """Return a vector changed by one unit in the last place, up or down."""
+        found: Array = v * (1 + np.finfo(float).eps * self._random.choice((-1.0, 1.0), v.size))
+        return found
 
     def _kept(self, v: Array, kept: Pattern) -> Array:
         """Return a vector with zeros in all states and parameters that are not kept."""

@@ -236,8 +236,8 @@ def _base(
 def _column_of(row: dict[str, Any], parameters: Mapping[str, float]) -> tuple[str, float | None]:
     """Return the column that a point is about, and its value.
 
-    Files of earlier versions have them in the name only, the value to a few digits: that of the point is better, where it is the
-    one in the name. Another name is a user's.
+    Files of earlier versions have them in the name only, the value to a few digits: that of the point is better, where it
+    agrees. Another name is a user's.
     """
     if "column" in row:
         return row["column"], row["value"]

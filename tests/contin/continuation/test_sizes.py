@@ -42,7 +42,7 @@ def test_buckling_loads_of_negative_sign(limits):
         lambda t, u, p: (u.v, p.P * math.sin(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"P": 0.0}
     )
     branch = trace(solve(problem, [0, 0]), free=["P"], direction=-1, limits={"P": limits}, max_points=25)
-    assert located(branch, "P", -math.pi**2, 3)[0] == pytest.approx([1, 4, 9], rel=1e-11)
+    assert located(branch, "P", -(math.pi**2), 3)[0] == pytest.approx([1, 4, 9], rel=1e-11)
 
 
 @pytest.mark.parametrize("limit", [20.0, 1e6, 1e200])
