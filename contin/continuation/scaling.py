@@ -17,9 +17,10 @@ from one count (`contin.discretization.scales`).
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -118,13 +119,15 @@ class _FirstPoint:
         natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
         change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
         natural = _larger(natural, _sizes(terms, change), ~at, error)
-        branches = [(self._branch(mode), mode) for mode in modes if mode.vector.any()]
-        for parts, equal in (branch for branch, _ in branches):
-            if np.isfinite(size := _held(equal, parts[0], known)):
+        branches = [self._settled_branch(mode) for mode in modes if mode.vector.any()]
+        held = [_held(size, parts[0], known) for parts, size in branches]
+        for (parts, _), size in zip(branches, held):
+            if np.isfinite(size):
                 natural = _larger(natural, _sizes(parts, size), ~at, error)
-        for parts in (parts for (parts, equal), _ in branches if not np.isfinite(_held(equal, parts[0], known))):
-            sizes = _sizes(parts, _balanced(parts, np.where(known > 0, known, natural)))
-            natural = _larger(natural, sizes, natural == 0, error)
+        for (parts, _), size in zip(branches, held):
+            if not np.isfinite(size):
+                sizes = _sizes(parts, _balanced(parts, np.where(known > 0, known, natural)))
+                natural = _larger(natural, sizes, natural == 0, error)
         found = np.where(_counts(known, natural) | (stated > 0), known, natural)
         small = (found < USUAL[0]) & (stated == 0) & ~at
         apart = self._apart(small)
@@ -217,6 +220,19 @@ class _FirstPoint:
         found = self._kept(mode, _largest(self.system, mode) > errors)
         alone, left_out = (_largest(self.system, each) for each in (found, self._changed(found, direction, order)))
         return np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found
+
+    def _settled_branch(self, mode: _Mode) -> tuple[list[Array], float]:
+        """Return what `_branch` does, without states that change with the next iterations of the null vector.
+
+        They belong to what the power method has left of other eigenvectors, where symmetry makes them zero.
+        """
+        again = mode.vector
+        for _ in range(2):  # the sign is that of the first again
+            again = self._changed(again, self.tangent, mode.order) / mode.rate
+        parts, size = self._branch(mode)
+        others = self._branch(replace(mode, vector=again))[0]
+        pairs = zip(parts, itertools.chain(others, itertools.repeat(np.zeros_like(parts[0]))))
+        return [np.where(np.abs(part - other) < _LASTS * part, part, 0.0) for part, other in pairs], size
 
     def _branch(self, mode: _Mode) -> tuple[list[Array], float]:
         """Return the terms of the branch that leaves along a null vector v, x + a v + a^2 ..., and the size of a.
