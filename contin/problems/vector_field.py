@@ -31,9 +31,12 @@ def returning(field: Function, signature: Signature) -> Function:
 
     else:
         return field
-    if signature.times:
-        return lambda t, u, p: rates((t,), u, p)
-    return lambda u, p: rates((), u, p)
+    returned: Function = (lambda t, u, p: rates((t,), u, p)) if signature.times else (lambda u, p: rates((), u, p))
+    try:
+        result_count(returned, signature.arguments, "field")
+    except ProblemError:
+        return field  # one of (t, u, p) in place of (u, p, out): `check_field` says so
+    return returned
 
 
 def check_field(field: Function, signature: Signature, wrong: str) -> None:
