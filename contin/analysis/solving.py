@@ -128,7 +128,7 @@ def _holding(system: System, x: Array, name: str, newton: Newton) -> Corrected:
     """
     row = np.zeros(system.size)
     row[system.parameter_index(name)] = 1.0
-    return correct(system, x, row, row @ x, newton, unscaled=True)
+    return correct(system, x, row, row @ x, newton, sizes=system.magnitudes)
 
 
 def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
@@ -141,11 +141,12 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
     ConvergenceError
     """
     try:
-        return correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, unscaled=True)
+        return correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, sizes=system.magnitudes)
     except ConvergenceError:
         if not others:
-            with contextlib.suppress(ConvergenceError):
-                return correct(system, approached(system, x), newton=newton, unscaled=True)
+            for place in approached(system, x):
+                with contextlib.suppress(ConvergenceError):
+                    return correct(system, place, newton=newton, sizes=system.magnitudes)
         if isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
             reason = degeneracy(system, x)
             if reason:

@@ -122,7 +122,7 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
         raise ProblemError("start: must be a point of a branch, with the free parameters of a curve")
     known = tuple(system.problem.parameters)
     branch = isinstance(system, System)
-    found_in = start.column if start.label == "LP" and branch else system.free[0]
+    found_in = start.column if start.label == "LP" and start.column and branch else system.free[0]
     if (second is None) == (free is None):
         raise ProblemError("curve: give the second parameter, or free=[first, second]")
     if free is None:
@@ -167,7 +167,7 @@ def _branch_points(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _folds(start: Point, base: System, x: Array) -> _First | None:
-    return (FoldCurve(base), x) if start.label == "LP" else None
+    return (FoldCurve(base), x) if start.label == "LP" and start.column else None
 
 
 def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
@@ -192,7 +192,7 @@ def _tori(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _extrema(start: Point, base: System, x: Array) -> _First | None:
-    return (ExtremumCurve(base, start.column), x) if start.label == "EX" else None
+    return (ExtremumCurve(base, start.column), x) if start.label == "EX" and start.column else None
 
 
 def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:

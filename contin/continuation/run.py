@@ -225,7 +225,7 @@ class Continuation:
         beside = x + _BESIDE * across / np.abs(across).max()  # of a branch point, where both are singular
         for start, row in ((x, fixed), (x, across), (beside, across)):
             try:
-                return correct(system, start, row, row @ start, self.settings.newton, unscaled=True).x, row
+                return correct(system, start, row, row @ start, self.settings.newton, sizes=system.magnitudes).x, row
             except ConvergenceError as error:
                 failed = failed or error
         assert failed is not None

@@ -1,47 +1,54 @@
-"""Sizes of states and parameters, taken from the first point of a run.
+"""Sizes of states and parameters, found at the first point of a run and corrected on the way.
 
-The size of a parameter is that of its first value; where that is zero, of its smallest limit or labelled value. The size of a
-state is its largest value. For what is zero at the first point the tangent says whether it is small: a parameter, by the change
-that moves some state by its size; a state, by its response to such a change. States that do not respond get sizes from the
-derivatives of the functions, with which the terms of an equation are alike. A parameter that is zero there and stands for a
-state (the coordinates of equilibria, of connecting orbits) has the size of that state. Only sizes far from one count
-(`contin.discretization.scales`).
+A size says from what change on the equations are no longer linear. Values that are known there are sizes; those of unknowns
+that are zero, or nothing but errors, follow from the exact Taylor expansion of F along the branch:
+
+1. The tangent t of the branch, and its derivatives with respect to the primary parameter p. The smallest change of p at which a
+   term of higher order is as large as the linear one bounds the size of p.
+2. The distance to the nearest singular point, where F_x is singular: 1 / |mu|, for the eigenvalue mu of largest modulus of
+   -F_x^-1 F_xx[t, .], by power iteration. It bounds the size of p too: on a trivial branch, nothing else does.
+3. The eigenvector v of mu leads to the branch that leaves there. The amplitude at which a nonlinear term along v is as large as
+   the linear one is the size of the states that take part in v.
+
+All of these are made with F_x^-1 and compared state by state, so that they do not depend on units. A limit is no size: it can
+only make one smaller. Where nothing is found the size is one; a branch that outgrows a size gets a larger one. Only sizes far
+from one count (`contin.discretization.scales`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, Pattern
+from contin.detection.significance import on_finer_mesh
 from contin.discretization.protocol import Carrier, Discretization
-from contin.discretization.scales import usual
+from contin.discretization.scales import USUAL, usual
 from contin.discretization.system import System
+from contin.stepping.newton import UNITS, Newton, rounded_off
 from contin.stepping.settings import Settings
-from contin.stepping.trial import Linearization
+from contin.stepping.trial import Linearization, Trial, linearization
 
-#: A value counts as zero below so many times its own round-off: the last update that Newton's method would make. At 10
-#: round-off of a state that vanishes by symmetry could become its size.
-_NOISE = 1e4
-#: A first value smaller than this part of the limits is zero.
-_NOTHING = 1e-10
-#: A state smaller than this part of the largest may vanish but for the error of the discretization: its size counts as one.
-_FAINT = 1e-6
-#: A term that the balance leaves smaller than this, relative to the others, is what cancellation has left of zero: the balance
-#: is made again without it, in so many passes.
-_CANCELLED, _PASSES = 1e-5, 3
-#: A derivative smaller than this part of the largest of its row is a product of round-off, where states vanish: sizes of 1e180
-#: came from such. Units differ by less.
-_NEGLIGIBLE = 1e-60
-#: States without any known size are looked for within so many powers of ten around one.
-_DECADES = 12
-#: A parameter that is zero and changes less than this while states change by their size stands still: that is round-off. Ten
-#: times larger, a parameter of that unit that begins at zero must have its size stated.
-_STILL = 1e-12
-#: A smaller value counts as zero in any case: the size of such a state or parameter must be stated.
-_TINY = 1e-14
+#: Iterations of the power method. Sizes are powers of two: the distance to the nearest singular point needs no digits. Ten
+#: times more separate eigenvalues that differ by a tenth.
+_ITERATIONS = 12
+#: A mean growth below this part of the largest one is round-off of a nilpotent matrix: its eigenvalues are zero.
+_NILPOTENT = 1e-6
+#: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are
+#: close; at .5 what it leaves of others counts as their size.
+_LASTS = 0.1
+#: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16, the
+#: finite time of a homoclinic orbit 2e-11. A true value that is smaller is known to four digits with the larger size.
+_NOTHING = 1e-8
+#: Largest number of states that are looked at one by one: more would take longer than the run.
+_MOST = 200
+#: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
+_HIGHEST = 5
 
 
 def scaled(
@@ -53,115 +60,301 @@ def scaled(
     """
     if not isinstance(system, System) or system.scales is not None:
         return system, x
-    names, states, count = list(system.problem.parameters), system.problem.states, len(system.problem.states)
-    known = {name: abs(value) for name, value in settings.scales.items()}
-    factors: Any = linear.factors
-    update = _NOISE * np.abs(factors.solve(np.append(system.residual(x), 0.0))) + _TINY
-    noise, noise_of_free = update[: system.state_size].reshape(-1, count).max(axis=0), update[system.state_size :]
-    size = np.abs(system.states(x)).max(axis=0)
-    size = np.where(size > noise, size, 0.0)
-    values = np.where(np.abs(x[system.state_size :]) > noise_of_free, x[system.state_size :], 0.0)
-    given = zip(system.free, values)
-    free = np.array([known.get(name) or _given(float(value), name, settings) for name, value in given])
-    # what is zero at the first point: by the tangent
-    at, rate = system.free.index(primary), np.abs(linear.tangent)
-    rates, rate_of_free = rate[: system.state_size].reshape(-1, count).max(axis=0), rate[system.state_size :]
-    if not free[at]:
-        moves = rates > 0
-        stated = np.array([known.get(name, found) for name, found in zip(states, size)])
-        needed = usual(np.where(stated > 0, stated, 1.0))[moves] * rate_of_free[at] / rates[moves]
-        least = needed.min(initial=1.0)
-        free[at] = min(1.0, least) if least > _STILL else 1.0
-    change = usual(free[at]) / rate_of_free[at] if rate_of_free[at] else 0.0
-    response = np.minimum(1.0, rates * change)
-    size = np.maximum(size, np.where(response > noise, response, 0.0))
-    alike = getattr(system.problem, "alike", {})
-    free = np.array([found or size[states.index(alike[name])] if name in alike else found
-                     for name, found in zip(system.free, free)])  # fmt: skip
-    size, free = _with_faint(system, x, size, free)
-    size = np.array([known.get(name, found) for name, found in zip(states, size)])
-    parameters = np.array([known.get(name, value) for name, value in zip(names, system.parameters)])
-    parameters[[names.index(name) for name in system.free]] = np.where(free > 0, free, 1.0)
-    sizes = usual(size), usual(parameters)
-    if all(np.all(found == 1) for found in sizes):
-        return system, x
-    return system.with_scales(x, *sizes)
+    problem, states = system.problem, list(system.problem.states)
+    names, stated = [*states, *system.free], settings.scales
+    sizes, held = _largest(system, x), dict(zip(problem.parameters, np.abs(system.parameters)))
+    if np.any(sizes < USUAL[0]) or any(0 < size < USUAL[0] for size in held.values()):
+        first = _FirstPoint(system, x, linear, primary, settings.newton)
+        sizes = first.sizes(np.array([stated.get(name, 0.0) for name in names]), _said(primary, settings))
+        held = {name: size * first.counts(name, size, sizes) for name, size in held.items()}
+    alike: Mapping[str, str] = getattr(problem, "alike", {})
+    sizes = np.array([stated.get(name, sizes[names.index(alike.get(name, name))]) for name in names])
+    of_parameters = {**held, **stated, **dict(zip(system.free, sizes[len(states) :]))}
+    found = usual(sizes[: len(states)]), usual(np.array([of_parameters[name] for name in problem.parameters]))
+    return (system, x) if all(np.all(each == 1) for each in found) else system.with_scales(x, *found)
 
 
-def _with_faint(system: System, x: Array, size: Array, free: Array) -> tuple[Array, Array]:
-    """Return sizes of the states and free parameters, those of vanishing ones found from the others by the derivatives.
+@dataclass(frozen=True, eq=False)
+class _Mode:
+    """A null vector at a singular point: an eigenvector of the change of F_x along the branch, of first or second order."""
 
-    ``size`` (n,) and ``free`` (number of free parameters,) are 0 where nothing is known.
+    vector: Array
+    rate: float
+    order: int
+
+    @property
+    def distance(self) -> float:
+        """Change of the primary parameter up to the singular point."""
+        return float(self.rate ** (-1 / self.order))
+
+
+class _FirstPoint:
+    """A first point and the expansion of the branch there: x + s t + ..., with s the change of the primary parameter.
+
+    Arrays by name have the shape (states + free parameters,): the largest value of each state, and each free parameter.
     """
-    faint = size <= _FAINT * size.max()
-    if not faint.any() and free.all():
-        return size, free
-    states, values = x[: system.state_size].reshape(-1, len(size)) * ~faint, x[system.state_size :]
-    known = np.concatenate([np.where(faint, 0.0, size), free])
-    at_rest = not np.any(known[: len(size)])
-    if at_rest:
-        values = np.where(values == 0, free, values)  # a load that enters as its square shows nothing where it is zero
-    z = np.concatenate([states.ravel(), values])
-    found = _balanced(system, z, known)
-    balanced = found[: len(size)]
-    if at_rest:
-        balanced = balanced * _amplitude(system, z, found)
-    return np.where(faint & (size <= _FAINT * balanced), balanced, size), found[len(size) :]
 
+    def __init__(self, system: System, x: Array, linear: Linearization, primary: str, newton: Newton) -> None:
+        self.system, self.x, self.linear, self._newton = system, x, linear, newton
+        self._factors: Any = linear.factors
+        self.place = system.parameter_index(primary)
+        self.at = len(system.problem.states) + system.free.index(primary)
+        rate = linear.tangent[self.place]
+        self.tangent = linear.tangent / rate if rate else np.zeros_like(x)
+        self._random = np.random.default_rng(11)
 
-def _balanced(system: System, x: Array, sizes: Array) -> Array:
-    """Return sizes of states and free parameters with which the terms of every linearized equation are alike.
+    def sizes(self, stated: Array, said: float) -> Array:
+        """Return sizes; 0 where nothing is known. ``stated`` are those that are given, ``said`` bounds that of the primary."""
+        error, error_of_tangent = self._errors()
+        values = _largest(self.system, self.x)
+        known = np.where(stated > 0, stated, np.where(values > error, values, 0.0))
+        self.tangent = self._kept(self.tangent, _largest(self.system, self.tangent) > error_of_tangent)
+        if not self.tangent.any() or any(batch.interpreted is not None for batch in self.system._evaluated):
+            return known  # differences are taken over lengths of order one: they show no other sizes
+        at = np.arange(known.size) == self.at
+        terms = [_largest(self.system, term) for term in self._terms()]
+        modes = list(self._modes(known))
+        reach = min([_reach(terms), *(mode.distance for mode in modes)])
+        reach = _held(reach, terms[0], np.where(at, 0.0, known))
+        natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
+        change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
+        natural = _larger(natural, _sizes(terms, change), ~at, error)
+        branches = [self._settled_branch(mode) for mode in modes if mode.vector.any()]
+        held = [_held(size, parts[0], known) for parts, size in branches]
+        for (parts, _), size in zip(branches, held):
+            if np.isfinite(size):
+                natural = _larger(natural, _sizes(parts, size), ~at, error)
+        for (parts, _), size in zip(branches, held):
+            if not np.isfinite(size):
+                sizes = _sizes(parts, _balanced(parts, np.where(known > 0, known, natural)))
+                natural = _larger(natural, sizes, natural == 0, error)
+        found = np.where(_counts(known, natural) | (stated > 0), known, natural)
+        small = (found < USUAL[0]) & (stated == 0) & ~at
+        apart = self._apart(small)
+        return np.where(small & ~_counts(found, apart), apart, found)
 
-    Alike in the mean of logarithms. Unknowns of the least squares are the logarithms of the sizes that are 0, and of those of
-    the equations that are no rates of states. Of unknowns that are coupled to nothing known only the ratios are determined:
-    their sizes are as near to one as they can be.
-    """
-    entries, owners = system.couplings(x)
-    unknown = np.flatnonzero(sizes == 0)
-    place = {int(j): i for i, j in enumerate(unknown)}
-    rows, values = [], []
-    for i, (row, owner) in enumerate(zip(entries, owners)):
-        least = _NEGLIGIBLE * row[np.isfinite(row)].max(initial=0.0)
-        for j in np.flatnonzero((row > least) & np.isfinite(row)):
-            term, value = np.zeros(len(unknown) + len(entries)), -np.log(row[j])
-            for sign, which in ((1.0, int(j)), (-1.0, int(owner))):
-                if which < 0:
-                    term[len(unknown) + i] = sign
-                elif which in place:
-                    term[place[which]] += sign
-                else:
-                    value -= sign * np.log(sizes[which])
-            rows.append(term)
-            values.append(value)
-    found = sizes.copy()
-    matrix, wanted = np.array(rows), np.array(values)
-    for _ in range(_PASSES if rows else 0):
-        logarithms = np.linalg.lstsq(matrix, wanted)[0]
-        kept = matrix @ logarithms - wanted > np.log(_CANCELLED)
-        matrix, wanted = matrix[kept], wanted[kept]
-        found[unknown] = np.exp(logarithms[: len(unknown)])
-    return np.where(found > 0, found, 1.0)
-
-
-def _amplitude(system: System, x: Array, sizes: Array) -> float:
-    """Return the power of ten by which states of these sizes must be multiplied to change the derivatives by about themselves.
-
-    One where the functions are linear. ``sizes`` are those of states and free parameters.
-    """
-    entries = system.couplings(x)[0]
-    if not entries.size:  # large sparse problems have none
-        return 1.0
-    count, entries = len(sizes) - len(system.free), entries * sizes
-    largest = entries.max(axis=1)
-    powers = 10.0 ** np.arange(-_DECADES, _DECADES + 1)
-    for factor in powers:
-        states = x[: system.state_size].reshape(-1, count) + factor * sizes[:count]
+    def counts(self, name: str, size: float, sizes: Array) -> bool:
+        """Return whether a small value of a parameter is more than nothing: without it, a state would change."""
+        if size >= USUAL[0] or not size:
+            return True
         with np.errstate(all="ignore"):
-            there = system.couplings(np.concatenate([states.ravel(), x[system.state_size :]]))[0] * sizes
-            change = np.abs(there - entries).max(axis=1)
-        if not np.all(change[largest > 0] <= largest[largest > 0]):
-            return float(factor)
-    return 1.0
+            column = self.system.parameter_columns(self.x, (name,))[:, 0]
+            change = size * _largest(self.system, self._factors.solve(np.append(column, 0.0)))
+        return bool(np.any(change > _NOTHING * sizes))
+
+    # --- the expansion -------------------------------------------------------------------------------------------
+
+    def _terms(self) -> Iterator[Array]:
+        """Return the tangent and F_x^-1 of the derivatives of F of second and third order along it, over their factorials."""
+        yield self.tangent
+        for order in (2, 3):
+            yield self._solved([self.tangent] * order) / math.factorial(order)
+
+    def _solved(self, directions: Sequence[Array]) -> Array:
+        """Return F_x^-1 of the derivative of F along directions, zero in states where that is nothing but round-off."""
+        with np.errstate(all="ignore"):
+            right = np.append(self.system.along(self.x, directions), 0.0)
+            both = np.stack([right, self._rounded(right)])
+            found, other = self._factors.solve(both) if right.any() else np.zeros_like(both)
+        if not np.all(np.isfinite(found)):
+            return np.zeros_like(found)
+        return self._kept(found, _largest(self.system, found) > UNITS * _largest(self.system, found - other))
+
+    def _modes(self, known: Array) -> Iterator[_Mode]:
+        """Return singular points along the branch: the nearest one, then those of states that take no part in it."""
+        left = np.ones(known.size, dtype=bool)
+        while np.any(left & (known < USUAL[0])):
+            mode = self._nearest(self.tangent, left)
+            if mode is None:
+                return
+            yield mode
+            part = _largest(self.system, mode.vector) > 0
+            if not np.any(part & left):
+                return
+            left = left & ~part
+
+    def _apart(self, which: Pattern) -> Array:
+        """Return how far some states can change by themselves before F_x is singular; 0 where that never happens."""
+        found = np.zeros(which.size)
+        for number in np.flatnonzero(which) if np.count_nonzero(which) <= _MOST else ():
+            alone = self._kept(np.ones_like(self.x), np.arange(which.size) == number)
+            mode = self._nearest(alone, np.ones_like(which))
+            found[number] = 0.0 if mode is None else mode.distance
+        return found
+
+    def _nearest(self, direction: Array, kept: Pattern) -> _Mode | None:
+        """Return the nearest singular point in a direction and the null vector there, of some states; None where there is none.
+
+        The change of F_x is that of first or second order.
+        """
+        found: _Mode | None = None
+        for order in (1, 2):
+            v, growth = self._kept(self._random.standard_normal(self.x.size), kept), []
+            for _ in range(_ITERATIONS):
+                image = self._changed(v, direction, order)
+                growth.append(float(np.linalg.norm(image) / np.linalg.norm(v)))
+                if not growth[-1] > 0:
+                    break
+                v = image / np.linalg.norm(image)
+            else:
+                rate = float(np.exp(np.mean(np.log(growth[-4:]))))
+                nearer = found is None or rate ** (-1 / order) < found.distance
+                if rate > _NILPOTENT * max(growth[2:]) and nearer:
+                    found = _Mode(self._eigenvector(v, direction, rate, order), rate, order)
+        return found
+
+    def _changed(self, v: Array, direction: Array, order: int) -> Array:
+        """Return F_x^-1 of the change of F_x v in a direction, of first or second order."""
+        return self._solved([*[direction] * order, v]) / math.factorial(order)
+
+    def _eigenvector(self, v: Array, direction: Array, rate: float, order: int) -> Array:
+        """Return the part of v that belongs to the eigenvalue ``rate`` or its negative; zeros for complex ones.
+
+        Both occur, where the parameter couples two states only; v is then in turn of one state and of the other.
+        """
+        image = self._changed(v, direction, order) / rate
+        mode, sign = max(((v + image, 1.0), (v - image, -1.0)), key=lambda pair: float(np.linalg.norm(pair[0])))
+        missed = self._changed(mode, direction, order) / rate - sign * mode
+        noise = self._changed(self._rounded(v), direction, order) / rate - image
+        errors = np.maximum(_largest(self.system, missed) / _LASTS, UNITS * _largest(self.system, noise))
+        found = self._kept(mode, _largest(self.system, mode) > errors)
+        alone, left_out = (_largest(self.system, each) for each in (found, self._changed(found, direction, order)))
+        return np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found
+
+    def _settled_branch(self, mode: _Mode) -> tuple[list[Array], float]:
+        """Return what `_branch` does, without states that change with the next iterations of the null vector.
+
+        They belong to what the power method has left of other eigenvectors, where symmetry makes them zero.
+        """
+        again = mode.vector
+        for _ in range(2):  # the sign is that of the first again
+            again = self._changed(again, self.tangent, mode.order) / mode.rate
+        parts, size = self._branch(mode)
+        others = self._branch(replace(mode, vector=again))[0]
+        pairs = zip(parts, itertools.chain(others, itertools.repeat(np.zeros_like(parts[0]))))
+        return [np.where(np.abs(part - other) < _LASTS * part, part, 0.0) for part, other in pairs], size
+
+    def _branch(self, mode: _Mode) -> tuple[list[Array], float]:
+        """Return the terms of the branch that leaves along a null vector v, x + a v + a^2 ..., and the size of a.
+
+        At this size a term of higher order in a, there or at the singular point, is as large along v as the change of F_x v
+        from here to the singular point. It is infinity where F is linear along v.
+        """
+        v, size, parts, second = mode.vector, np.inf, [_largest(self.system, mode.vector)], np.zeros_like(mode.vector)
+        for order in range(2, _HIGHEST + 1):
+            if order > 3 and np.isfinite(size):
+                break
+            here = self._solved([v] * order) / math.factorial(order)
+            there = np.zeros_like(v)
+            if order < _HIGHEST:
+                there = mode.distance * self._solved([self.tangent, *[v] * order]) / math.factorial(order)
+            if order == 2:
+                second = here + there
+            if order == 3:
+                here = here - self._solved([v, second])
+            size = min(size, *(self._equal(term, mode) ** (1 / (order - 1)) for term in (here, there)))
+            parts.append(np.maximum(_largest(self.system, here), _largest(self.system, there)))
+        return parts, size
+
+    def _equal(self, term: Array, mode: _Mode) -> float:
+        """Return how much longer a null vector is than a term along it: what the power method leaves of the term.
+
+        Infinity where that is nothing but round-off.
+        """
+        left = term
+        for _ in range(_ITERATIONS if term.any() else 0):
+            left = self._changed(left, self.tangent, mode.order) / mode.rate
+        size = float(np.linalg.norm(left))
+        return float(np.linalg.norm(mode.vector)) / size if size > _NOTHING * np.linalg.norm(term) else np.inf
+
+    # --- errors --------------------------------------------------------------------------------------------------
+
+    def _errors(self) -> tuple[Array, Array]:
+        """Return errors of the values at the first point and of the tangent: of the mesh, and of round-off."""
+        system, x, at = self.system, self.x, self.place
+        row = system.weights * self.linear.tangent
+        other = linearization(system, self._rounded(x), row).tangent
+        error = UNITS * _largest(system, rounded_off(system, x, (row,)))
+        rate = other[at] or 1.0
+        error_of_tangent = UNITS * _largest(system, other / rate - self.tangent)
+        finer = None if system.refined() is None else on_finer_mesh(Trial(system, x, self.linear), self._newton)
+        if finer is not None:
+            carry, rate = system.carrier(finer.system), finer.tangent[finer.system.parameter_index(self._primary)] or 1.0
+            error = np.maximum(error, 2 * _largest(finer.system, finer.x - carry(x)))
+            turned = finer.tangent / rate - carry(self.tangent)
+            error_of_tangent = np.maximum(error_of_tangent, 2 * _largest(finer.system, turned))
+        return error, error_of_tangent
+
+    @property
+    def _primary(self) -> str:
+        return self.system.free[self.place - self.system.state_size]
+
+    def _rounded(self, v: Array) -> Array:
+        """Return a vector changed by one unit in the last place, up or down."""
+        found: Array = v * (1 + np.finfo(float).eps * self._random.choice((-1.0, 1.0), v.size))
+        return found
+
+    def _kept(self, v: Array, kept: Pattern) -> Array:
+        """Return a vector with zeros in all states and parameters that are not kept."""
+        count = len(self.system.problem.states)
+        kept_states = np.tile(kept[:count], self.system.state_size // count)
+        result: Array = v * np.concatenate([kept_states, kept[count:]])
+        return result
+
+
+def _largest(system: Discretization, v: Array) -> Array:
+    """Return the largest absolute value of each state, and that of each free parameter."""
+    states = np.abs(v[: system.state_size]).reshape(-1, len(system.problem.states)).max(axis=0, initial=0.0)
+    return np.append(states, np.abs(v[system.state_size :]))
+
+
+def _reach(terms: Sequence[Array]) -> float:
+    """Return the factor with which a term of higher order is as large as the linear one, in a state that has both."""
+    found = [np.inf]
+    for power, term in enumerate(terms[1:], 1):
+        both = (terms[0] > 0) & (term > 0)
+        if both.any():
+            found.append(float(np.min(terms[0][both] / term[both]) ** (1 / power)))
+    return min(found)
+
+
+def _held(reach: float, direction: Array, known: Array) -> float:
+    """Return a factor, made smaller where it changes a known state by more than its size."""
+    natural = np.where(direction > 0, direction * reach, 0.0) if np.isfinite(reach) else np.zeros_like(direction)
+    moved = (direction > 0) & (known > 0) & _counts(known, natural)
+    return float(min([reach, *(known[moved] / direction[moved])]))
+
+
+def _sizes(terms: Sequence[Array], change: float) -> Array:
+    """Return the largest term of an expansion, by state, at a change of its variable."""
+    found: Array = np.max([term * change**power for power, term in enumerate(terms, 1)], axis=0)
+    return found
+
+
+def _balanced(terms: Sequence[Array], sizes: Array) -> float:
+    """Return the change at which the terms of an expansion are as near to known sizes, or else to one, as they can be."""
+    pairs = [(power, np.log(term[i] / (sizes[i] or 1.0)), sizes[i]) for power, term in enumerate(terms, 1)
+             for i in np.flatnonzero(term)]  # fmt: skip
+    powers, gaps, _ = np.array([pair for pair in pairs if pair[2]] or pairs).T
+    return float(np.exp(-(powers @ gaps) / (powers @ powers)))
+
+
+def _larger(sizes: Array, others: Array, where: Pattern, error: Array) -> Array:
+    """Return sizes, the larger ones of both in some places, where they are more than errors."""
+    found: Array = np.where(where & (others > error), np.maximum(sizes, others), sizes)
+    return found
+
+
+def _counts(values: Array, natural: Array) -> Pattern:
+    """Return which values are more than nothing, compared with the sizes that the expansion gives."""
+    found: Pattern = (values >= USUAL[0]) | (values > _NOTHING * natural)
+    return found
+
+
+def _said(name: str, settings: Settings) -> float:
+    """Return the smallest limit or value to be labelled of a parameter but zero; infinity where there is none."""
+    said: Iterable[float] = (*settings.limits.get(name, ()), *settings.zeros.get(name, ()))
+    return min((abs(float(number)) for number in said if number), default=np.inf)
 
 
 def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier] | None:
@@ -179,10 +372,3 @@ def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier]
     parameters[[names.index(name) for name in system.free]] *= np.maximum(1.0, size_of_free)
     other, _ = system.with_scales(x, states * np.maximum(1.0, size), parameters)
     return None if other is system else (other, system.carrier(other))
-
-
-def _given(value: float, name: str, settings: Settings) -> float:
-    """Return the size of a parameter from what is said of it; 0 where nothing is."""
-    said: Iterable[float] = (*settings.limits.get(name, ()), *settings.zeros.get(name, ()))
-    smallest = min((abs(float(number)) for number in said if number and np.isfinite(number)), default=0.0)
-    return abs(value) if abs(value) > _NOTHING * smallest else smallest

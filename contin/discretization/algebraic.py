@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray, Indices
+from contin.arrays import Array, ComplexArray
 from contin.discretization.given import check_given
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
@@ -273,13 +273,6 @@ class Algebraic(System):
         """Return the same problem in the user's units, and x for it."""
         other = self._with(scales=None)
         return other, self.carrier(other)(x)
-
-    def couplings(self, x: Array) -> tuple[Array, Indices]:
-        """Return sizes of derivatives of the residual; its values are no rates of states here, -1."""
-        if self.is_sparse:
-            return super().couplings(x)
-        jacobian = np.abs(self._jacobian(x)[1])
-        return jacobian, np.full(len(jacobian), -1)
 
     def _with(self, **changes: Any) -> Algebraic:
         """Return the same with other free parameters, parameters or scales."""

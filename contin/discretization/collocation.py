@@ -368,23 +368,6 @@ class Collocation(System):
         other = self._with(scales=None)
         return other, self.carrier(other)(x)
 
-    def couplings(self, x: Array) -> tuple[Array, Indices]:
-        """Return sizes of derivatives of the functions, and whose rate each function is.
-
-        Rows are the right-hand sides times the length of the domain, integrands, and boundary conditions, there the larger
-        derivative of both ends.
-        """
-        n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
-        of_field, of_boundary = self._columns
-        field = self._field.jacobian(self._times, self.at_gauss_points(x), _NONE(n), p, of_field)[1]
-        ends = np.abs(self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)[1][0])
-        field = np.abs(field).max(axis=0)
-        field[:n] *= self.mesh[-1] - self.mesh[0]
-        ends = np.concatenate([np.maximum(ends[:, :n], ends[:, n : 2 * n]), ends[:, 2 * n :]], axis=1)
-        owners = np.full(len(field) + len(ends), -1)
-        owners[:n] = np.arange(n)
-        return np.concatenate([field, ends]), owners
-
     def _with(self, **changes: Any) -> Collocation:
         """Return the same with other mesh, free parameters, parameters or scales."""
         values = dict(zip(self.problem.parameters, self.parameters))

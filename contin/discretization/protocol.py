@@ -111,6 +111,14 @@ class Discretization(Equations, Protocol):
 
         return of_lines(bend, directions)
 
+    def magnitudes(self, x: Array) -> Array:
+        """Return the sizes of the unknowns relative to which x must be known, shape (size,).
+
+        Kinds of system that do not say are made of unknowns of order one.
+        """
+        found: Array = 1 + np.abs(x)
+        return found
+
     @abstractmethod
     def carrier(self, other: Any) -> Carrier:
         """Return the function that carries vectors of unknowns to another discretization of this problem."""

@@ -108,6 +108,12 @@ class System(Discretization):
         count = self.state_size // self.scales.states.size
         return np.concatenate([np.tile(self.scales.states, count), self.free_scales])
 
+    def magnitudes(self, x: Array) -> Array:
+        """Return the largest value of each state, and each free parameter, in the places of the unknowns, shape (size,)."""
+        states = np.abs(x[: self.state_size]).reshape(-1, len(self.problem.states))
+        largest = np.tile(states.max(axis=0, initial=0.0), len(states))
+        return np.append(largest, np.abs(x[self.state_size :]))
+
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[System, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it.
 
@@ -118,13 +124,6 @@ class System(Discretization):
     def without_scales(self, x: Array) -> tuple[System, Array]:
         """Return the same problem in the user's units, and x for it."""
         return self, x
-
-    def couplings(self, x: Array) -> tuple[Array, Indices]:
-        """Return sizes of derivatives of the functions, and whose rate each function is.
-
-        Shapes (functions, states + free parameters) and (functions,): the place of a state, or -1. Without scales.
-        """
-        return np.empty((0, 0)), np.empty(0, dtype=np.int64)
 
     def parameter(self, x: Array, name: str) -> float:
         """Return the value of one parameter."""

@@ -13,7 +13,7 @@ from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
-from contin.problems.vector_field import check_field, found_elsewhere, scaled
+from contin.problems.vector_field import check_field, found_elsewhere, returning, scaled
 
 #: The name, among the parameters, of the time that the computed part of the orbit takes.
 TIME = "time"
@@ -34,7 +34,7 @@ class ConnectionProblem(BoundaryValueProblem):
     Parameters
     ----------
     field : callable
-        ``field(u, p)`` returns the rates of the states.
+        ``field(u, p)`` returns the rates of the states; ``field(u, p, out)`` fills an array with them.
     states : sequence of str
     parameters : mapping of str to float
         Names and default values.
@@ -87,7 +87,9 @@ class ConnectionProblem(BoundaryValueProblem):
         for name in own:
             if name in parameters:
                 raise ProblemError(f"parameters: {name} is a parameter of every connection by itself")
-        check_field(field, Signature(names, (*parameters, *own), times=False), "must be a function of (u, p)")
+        signature = Signature(names, (*parameters, *own), times=False)
+        field = returning(field, signature)
+        check_field(field, signature, "must be a function of (u, p)")
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "homoclinic", homoclinic)
         object.__setattr__(self, "unstable", unstable)

@@ -19,7 +19,7 @@ from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle_symmetry import averaged, check_equivariance, image, order_of, symmetry_matrix
 from contin.problems.statement import check_statement
-from contin.problems.vector_field import check_field, found_elsewhere, of_parameters, scaled
+from contin.problems.vector_field import check_field, found_elsewhere, of_parameters, returning, scaled
 
 #: What is said of a field with other arguments.
 _FORCED = "must be a function of (t, u, p), as a period is given"
@@ -47,7 +47,7 @@ class CycleProblem(BoundaryValueProblem):
     ----------
     field : callable
         ``field(u, p)`` returns the rates of the states, as for an `AlgebraicProblem` whose equilibria are looked for;
-        ``field(t, u, p)`` with ``period``.
+        ``field(t, u, p)`` with ``period``. With one argument more, an array, it fills that with the rates.
     states : sequence of str
     parameters : mapping of str to float
         Names and default values.
@@ -107,7 +107,9 @@ class CycleProblem(BoundaryValueProblem):
         for name in (PERIOD, *extremes, *([ROUNDS] if forced else [])):
             if name in parameters or name in means:
                 raise ProblemError(f"parameters: {name} is a column of every cycle by itself")
-        check_field(field, Signature(names, tuple(parameters), times=forced), _FORCED if forced else _AUTONOMOUS)
+        signature = Signature(names, tuple(parameters), times=forced)
+        field = returning(field, signature)
+        check_field(field, signature, _FORCED if forced else _AUTONOMOUS)
         count = len(names)
         turn = _turn(symmetry, forced, count)
         check_equivariance(field, turn, names, parameters)

@@ -5,10 +5,38 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from contin import checks
 from contin.arrays import Function
 from contin.errors import ProblemError
-from contin.functions.signature import Signature, argument_count, result_count
+from contin.functions.signature import Signature, argument_count, result_count, takes_arrays
+
+
+def returning(field: Function, signature: Signature) -> Function:
+    """Return a field that fills an array, or takes states as arrays only, as one of named values that returns the rates."""
+    counted, wanted = argument_count(checks.function("field", field)), len(signature.arguments)
+    if counted == wanted + 1:
+        known, count = len(signature.parameters), len(signature.states)
+
+        def rates(times: tuple[Any, ...], u: Any, p: Any) -> Any:
+            out = np.zeros(count)
+            field(*times, np.array(list(u)), np.array(list(p)[:known]), out)
+            return [out[i] for i in range(count)]
+
+    elif counted == wanted and takes_arrays(field, signature.arguments):
+
+        def rates(times: tuple[Any, ...], u: Any, p: Any) -> Any:
+            return field(*times, np.array(list(u)), p)
+
+    else:
+        return field
+    returned: Function = (lambda t, u, p: rates((t,), u, p)) if signature.times else (lambda u, p: rates((), u, p))
+    try:
+        result_count(returned, signature.arguments, "field")
+    except ProblemError:
+        return field  # one of (t, u, p) in place of (u, p, out): `check_field` says so
+    return returned
 
 
 def check_field(field: Function, signature: Signature, wrong: str) -> None:

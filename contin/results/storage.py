@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -235,15 +236,24 @@ def _base(
 def _column_of(row: dict[str, Any], parameters: Mapping[str, float]) -> tuple[str, float | None]:
     """Return the column that a point is about, and its value.
 
-    Files of earlier versions have them in the name only, the value to a few digits: that of the point is better.
+    Files of earlier versions have them in the name only, the value to a few digits: that of the point is better, where it
+    agrees. Another name is a user's.
     """
     if "column" in row:
         return row["column"], row["value"]
     column, _, text = row["name"].removeprefix("possible ").partition(" = ")
     values = {**parameters, **row["functionals"]}
-    if column not in values:
+    if column not in values or (text and not _is_number(text, values[column])):
         return "", None
     return column, values[column] if text and not row["name"].startswith("possible ") else None
+
+
+def _is_number(text: str, value: float) -> bool:
+    """Return whether a text is a value to the six digits that names have."""
+    try:
+        return math.isclose(float(text), value, rel_tol=1e-5, abs_tol=1e-9)
+    except ValueError:
+        return False
 
 
 def _with_reference(system: Discretization, x: Array) -> Discretization:

@@ -7,7 +7,7 @@ estimate the error that is left; stop when that is below the tolerance or round-
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,13 +32,18 @@ _ROUND_OFF = 1e-9
 #: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: then a
 #: few steps reach round-off, where slower ones would take as long as a factorization.
 _CLOSE = 0.03
-#: Where Newton's method fails, the last update counts as round-off below so many times what one unit in the last place of x
-#: makes, in so many draws of its signs. Ten times fewer would not suffice on meshes of many intervals.
-_UNITS, _DRAWS = 30, 3
+#: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
+#: on meshes of many intervals.
+UNITS = 30
+#: Draws of the signs of these units. One more changes the estimate by a few percent.
+_DRAWS = 3
 #: A larger update is not taken for round-off in any case. Ten times larger, a matrix that is singular could pass.
 _COARSE = 1e-3
 #: An update of a few units in the last place: with it x solves the equations as well as any number can.
 _EXACT = 1e-15
+
+#: Returns the size of each unknown at x.
+Sizes = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,7 @@ def correct(
     target: Any = 0.0,
     newton: Newton = Newton(),
     factors: Factors | None = None,
-    unscaled: bool = False,
+    sizes: Sizes | None = None,
 ) -> Corrected:
     """Solve F(x) = 0 and row.x = target, starting from ``guess``.
 
@@ -104,8 +109,9 @@ def correct(
         The linear condition; without it F = 0 must be square.
     factors : optional
         A factorization from near by: tried first, for as long as it converges fast.
-    unscaled : bool
-        The sizes of the unknowns are not known yet: updates that are as small as round-off of x allows count as converged.
+    sizes : callable, optional
+        ``sizes(x)`` returns the size of each unknown. Where it is given, the last update is also small relative to these, or as
+        small as round-off of x allows: for unknowns that are not known to be of order one.
 
     Raises
     ------
@@ -122,11 +128,11 @@ def correct(
     if factors is not None:
         with contextlib.suppress(ConvergenceError):
             return _chords(system, guess, row, target, newton, factors)
-    return _newton(system, guess, row, target, newton, unscaled)
+    return _newton(system, guess, row, target, newton, sizes)
 
 
 def _newton(
-    system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, unscaled: bool
+    system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes | None
 ) -> Corrected:
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
     rows = () if row is None else (row,)
@@ -153,39 +159,74 @@ def _newton(
                 break
             progress.record(size, fresh)
             if progress.converged:
-                return Corrected(x, factors, len(progress.sizes), progress.error, along)
+                relative = 0.0 if sizes is None else _relative(update, sizes(x))
+                if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
+                    return Corrected(x, factors, len(progress.sizes), progress.error, along)
+                return _settled(system, x, row, target, newton, sizes, progress.sizes)
             if progress.diverges:
                 break
             if progress.wants_jacobian:
                 factors = None
-        if unscaled and _is_noise(system, x, update, rows):
+        if sizes is not None and _is_noise(system, x, update, rows):
             return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), progress.sizes[-1])
     raise _failure(progress.sizes)
 
 
-def approached(system: Equations, guess: Sequence[float] | Array) -> Array:
-    """Return a point from which Newton's method converges, reached from a guess by damped steps.
+def _settled(
+    system: Equations, x: Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes, updates: list[float]
+) -> Corrected:
+    """Go on until the update is small relative to the size of each unknown, or round-off, or leads to zero.
 
-    The damping is that of the natural monotonicity test (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3):
-    the next correction, with the same Jacobian, must be smaller. It does not depend on units of the equations.
+    An unknown that is zero has no size: its updates vanish much faster than they become small.
 
     Raises
     ------
     ConvergenceError
-        The damping becomes too strong, or the corrections do not become small.
+        It does not become so; the message holds the last updates, relative to these sizes.
+    """
+    rows, relative, before = () if row is None else (row,), [], np.zeros_like(x)
+    for _ in range(newton.max_iterations):
+        residual, factors = system.linearize(x, rows)
+        update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
+        relative.append(_relative(update, sizes(x)))
+        if not np.all(np.isfinite(update)):
+            break
+        least = newton.tolerance * np.maximum(sizes(x), before)
+        if not np.all(np.abs(update) <= least):
+            least = np.maximum(least, UNITS * rounded_off(system, x, rows))
+        small = np.all(np.abs(update) <= least)
+        error, before = _move(x, update), np.abs(update)
+        if small:
+            return Corrected(x, factors, len(updates) + len(relative), error)
+    raise _failure(relative)
+
+
+def _relative(update: Array, sizes: Array) -> float:
+    """Return the largest component of an update relative to the size of its unknown; infinity if a zero changes."""
+    moving = update != 0
+    return float(np.max(np.abs(update[moving]) / sizes[moving], initial=0.0))
+
+
+def approached(system: Equations, guess: Sequence[float] | Array) -> Iterator[Array]:
+    """Return points from which Newton's method may converge, reached from a guess by damped steps, each nearer than the last.
+
+    The damping is that of the natural monotonicity test (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3):
+    the next correction, with the same Jacobian, must be smaller. It does not depend on units of the equations. How near is near
+    enough depends on the size of the solution: corrections that have become ten times smaller give the next point.
     """
     for enough in _ENOUGH:
-        x = np.array(guess, dtype=float)
+        x, near = np.array(guess, dtype=float), _NEAR
         with np.errstate(all="ignore"):
             for _ in range(_MOST_DAMPED):
                 update, factors = _correction(system, x)
-                if np.max(np.abs(update) / (1 + np.abs(x)), initial=0.0) < _NEAR:
-                    return x
+                size = float(np.max(np.abs(update) / (1 + np.abs(x)), initial=0.0))
+                if size < near:
+                    yield x
+                    near = min(near, size) / 10
                 part = _part_taken(system, x, update, factors, enough)
                 if part < _LEAST_PART:
                     break
-                x -= part * update
-    raise ConvergenceError("damped Newton steps from this guess do not come nearer to a solution")
+                x = x - part * update
 
 
 def _correction(system: Equations, x: Array) -> tuple[Array, Factors]:
@@ -217,16 +258,22 @@ def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...
 
     With unknowns of very different sizes, round-off of the large ones reaches the small ones.
     """
-    residual, factors = system.linearize(x, rows)
-    if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(update))):
+    noise = rounded_off(system, x, rows)
+    if not (np.all(np.isfinite(noise)) and np.all(np.isfinite(update))):
         return False
+    level = float(np.max(noise / (1 + np.abs(x))))
+    return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(UNITS * level, _COARSE))
+
+
+def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Array:
+    """Return by how much each unknown of a solution x changes where x changes by one unit in the last place."""
     random, noise = np.random.default_rng(5), np.zeros_like(x)
+    residual, factors = system.linearize(x, rows)
     for _ in range(_DRAWS):
         rounded = x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), x.size))
         change = np.append(system.residual(rounded) - residual, np.zeros(len(rows)))
         noise = np.maximum(noise, np.abs(factors.solve(change)))
-    level = float(np.max(noise / (1 + np.abs(x))))
-    return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(_UNITS * level, _COARSE))
+    return noise
 
 
 class _Progress:
@@ -236,13 +283,13 @@ class _Progress:
         self.tolerance = tolerance
         self.sizes: list[float] = []
         self._moved = 1.0  # distance from where the Jacobian was taken
-        self._rate = 1.0  # estimated ratio of the error after the last update to its size
+        self.rate = 1.0  # estimated ratio of the error after the last update to its size
 
     def record(self, size: float, fresh: bool) -> None:
         """Note an update, made with a ``fresh`` Jacobian or with an old one."""
         self.sizes.append(size)
         self._moved = size if fresh else self._moved + size
-        self._rate = self._estimated_rate(fresh)
+        self.rate = self._estimated_rate(fresh)
 
     def _estimated_rate(self, fresh: bool) -> float:
         if len(self.sizes) < 2:  # nothing is known of how nonlinear the equations are
@@ -255,14 +302,14 @@ class _Progress:
     @property
     def error(self) -> float:
         """Estimated error after the last update."""
-        return self.sizes[-1] * self._rate
+        return self.sizes[-1] * self.rate
 
     @property
     def converged(self) -> bool:
         """The error is below the tolerance, or the updates are round-off."""
         size, repeated = self.sizes[-1], len(self.sizes) > 1
         confirmed = repeated or size <= self.tolerance
-        return (confirmed and self.error <= self.tolerance) or (size < _ROUND_OFF and repeated and self._rate >= 0.5)
+        return (confirmed and self.error <= self.tolerance) or (size < _ROUND_OFF and repeated and self.rate >= 0.5)
 
     @property
     def diverges(self) -> bool:
@@ -273,7 +320,7 @@ class _Progress:
     def wants_jacobian(self) -> bool:
         """The next update is better made with a new Jacobian: chord steps would take longer."""
         size = self.sizes[-1]
-        return bool(size > _FAR or not self._rate < 0.5 or np.log(self.tolerance / size) < _CHORDS * np.log(self._rate))
+        return bool(size > _FAR or not self.rate < 0.5 or np.log(self.tolerance / size) < _CHORDS * np.log(self.rate))
 
 
 def _chords(

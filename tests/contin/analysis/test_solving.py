@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bank.closed_forms import bratu, bratu_middles
 
-from contin import BoundaryValueProblem, ConvergenceError, ProblemError, solve
+from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, ProblemError, solve, trace
 
 
 def middle(point):
@@ -84,3 +84,67 @@ def test_where_all_solutions_are_known_there_is_no_further_one():
     second = solve(bratu(), [0, 0.1], {"lam": 1.0}, degree=6, others=[first])
     with pytest.raises(ConvergenceError, match="no further solution"):
         solve(bratu(), [0, 0.1], {"lam": 1.0}, degree=6, others=[first, second])
+
+
+# --- solutions of any size -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "k"), [(1e-9, 1e-9, 1e-9), (1e-9, 2e-9, 3e-9), (1e-6, 2e-9, 1e-12), (1e-9, 1e-9, 1e-15), (1e-12, 3e-12, 1e-10)]
+)
+def test_binding_equilibria_in_moles_per_litre(a, b, k):
+    """c = 2 A B / (A + B + K + sqrt((A + B + K)^2 - 4 A B)), from several guesses and in two forms."""
+    total = a + b + k
+    c = 2 * a * b / (total + math.sqrt(total**2 - 4 * a * b))
+    values = {"A": a, "B": b, "K": k}
+    one = AlgebraicProblem(lambda u, p: ((p.A - u.c) * (p.B - u.c) - p.K * u.c,), ["c"], values)
+    for guess in (0.0, min(a, b) / 2):
+        assert solve(one, [guess])["c"] == pytest.approx(c, rel=1e-10, abs=0)
+    three = AlgebraicProblem(lambda u, p: (u.a + u.c - p.A, u.b + u.c - p.B, u.a * u.b - p.K * u.c), ["a", "b", "c"], values)
+    for guess in ([a, b, 0.0], [a / 2, b / 2, min(a, b) / 2]):
+        assert solve(three, guess)["c"] == pytest.approx(c, rel=1e-10, abs=0)
+
+
+@pytest.mark.parametrize("a", [1e-60, 1e-20, 1e-14, 1e-8, 1.0, 1e6])
+@pytest.mark.parametrize("guess", [1.0, 1e-8])
+def test_square_roots_of_any_size(a, guess):
+    """x^2 = a is solved, or the call says that it is not."""
+    problem = AlgebraicProblem(lambda u, p: (u.x**2 - p.a,), ["x"], {"a": a})
+    try:
+        assert solve(problem, [guess])["x"] == pytest.approx(math.sqrt(a), rel=1e-10, abs=0)
+    except ConvergenceError:
+        assert a > 1 or guess < math.sqrt(a)
+
+
+@pytest.mark.parametrize("a", [-1e-60, -1e-30, 0.0])
+def test_what_has_no_root_is_not_solved(a):
+    problem = AlgebraicProblem(lambda u, p: (u.x**2 - p.a,), ["x"], {"a": a})
+    for guess in (1.0, 1e-8, 1e-30):
+        with pytest.raises(ConvergenceError):
+            solve(problem, [guess])
+
+
+def test_the_fold_of_a_small_root():
+    """x^2 = a from a = 1e-60: the branch turns at a = 0."""
+    problem = AlgebraicProblem(lambda u, p: (u.x**2 - p.a,), ["x"], {"a": 1e-60})
+    branch = trace(solve(problem, [1e-30]), free=["a"], direction=-1, limits={"a": (-1e-60, 2e-60)})
+    assert [point.label for point in branch if point.label] == ["EP", "LP", "EP"]
+    assert abs(branch.labelled("LP")[0]["a"]) < 1e-72 and branch.points[-1]["x"] == pytest.approx(-math.sqrt(2e-60), rel=1e-10)
+
+
+def test_a_small_reaction_and_diffusion():
+    """u'' = u^2 / s - q between zeros, with u and q of size 1e-9: s times the solution for s = q = 1."""
+    problem = BoundaryValueProblem(
+        lambda t, u, p: (u.v, u.u**2 / p.s - p.q), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 1.0, "s": 1.0}
+    )
+    usual, small = solve(problem, [0, 0]), solve(problem, [0, 0], {"q": 1e-9, "s": 1e-9})
+    times = np.linspace(0, 1, 11)
+    expected = usual.system.evaluate(usual.x, times)
+    assert small.system.evaluate(small.x, times) / 1e-9 == pytest.approx(expected, rel=1e-7, abs=1e-9)
+
+
+def test_a_state_that_is_zero_has_no_size():
+    """From a guess beside it, too: y = 0, z = x - 1 = 0."""
+    problem = AlgebraicProblem(lambda u, p: (u.x**3 - p.a, u.y + u.y**2, u.z - u.x + 1), ["x", "y", "z"], {"a": 1.0})
+    found = solve(problem, [1.2, 0.1, 0.3])
+    assert abs(found["y"]) < 1e-20 and abs(found["z"]) < 1e-15

@@ -3,11 +3,12 @@
 import functools
 import math
 
+import numpy as np
 import pytest
 from bank import opt
 from bank.closed_forms import cusp, elastica
 
-from contin import AlgebraicProblem, BoundaryValueProblem, ProblemError, curve, sensitivities, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, ProblemError, TestFunction, curve, sensitivities, solve, trace
 
 
 @functools.cache
@@ -184,3 +185,18 @@ def test_sensitivities_of_a_branch_point_by_a_parameter_of_another_size():
     problem = AlgebraicProblem(lambda u, p: (u.x * (u.x - p.a + 1e-6 * p.b),), ["x"], {"a": 1.0, "b": 3e6})
     (point,) = trace(solve(problem, [0.0]), free=["a"], limits={"a": (0, 5)}).labelled("BP")
     assert sensitivities(point)["b"]["a"] == pytest.approx(1e-6, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["a = critical", "a = 0.231", "a", "x = -1.1", "b = 1"])
+@pytest.mark.parametrize("label", ["UZ", "LP", "EX"])
+def test_a_users_name_names_no_quantity(name, label):
+    """x = -1.1 on x^3 - b x + a = 0 at a = 0.231: `curve` follows that, given as event, or asks for it."""
+    problem = AlgebraicProblem(lambda u, p: (u.x**3 - p.b * u.x + p.a,), ["x"], {"a": 2.0, "b": 1.0})
+    event = TestFunction(label, name, lambda trial: trial["x"] + 1.1)
+    branch = trace(solve(problem, [-1.5]), free=["a"], direction=-1, limits={"a": (-2, 3)}, test_functions=[event])
+    point = next(point for point in branch if point.name == name)
+    with pytest.raises(ProblemError, match="give it as event"):
+        curve(point, "b", limits={"b": (0.5, 2)})
+    found = curve(point, "b", event=event, limits={"b": (0.5, 2)})
+    assert found.column("x") == pytest.approx(np.full(len(found), -1.1), abs=1e-10)
+    assert found.column("a") == pytest.approx(1.1**3 - 1.1 * found.column("b"), abs=1e-10)

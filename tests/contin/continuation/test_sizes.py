@@ -1,0 +1,208 @@
+"""Sizes that a run finds: what a limit, an error or a coefficient with a pole must not become, and what other units change."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import jn_zeros
+
+import contin
+from contin import AlgebraicProblem, BoundaryValueProblem, ConnectionProblem, solve, trace
+
+
+def column(load=1.0, height=1.0):
+    """Euler's column u'' + P sin u = 0 between hinges, in units of load and angle: buckling loads (pi k)^2."""
+    return BoundaryValueProblem(
+        lambda t, u, p: (u.v, -height * p.P / load * math.sin(u.u / height)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"P": 0.0}
+    )
+
+
+def located(branch, name, unit, count):
+    """Return the first branch points in a unit, none of them only possible, and the largest of their errors."""
+    points = branch.labelled("BP")[:count]
+    assert not any("possible" in point.name for point in points)
+    return [point[name] / unit for point in points], max(point.errors[name] / unit for point in points)
+
+
+# --- a limit is no size ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("limit", [1e3, 1e6, 1e10, 1e200, 1.7e308])
+@pytest.mark.parametrize("load", [1.0, 1e-6, 1e6])
+def test_buckling_loads_whatever_the_limit(limit, load):
+    branch = trace(solve(column(load), [0, 0]), free=["P"], limits={"P": (0, max(limit, 1e3 * load))}, max_points=40)
+    found, error = located(branch, "P", load, 6)
+    assert found == pytest.approx([(math.pi * k) ** 2 for k in range(1, 7)], rel=1e-11) and error < 1e-8
+
+
+@pytest.mark.parametrize("limits", [(-100, 100), (-1e8, 1e8), (-1e200, 1.0)])
+def test_buckling_loads_of_negative_sign(limits):
+    """The column pulled by -P."""
+    problem = BoundaryValueProblem(
+        lambda t, u, p: (u.v, p.P * math.sin(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"P": 0.0}
+    )
+    branch = trace(solve(problem, [0, 0]), free=["P"], direction=-1, limits={"P": limits}, max_points=25)
+    assert located(branch, "P", -(math.pi**2), 3)[0] == pytest.approx([1, 4, 9], rel=1e-11)
+
+
+@pytest.mark.parametrize("limit", [20.0, 1e6, 1e200])
+@pytest.mark.parametrize("coupled", [False, True])
+def test_branch_points_of_equilibria_whatever_the_limit(limit, coupled):
+    """x_k (a - k^2) = x_k^3, each of its own or with a linear coupling to the next: branch points at 1, 4, 9, 16."""
+    names = ["x1", "x2", "x3", "x4"]
+
+    def residual(u, p):
+        rates = [(p.a - (k + 1) ** 2) * u[k] - u[k] ** 3 for k in range(4)]
+        return [rates[k] + (u[k + 1] if coupled and k < 3 else 0) for k in range(4)]
+
+    problem = AlgebraicProblem(residual, names, {"a": 0.0})
+    branch = trace(solve(problem, [0.0] * 4), free=["a"], limits={"a": (0, limit)}, max_points=60)
+    found, error = located(branch, "a", 1.0, 9)
+    assert found == pytest.approx([1, 4, 9, 16], rel=1e-11) and error < 1e-11
+
+
+@pytest.mark.parametrize("critical", [1e-3, 0.1, 2.0, 1e6])
+def test_a_limit_that_equals_the_critical_value(critical):
+    problem = AlgebraicProblem(lambda u, p: ((p.a - critical) * u.x - u.x**3,), ["x"], {"a": 0.0})
+    branch = trace(solve(problem, [0.0]), free=["a"], limits={"a": (0, critical)})
+    assert branch.points[-1]["a"] == pytest.approx(critical, rel=1e-12) and branch.points[-1].errors["a"] < 1e-12 * critical
+    assert all(point["a"] == pytest.approx(critical) for point in branch.labelled("BP"))
+
+
+def test_the_limit_of_a_column_at_its_buckling_load():
+    branch = trace(solve(column(), [0, 0]), free=["P"], limits={"P": (0, math.pi**2)})
+    assert branch.points[-1].errors["P"] < 1e-11 and branch.points[-1]["P"] == pytest.approx(math.pi**2, rel=1e-12)
+
+
+def test_a_linear_problem_reaches_a_generous_limit():
+    """x = a / 1e3: nothing shows a size. The steps grow."""
+    problem = AlgebraicProblem(lambda u, p: (1e3 * u.x - p.a,), ["x"], {"a": 0.0})
+    branch = trace(solve(problem, [0.0]), free=["a"], limits={"a": (0, 1e9)})
+    assert str(branch.stop) == "reached a = 1e+09" and branch.points[-1]["x"] == pytest.approx(1e6, rel=1e-12)
+
+
+# --- amplitudes ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("load", "height"), [(1.0, 1e-8), (1e6, 1e-5), (1e-7, 1e7), (1e9, 1e9)])
+def test_the_amplitude_of_a_buckled_column_is_found(load, height):
+    """The same branch in all units: at P = 20 its largest angle is that of the column with P = 20 in units of one."""
+    ends = []
+    for of_load, of_height in ((1.0, 1.0), (load, height)):
+        limits = {"P": (0, 20 * of_load)}
+        straight = trace(solve(column(of_load, of_height), [0, 0]), free=["P"], limits=limits)
+        buckled = trace(straight.labelled("BP")[0], branch=1, limits=limits)
+        assert buckled.stop.reason == "limit"
+        ends.append(np.abs(buckled.points[-1].system.states(buckled.points[-1].x)).max(axis=0) / of_height)
+    assert ends[1] == pytest.approx(ends[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("power", [2, 3, 4, 5])
+@pytest.mark.parametrize("size", [1e-7, 1.0, 1e8])
+def test_branches_that_leave_as_a_power(power, size):
+    """a = (x / size)^(power - 1) crosses x = 0 at a = 0."""
+    problem = AlgebraicProblem(lambda u, p: (p.a * u.x - u.x * (u.x / size) ** (power - 1),), ["x"], {"a": -1.0})
+    rest = trace(solve(problem, [0.0]), free=["a"], limits={"a": (-1, 1)})
+    assert [point["a"] for point in rest.labelled("BP")] == pytest.approx([0.0], abs=1e-12)
+    fork = trace(rest.labelled("BP")[0], branch=1, limits={"a": (-1, 1)})
+    assert fork.stop.reason == "limit" and abs(fork.points[-1]["x"]) == pytest.approx(size, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_elasticas(seed):
+    """theta' = c0 m, m' = -P c1 sin theta (1 + e cos theta), y' = c2 sin theta, clamped and free: P = (k - 1/2)^2 pi^2 unit.
+
+    The sizes are powers of two near one, as the constants are.
+    """
+    random = np.random.default_rng(seed)
+    c, e = 10.0 ** random.uniform(-1, 1, 3), random.uniform(-0.2, 1)
+    unit = math.pi**2 / (c[0] * c[1] * (1 + e))
+    problem = BoundaryValueProblem(
+        lambda t, u, p: (c[0] * u.m, -p.P * c[1] * math.sin(u.th) * (1 + e * math.cos(u.th)), c[2] * math.sin(u.th)),
+        lambda a, b, p: (a.th, b.m, a.y), ["th", "m", "y"], {"P": 0.0},
+    )  # fmt: skip
+    branch = trace(solve(problem, [0, 0, 0]), free=["P"], limits={"P": (0, 7 * unit)})
+    assert located(branch, "P", unit, 9)[0] == pytest.approx([0.25, 2.25, 6.25], rel=1e-10)
+    scales = branch.points[0].system.scales
+    assert scales is None or np.all(np.abs(np.log2([*scales.states, *scales.parameters])) <= 13)
+
+
+# --- coefficients with a pole ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("load", [0.0, 5.0])
+@pytest.mark.parametrize("heated", [False, True])
+def test_a_clamped_circular_plate(load, heated):
+    """Von Karman's plate, compressed at its edge or heated, buckles at the squares of zeros of J_1; 1 / r^2 has a pole."""
+
+    def rhs(t, u, p):
+        thermal = p.P * u.f if heated else 0.0
+        return u.w, -u.w / t + u.f / t**2 - thermal + u.f * u.g / t, u.h, -u.h / t + u.g / t**2 - u.f**2 / (2 * t)
+
+    edge = (lambda a, b, p: (a.f, b.f, a.g, b.g)) if heated else (lambda a, b, p: (a.f, b.f, a.g, b.g + p.P))
+    problem = BoundaryValueProblem(rhs, edge, ["f", "w", "g", "h"], {"P": load})
+    guess = (lambda t: (0, 0, 0, 0)) if heated else (lambda t: (0, 0, -load * t, -load))
+    flat = trace(solve(problem, guess), free=["P"], limits={"P": (0, 60)})
+    assert located(flat, "P", 1.0, 9)[0] == pytest.approx(jn_zeros(1, 2) ** 2, rel=1e-9)
+    buckled = trace(flat.labelled("BP")[0], branch=1, limits={"P": (0, 60)})
+    assert str(buckled.stop) == "reached P = 60"
+
+
+# --- values that are nothing but errors ------------------------------------------------------------------------------
+
+
+def sandstede(u, p):
+    """AUTO-07p's demos `san` and `sib`: at mu = 0 the orbit on x^2 (1 - x) = y^2, z = 0 is homoclinic with nu = 0."""
+    leaf = p.nu - p.alpha * u.z
+    return (
+        p.a * u.x + u.y - p.a * u.x**2 + leaf * u.x * (2 - 3 * u.x),
+        u.x + p.a * u.y - 1.5 * u.x**2 - 1.5 * p.a * u.x * u.y - 2 * leaf * u.y,
+        p.c * u.z + p.mu * u.x + p.gamma * u.x * u.z + p.alpha * p.beta * (u.x**2 * (1 - u.x) - u.y**2),
+    )
+
+
+ORBITS = [
+    ("alpha", (0, 1), {"alpha": 0.0, "gamma": 0.0}),
+    ("c", (-3, -1), {"alpha": 1.0, "gamma": 3.0}),
+    ("c", (-3, -1), {"alpha": 0.5, "gamma": 3.0, "a": 0.375}),
+    ("a", (-0.3, 0.3), {"alpha": 1.0, "gamma": 0.0}),
+    ("gamma", (0, 2), {"alpha": 1.0, "gamma": 1.0, "beta": 0.0}),
+]
+
+
+@pytest.mark.parametrize(("name", "limits", "numbers"), ORBITS)
+@pytest.mark.parametrize("direction", [1, -1])
+def test_unfolding_parameters_that_are_zero(name, limits, numbers, direction):
+    """The orbit is there for all values of a, c, alpha, beta, gamma: nu stays zero, z is zero but for errors."""
+    values = {"a": 0.0, "c": -2.0, "alpha": 0.0, "beta": 1.0, "gamma": 0.0, "mu": 0.0, "nu": 0.0}
+    problem = ConnectionProblem(sandstede, ["x", "y", "z"], {**values, **numbers}, unstable=1)
+
+    def guess(t):
+        x = 1 / math.cosh(20 * (t - 0.5)) ** 2
+        return x, -x * math.tanh(20 * (t - 0.5)), 0
+
+    found = solve(problem, guess, {"time": 40}, free=["nu"])
+    branch = trace(found, free=[name, "nu"], limits={name: limits}, direction=direction)
+    end = limits[direction > 0]
+    assert str(branch.stop) == f"reached {name} = {end:g}" or found[name] == end
+    assert len(branch) < 30 and max(abs(branch.column("nu"))) < 1e-9
+    assert abs(branch.points[-1].system.states(branch.points[-1].x)[:, 2]).max() < 1e-7
+
+
+def test_round_off_in_a_boundary_condition_is_no_size():
+    """u(1) = sin(pi) = 1.2e-16 in place of zero: the same buckling loads, and the same buckled column."""
+    problem = BoundaryValueProblem(
+        lambda t, u, p: (u.v, -p.P * math.sin(u.u)), lambda a, b, p: (a.u, b.u - math.sin(math.pi)), ["u", "v"], {"P": 2.0}
+    )
+    branch = trace(solve(problem, [0, 0]), free=["P"], limits={"P": (2, 50)})
+    assert branch.points[0].system.scales is None
+    assert located(branch, "P", math.pi**2, 3)[0] == pytest.approx([1, 4], rel=1e-9)
+
+
+def test_a_parameter_that_is_an_error_and_becomes_free():
+    """nu = 3e-17 is an error of an earlier solution. The run has no size for it; the fold is followed in it."""
+    problem = AlgebraicProblem(lambda u, p: (p.a - u.x**2 - p.nu,), ["x"], {"a": 1.0, "nu": 3e-17})
+    branch = trace(solve(problem, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 2)})
+    folds = contin.curve(branch.labelled("LP")[0], "nu", limits={"nu": (-1, 1)})
+    assert str(folds.stop) == "reached nu = 1" and len(folds) < 40
+    assert folds.column("a") == pytest.approx(folds.column("nu"), abs=1e-12)
