@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contin.arrays import ComplexArray
+from contin.arrays import ComplexArray, Mask
 from contin.linalg.factors import Factors
 from contin.linalg.singular import orthonormalize, random_rows
 
@@ -90,6 +90,16 @@ def crossings(values: ComplexArray) -> tuple[int, bool]:
 
     It is not where one of them is close to zero at the end.
     """
-    passed = (values.real < 0) & (np.abs(values.imag) < np.abs(values.real))
-    clear = np.abs(values) < np.where(passed, _VANISHES, _SHRINKS)
-    return int(np.count_nonzero(passed)), bool(np.all(clear))
+    passing = (values.real < 0) & (np.abs(values.imag) < np.abs(values.real))
+    clear = np.abs(values) < np.where(passing, _VANISHES, _SHRINKS)
+    return int(np.count_nonzero(passing)), bool(np.all(clear))
+
+
+def passed(values: ComplexArray) -> tuple[Mask, Mask]:
+    """Return which singular values pass zero before the second point, and which vanish right there, from `quotients`.
+
+    Of those that vanish, round-off decides on the sign.
+    """
+    vanishing = np.abs(values) > _VANISHES
+    passing = (values.real < 0) & (np.abs(values.imag) < np.abs(values.real)) & ~vanishing
+    return passing, vanishing
