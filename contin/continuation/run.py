@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from contin import checks, threads
 from contin.arrays import Array
 from contin.continuation.failure import no_convergence
 from contin.continuation.scaling import outgrown, scaled
+from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
 from contin.detection.hopf_end import collapsed
 from contin.detection.inspection import Inspection, Start
@@ -91,6 +92,8 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
+#: Labels of points that must be found again on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
+_CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
@@ -161,6 +164,7 @@ class Continuation:
         self._tests = [*general, *self._own]
         self._comparable = general  # have the same sign on every mesh
         self._index = index_of(self.state.system)
+        self._census = census_of(self.state.system) if settings.folds and settings.branch_points else None
         self.notes: list[str] = []
         self._resumed = state is not None
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
@@ -237,7 +241,7 @@ class Continuation:
         if not self._resumed:
             trial = self._state_trial()
             first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
-            yield self._point(dataclasses.replace(first, label=own_end(trial.system, first).label), self.state)
+            yield self._point(self._located(dataclasses.replace(first, label=own_end(trial.system, first).label)), self.state)
             if (stop := self._out_of_limits(trial) or self._out_of_domain(trial)) is not None:
                 self.stop = stop
                 return
@@ -270,15 +274,20 @@ class Continuation:
         """Make one step: yield the labelled points inside it, then the point at its end."""
         self._adapt_mesh()
         try:
-            segment, inspection, distance = self._step(self.state)
+            segment, inspection, distance, doubt = self._step(self.state)
         except ConvergenceError as error:
             self.stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
             return
         special = [own_end(segment.trial.system, point) for point in inspection.special_points(self._tests)]
         special = within_limits(segment, special, self._limits)
-        changes = self._index_changes(segment, special)
-        for point, change in zip(special, changes):
+        end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
+        found = [self._located(point) for point in special[: end + 1]]
+        found = [point for point in found if self._is_confirmed(point, segment)]
+        changes = self._index_changes(segment, found)
+        if end == len(special):
+            self._note_doubts(segment, found, doubt if len(found) == len(special) else "")
+        for point, change in zip(found, changes):
             if point.stop is not None:
                 self.stop = own_stop(point.trial.system, point.trial, point.stop)
                 point = with_details(point, self.stop)
@@ -292,7 +301,7 @@ class Continuation:
         elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
-        yield self._point(SpecialPoint(segment.step, label, name, segment.trial), segment.state)
+        yield self._point(self._located(SpecialPoint(segment.step, label, name, segment.trial)), segment.state)
 
     def _failure(self, error: ConvergenceError) -> Stop:
         """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
@@ -303,11 +312,11 @@ class Continuation:
 
     # --- one step ------------------------------------------------------------------------------------------------
 
-    def _step(self, state: State) -> tuple[Segment, Inspection, float]:
+    def _step(self, state: State) -> tuple[Segment, Inspection, float, str]:
         """Predict and correct, halving the step until the corrected point can be believed.
 
-        Returns the step and the distance from prediction to corrected point. At the first failure the state's tangent is taken
-        anew, right at its point.
+        Returns the step, the distance from prediction to corrected point, and the doubt that is left where the step cannot be
+        halved any more. At the first failure the state's tangent is taken anew, right at its point.
         """
         step, settings, exact = up_to_limits(state, self.settings.limits, self.settings.min_step), self.settings, False
         finest = max(settings.min_step, _FINEST * step)
@@ -315,10 +324,11 @@ class Continuation:
             try:
                 segment, distance = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
-                if step < 2 * finest or (inspection.is_simple() and self._is_explained(segment, inspection)):
+                doubt = inspection.doubt() or self._contradiction(segment, inspection)
+                if step < 2 * finest or not doubt:
                     inspection.special_points(self._tests)  # where points inside cannot be found the step is halved
-                    return segment, inspection, distance
-                problem = ConvergenceError("several branch points in one step, or another branch at its end")
+                    return segment, inspection, distance, doubt
+                problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
             if not exact and not state.singular:
@@ -450,12 +460,37 @@ class Continuation:
 
     # --- the index -----------------------------------------------------------------------------------------------
 
-    def _is_explained(self, segment: Segment, inspection: Inspection) -> bool:
-        """Return whether the special points of a step allow the change of the index over it."""
-        if self._index is None:
+    def _contradiction(self, segment: Segment, inspection: Inspection) -> str:
+        """Return how the change of index or number of eigenvalues over a step contradicts its special points; "" if not."""
+        if not contradiction(self._census, segment, ()):
+            return ""  # without special points, which take time
+        return contradiction(self._census, segment, inspection.special_points(self._tests))
+
+    def _note_doubts(self, segment: Segment, found: list[SpecialPoint], doubt: str) -> None:
+        """Note what the labelled points of a step do not explain: a change of the count or, without one, a doubt."""
+        contradicts = contradiction(self._census, segment, found)
+        if contradicts and (self._census is not self._index or not found):  # beside points, changes of the index are noted
+            self._note(f"{contradicts}, and the labelled points do not explain it", segment)
+        elif doubt and not contradicts:
+            self._note(doubt, segment)
+
+    def _note(self, text: str, segment: Segment) -> None:
+        """Note what was seen inside a step and not understood."""
+        ends = (trial[self.primary] for trial in (segment.before, segment.trial))
+        self.notes.append(f"{text} (between {self.primary} = {' and '.join(f'{end:.10g}' for end in ends)})")
+
+    def _is_confirmed(self, point: SpecialPoint, segment: Segment) -> bool:
+        """Return whether a special point was located and, where that was asked for, found again on a finer mesh.
+
+        Others are noted: they get no label. The end of a run keeps its own.
+        """
+        lost = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
+        if point.stop is not None or (point.is_located and not lost):
             return True
-        before, after = segment.before.value(self._index), segment.trial.value(self._index)
-        return not abs(after - before) > sum(map(nullity_of, inspection.special_points(self._tests)))
+        why = "was not found again on a finer mesh" if point.is_located else "was bracketed, and not located"
+        what = f"{point.label} {point.name.removeprefix('possible').strip()}".strip()
+        self._note(f"a possible {what} {why}", segment)
+        return False
 
     def _index_changes(self, segment: Segment, special: list[SpecialPoint]) -> list[IndexChange | None]:
         """Return the index before and after each special point of a step, and note what contradicts itself."""
@@ -515,20 +550,21 @@ class Continuation:
 
     # --- results -------------------------------------------------------------------------------------------------
 
-    def _point(self, found: SpecialPoint, state: State, change: IndexChange | None = None) -> Point:
-        """Return the point of a branch; a labelled one is located again on finer meshes, if errors are wanted."""
-        errors: Mapping[str, float] = {}
+    def _located(self, found: SpecialPoint) -> SpecialPoint:
+        """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
         labelled = found.label not in ("", "MX") and found.name != "closed"  # closed: the first point once more
         coarse = own_normal_form(found.trial.system, found)
-        if found.errors is not None:
-            errors = found.errors
-        elif labelled and self.settings.errors:
+        if found.errors is None and labelled and self.settings.errors:
             again = refined(found.same_as or found, self.settings)
             details = found.details if found.same_as else again.details
-            found, errors = dataclasses.replace(found, trial=again.trial, details=details), again.errors
+            found = dataclasses.replace(found, trial=again.trial, details=details, errors=again.errors)
         if coarse is not None:
-            better = own_normal_form(found.trial.system, found) if errors else coarse
+            better = own_normal_form(found.trial.system, found) if found.errors else coarse
             found = with_normal_form(found, better or coarse, coarse)
+        return found
+
+    def _point(self, found: SpecialPoint, state: State, change: IndexChange | None = None) -> Point:
+        """Return the point of a branch."""
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
         stability = Stability()
@@ -536,7 +572,7 @@ class Continuation:
             stability = stability_of(found)
         return Point(
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
-            state.arclength + found.at, trial.iterations, trial.newton_error, errors, found.details,
+            state.arclength + found.at, trial.iterations, trial.newton_error, found.errors or {}, found.details,
             stability.index, stability.nullity, change, stability.breaks,
             *(("", None) if found.test is None else (found.test.column, found.test.value)),
         )  # fmt: skip

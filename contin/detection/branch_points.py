@@ -37,8 +37,6 @@ _GAP_WITHOUT_MESH = 1e-5
 _HALVINGS = 12
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
 _TOGETHER = 0.1
-#: Rounds of the power method where it gives more than the one singular value that the determinant's sign tells of, or another.
-_MORE_ROUNDS = 8
 
 
 class BranchPointSearch:
@@ -58,13 +56,11 @@ class BranchPointSearch:
         row, size = state.row, state.system.size
         if before.factors is None:
             before.refactor(row)
-        if before.sign == trial.sign and calm(quotients(before.factors, trial.factors, size, 1)):
+        if before.sign == trial.sign and calm(before.factors, trial.factors, size):
             return 0, True
         before.refactor(row)
         trial.sharpen_factors(row)
         values = quotients(before.factors, trial.factors, size)
-        if crossings(values)[0] != self.sign_changes:  # several, or the determinant knows better: look once more
-            values = quotients(before.factors, trial.factors, size, _MORE_ROUNDS)
         shares = _shares(values[values.real < 0])
         if len(shares):
             self._share, self._spread = float(np.mean(shares)), float(np.ptp(shares))

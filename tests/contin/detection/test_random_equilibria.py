@@ -10,6 +10,9 @@ import pytest
 
 import contin
 from contin.detection.branch_point import locate_branch_point
+from contin.detection.branch_points import BranchPointSearch
+from contin.detection.crossings import crossings, quotients
+from contin.linalg.dense import DenseFactors
 from contin.linalg.rightmost import nearest
 
 
@@ -110,3 +113,91 @@ def test_hopf_points_beside_the_end_of_a_domain():
     # the trace of the matrix vanishes where sqrt(a - .3) = 1 - a: a = (3 - sqrt(9 - 5.2)) / 2
     assert [point["a"] for point in branch.labelled("HB")] == pytest.approx([(3 - 3.8**0.5) / 2], abs=1e-9)
     assert branch.stop.reason == "no convergence"
+
+
+def test_a_cluster_that_is_labelled_as_one_point_says_how_wide_it_is():
+    """Two eigenvalues 2e-7 apart lie within the error of the double point."""
+    branch = trivial_branch([12.0, 14.0, 14.0 + 2e-7], 3, symmetric=True)
+    (point,) = branch.labelled("BP")[1:]
+    assert point.details.dimension == 2 and point.details.spread == pytest.approx(1e-7, rel=1e-3)
+    assert abs(point["lam"] - 14) <= point.errors["lam"] < 2e-7
+
+
+def grid(u, p, out):
+    """Allen-Cahn on m x m places of the unit square: a u - u^3 + the five-point Laplacian, zero at the boundary."""
+    m = int(round(len(u) ** 0.5))
+    for i in range(m):
+        for j in range(m):
+            here = u[i * m + j]
+            out[i * m + j] = p[0] * here - here**3 - 4 * (m + 1) ** 2 * here
+            if i > 0:
+                out[i * m + j] += (m + 1) ** 2 * u[(i - 1) * m + j]
+            if i < m - 1:
+                out[i * m + j] += (m + 1) ** 2 * u[(i + 1) * m + j]
+            if j > 0:
+                out[i * m + j] += (m + 1) ** 2 * u[i * m + j - 1]
+            if j < m - 1:
+                out[i * m + j] += (m + 1) ** 2 * u[i * m + j + 1]
+
+
+def laplacian(m, low, high):
+    """Return the eigenvalues in an interval with their multiplicities."""
+    one = 4 * (m + 1) ** 2 * np.sin(np.arange(1, m + 1) * np.pi / (2 * m + 2)) ** 2
+    found, counts = np.unique((one[:, None] + one).ravel().round(6), return_counts=True)
+    inside = (found > low) & (found < high)
+    return list(zip(found[inside], counts[inside]))
+
+
+def found_on(branch):
+    return [(round(point["a"], 6), getattr(point.details, "dimension", 1)) for point in branch.labelled("BP")]
+
+
+@pytest.mark.parametrize("dynamics", [True, False])
+@pytest.mark.parametrize("step", [34.0, 100.0])
+def test_double_points_of_a_grid_in_long_steps(step, dynamics):
+    """The step from 116 to 150 passes the double eigenvalue 129.5121; that to 216 ten of them."""
+    start = contin.solve(contin.AlgebraicProblem(grid, 36, {"a": 116.0}, dynamics=dynamics), [0.0] * 36)
+    branch = contin.trace(start, free=["a"], limits={"a": (0, 300)}, step=step, change=1.4, accuracy=0.1, errors=False)
+    assert found_on(branch) == laplacian(6, 116, 300) and not branch.notes
+
+
+@pytest.mark.full
+def test_double_points_of_a_large_grid():
+    start = contin.solve(contin.AlgebraicProblem(grid, 225, {"a": 1.0}), [0.0] * 225)
+    branch = contin.trace(start, free=["a"], limits={"a": (0, 300)}, errors=False)
+    assert branch.points[0].system.is_sparse and found_on(branch) == laplacian(15, 0, 300)
+
+
+def steps_of(spectrum, low, high, symmetric, seed):
+    """Return the factors of [F_x; row] of lam - A at two values of lam."""
+    random, n = np.random.default_rng(seed), len(spectrum)
+    turn = np.linalg.qr(random.standard_normal((n, n)))[0]
+    basis = turn if symmetric else np.eye(n) + 0.6 * random.standard_normal((n, n)) / np.sqrt(n)
+    matrix = basis @ np.diag(spectrum) @ np.linalg.inv(basis)
+    row = np.append(random.standard_normal(n) / np.sqrt(n), 1.0)
+    return [DenseFactors(np.vstack([np.eye(n, n + 1) * lam - np.pad(matrix, ((0, 0), (0, 1))), row])) for lam in (low, high)]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_count_that_is_clear_is_right(seed):
+    """Of random spectra with double eigenvalues, small and large, over steps that pass up to some 30 of them."""
+    random = np.random.default_rng(seed)
+    n = int(random.choice([10, 40, 150]))
+    spectrum = np.repeat(np.cumsum(random.exponential(1.0, n // 2)) ** random.choice([1.0, 2.0]), 2)
+    low = random.uniform(0, 1) * np.quantile(spectrum, 0.5)
+    high = low * (1 + random.uniform(0.05, 0.5)) + 0.1
+    before, after = steps_of(spectrum, low, high, bool(seed % 2), seed)
+    count, clear = crossings(quotients(before, after, n + 1))
+    if clear:
+        assert count == np.count_nonzero((spectrum > low) & (spectrum < high))
+
+
+def test_what_the_labels_do_not_explain_is_noted(monkeypatch):
+    """Were the double point not seen in the matrices, the number of unstable eigenvalues, 2 more behind it, would tell."""
+    monkeypatch.setattr(BranchPointSearch, "count", (0, True))
+    branch = trivial_branch([12.0, 14.0, 14.0], 1, symmetric=True)
+    assert [round(point["lam"]) for point in branch.labelled("BP")] == [12]
+    (note,) = branch.notes
+    assert note.startswith("the number of unstable eigenvalues goes from 1 to 3, and the labelled points do not explain it")
+    low, high = map(float, note.rstrip(")").partition("lam = ")[2].split(" and "))
+    assert low < 14 < high
