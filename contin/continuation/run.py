@@ -22,6 +22,7 @@ from contin import checks, threads
 from contin.arrays import Array
 from contin.continuation.failure import no_convergence
 from contin.continuation.scaling import outgrown, scaled
+from contin.detection.accuracy import Accuracy, accuracy_of
 from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
 from contin.detection.hopf_end import collapsed
@@ -43,7 +44,7 @@ from contin.detection.test_functions import (
     within_limits,
 )
 from contin.detection.trivial import crossed, jumped
-from contin.discretization.protocol import Discretization, inner
+from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
 from contin.names import value_names
 from contin.results.branch import Branch
@@ -92,6 +93,14 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
+#: A point's estimated error may be this many times the tolerance of the mesh, whose density knows it to a power of ten or two.
+#: Ten times larger lets through what the density underrates by ten; at 1, every second step of the bank would be made twice.
+_POOR = 100.0
+#: Times that a step is made on finer and finer meshes, and the factor by which the number of intervals grows at most each time:
+#: where the error is large, its estimate is no guide to how many are needed.
+_ATTEMPTS, _GROWTH = 4, 4
+#: Least tolerance that a finer mesh is asked for.
+_STRICTEST = 1e-40
 #: Labels of points that must be found again on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
 _CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
 #: Smallest angle and rate, in place of zero where they are divided by.
@@ -167,6 +176,7 @@ class Continuation:
         self._census = census_of(self.state.system) if settings.folds and settings.branch_points else None
         self.notes: list[str] = []
         self._resumed = state is not None
+        self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
     def _check(self, system: Discretization) -> None:
@@ -213,9 +223,24 @@ class Continuation:
         if rescaled is not system:
             x, row = self._first_correction(rescaled, z)
             system, linear = rescaled, linearization(rescaled, x, row)
+        system, x, linear = self._accurate_first(system, x, linear)
         unit = settings.direction * growing(system, x, linear.tangent, self.primary, settings.newton)
         state = standing_at(system, x, unit, settings.step)
         return dataclasses.replace(state, sign=system.linearize(x, (state.row,))[1].sign)
+
+    def _accurate_first(
+        self, system: Discretization, x: Array, linear: Linearization
+    ) -> tuple[Discretization, Array, Linearization]:
+        """Return the first point on a mesh on which its error is within the tolerance, as far as one is found."""
+        for _ in range(_ATTEMPTS):
+            accuracy = self._accuracy_of(system, x, linear.tangent)
+            finer = self._finer_mesh(system, x, accuracy.error) if self._is_poor(accuracy) else None
+            if finer is None:
+                break
+            system, carry = finer
+            x, row = self._first_correction(system, carry(x))
+            linear = linearization(system, x, row)
+        return system, x, linear
 
     def _first_correction(self, system: Discretization, x: Array) -> tuple[Array, Array]:
         """Correct x at fixed primary parameter or, where that is singular (at a fold), across a random direction.
@@ -274,7 +299,7 @@ class Continuation:
         """Make one step: yield the labelled points inside it, then the point at its end."""
         self._adapt_mesh()
         try:
-            segment, inspection, distance, doubt = self._step(self.state)
+            segment, inspection, distance, doubt = self._accurate_step()
         except ConvergenceError as error:
             self.stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
             yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
@@ -301,7 +326,8 @@ class Continuation:
         elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
-        yield self._point(self._located(SpecialPoint(segment.step, label, name, segment.trial)), segment.state)
+        found_at_end = self._located(SpecialPoint(segment.step, label, name, segment.trial))
+        yield self._point(found_at_end, segment.state, accuracy=None if label else self._accuracy)
 
     def _failure(self, error: ConvergenceError) -> Stop:
         """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
@@ -311,6 +337,44 @@ class Continuation:
         return no_convergence(self.state, self.settings, error)
 
     # --- one step ------------------------------------------------------------------------------------------------
+
+    def _accurate_step(self) -> tuple[Segment, Inspection, float, str]:
+        """Make a step whose end has an error within the tolerance of the mesh, as far as a finer mesh makes it smaller.
+
+        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point.
+        """
+        for attempt in range(_ATTEMPTS):
+            step = self._step(self.state)
+            trial = step[0].trial
+            self._accuracy = self._accuracy_of(trial.system, trial.x, trial.tangent)
+            if not self._is_poor(self._accuracy) or attempt == _ATTEMPTS - 1:
+                break
+            finer = self._finer_mesh(trial.system, trial.x, self._accuracy.error)
+            if finer is None or not self._move_to(finer):
+                break
+        return step
+
+    def _accuracy_of(self, system: Discretization, x: Array, tangent: Array) -> Accuracy:
+        wanted = _POOR * self.settings.mesh.tolerance
+        return accuracy_of(system, x, tangent, wanted) if self.settings.errors else Accuracy(np.nan)
+
+    def _is_poor(self, accuracy: Accuracy) -> bool:
+        """Return whether a point has a larger error than its mesh was made for, which a finer one would lower."""
+        control = self.settings.mesh
+        return bool(control.every and not accuracy.is_round_off and accuracy.error > _POOR * control.tolerance)
+
+    def _finer_mesh(self, system: Discretization, x: Array, error: float) -> tuple[Discretization, Carrier] | None:
+        """Return the system on a mesh that is adapted to x and has the error wanted; None where it may have no more intervals.
+
+        The density of the mesh underrates the error by as much as that is larger than the tolerance.
+        """
+        control = self.settings.mesh
+        strict = max(control.tolerance**2 / error, _STRICTEST)
+        fewest = min(system.intervals + 1, control.max_intervals)
+        most = max(min(_GROWTH * system.intervals, control.max_intervals), fewest)
+        if most <= system.intervals:
+            return None
+        return system.adapted(x, dataclasses.replace(control, tolerance=strict, min_intervals=fewest, max_intervals=most))
 
     def _step(self, state: State) -> tuple[Segment, Inspection, float, str]:
         """Predict and correct, halving the step until the corrected point can be believed.
@@ -519,9 +583,16 @@ class Continuation:
         if state.singular or not due or state.accepted % due:
             return
         adapted = state.system.adapted(state.x, control) or outgrown(state.system, state.x)
-        if adapted is None:
-            return
-        system, carry = adapted
+        if adapted is not None:
+            self._move_to(adapted)
+
+    def _move_to(self, adapted: tuple[Discretization, Carrier]) -> bool:
+        """Correct the state's point on another mesh, or with other sizes, and return whether the run goes on from there.
+
+        It does not where the point is not found there, where a special point would fall between the meshes, or where a mesh of
+        fewer intervals is not good enough.
+        """
+        state, (system, carry) = self.state, adapted
         tangent = carry(state.tangent)
         length = float(np.sqrt(inner(system, tangent, tangent)))
         tangent /= length
@@ -532,21 +603,24 @@ class Continuation:
         try:
             done = correct(system, x, row, row @ x, self.settings.newton)
         except ConvergenceError:
-            return  # the old mesh still serves; the step control will notice if it does not
+            return False  # the old mesh still serves; the step control will notice if it does not
         if collapsed(system, x, done.x):
-            return
+            return False
         end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0))
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):
-            return  # a special point would fall between the meshes; the next point will do as well
+            return False  # the next point will do as well
         if self._sense(before) * self._sense(end) < 0:
-            return  # so would a fold
+            return False
         if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, self.settings.newton):
-            return
+            return False
+        if system.intervals < state.system.intervals and self._is_poor(self._accuracy_of(system, end.x, end.tangent)):
+            return False
         self._end = end
         self.state = dataclasses.replace(
             state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
         )
+        return True
 
     # --- results -------------------------------------------------------------------------------------------------
 
@@ -563,10 +637,16 @@ class Continuation:
             found = with_normal_form(found, better or coarse, coarse)
         return found
 
-    def _point(self, found: SpecialPoint, state: State, change: IndexChange | None = None) -> Point:
-        """Return the point of a branch."""
+    def _point(
+        self, found: SpecialPoint, state: State, change: IndexChange | None = None, accuracy: Accuracy | None = None
+    ) -> Point:
+        """Return the point of a branch; its accuracy is estimated where it is not known."""
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
+        if accuracy is None and np.all(np.isfinite(trial.tangent)):
+            accuracy = self._accuracy_of(system, trial.x, trial.tangent)
+        elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on a coarser mesh
+            accuracy = self._accuracy
         stability = Stability()
         if self._index is not None:
             stability = stability_of(found)
@@ -574,7 +654,7 @@ class Continuation:
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
             state.arclength + found.at, trial.iterations, trial.newton_error, found.errors or {}, found.details,
             stability.index, stability.nullity, change, stability.breaks,
-            *(("", None) if found.test is None else (found.test.column, found.test.value)),
+            *(("", None) if found.test is None else (found.test.column, found.test.value)), accuracy.error,
         )  # fmt: skip
 
 

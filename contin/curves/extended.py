@@ -101,6 +101,14 @@ class Extended(Discretization):
         """Names of the states that are columns of the underlying system."""
         return self.base.named_states
 
+    def observed(self, x: Array, every: int = 1) -> Array:
+        """Return what is observed of the underlying system."""
+        return self.base.observed(x[: self.base.size], every)
+
+    def observed_sizes(self, x: Array, values: Array) -> Array:
+        """Return the sizes of what is observed of the underlying system."""
+        return self.base.observed_sizes(x[: self.base.size], values)
+
     def states(self, x: Array) -> Array:
         """Return the states of the underlying system."""
         return self.base.states(x[: self.base.size])

@@ -177,6 +177,38 @@ class Collocation(System):
         states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self._scaled_states(x))[j])
         return states
 
+    def observed(self, x: Array, every: int = 1) -> Array:
+        """Return what the discretization error of a point is measured in.
+
+        States and free parameters divided by their sizes, rates of the states and integrands times the length of the domain, at
+        every so many mesh points (superconvergence holds there), and the integrals.
+        """
+        u, p = self._scaled_states(x), self._scaled_parameters(x)
+        times, at = self.mesh[::every].copy(), u[:: self._d * every].copy()
+        rates = self._field.values(times, at, _NONE(self._n), p) * (self.mesh[-1] - self.mesh[0])
+        integrals = self._quadrature @ self._integrands(x, 0.0) if self._integrated else np.empty(0)
+        return np.concatenate([at.ravel(), x[self.state_size :], rates.ravel(), integrals])
+
+    def observed_sizes(self, x: Array, values: Array) -> Array:
+        """Return the sizes of what `observed` has returned at x: 1 + |value|.
+
+        That of an integral is the integral of its integrand's size, at the solution and where states are larger by theirs.
+        """
+        sizes, count = 1 + np.abs(values), len(self._integrated)
+        if count:
+            beside = np.abs(self._integrands(x, 1.0))
+            beside[~np.isfinite(beside)] = 0.0
+            found = self._quadrature @ (np.abs(self._integrands(x, 0.0)) + beside)
+            sizes[-count:] = np.where(found > 0, found, 1.0)
+        return sizes
+
+    def _integrands(self, x: Array, further: float) -> Array:
+        """Return the integrands of the functionals at the Gauss points, with all states larger by this part of their sizes."""
+        points = self.at_gauss_points(x) + further
+        points = points if self.scales is None else points * self.scales.states
+        values: Array = self.problem.batch("functionals").values(self._times, points, _NONE(self._n), self.all_parameters(x))
+        return values
+
     # --- the discrete equations ----------------------------------------------------------------------------------
 
     def _residual(self, x: Array, field: Array, boundary: Array) -> Array:

@@ -74,6 +74,14 @@ class Discretization(Equations, Protocol):
     def nodes(self) -> Array:
         """Values of t at the nodes, where the states are given; shape (K,)."""
 
+    def observed(self, x: Array, every: int = 1) -> Array:
+        """Return what the discretization error is measured in, at every so many mesh points; nothing without a mesh."""
+        return np.empty(0)
+
+    def observed_sizes(self, x: Array, values: Array) -> Array:
+        """Return the sizes of what `observed` has returned at x."""
+        return 1 + np.abs(values)
+
     @property
     def named_states(self) -> tuple[str, ...]:
         """Names of the states that are columns: those that are numbers, no functions of t."""

@@ -94,7 +94,7 @@ class Branch:
         >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
         >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
         >>> list(branch.to_pandas().columns)
-        ['label', 'name', 'arclength', 'intervals', 'degree', 'iterations', 'a', 'norm']
+        ['label', 'name', 'arclength', 'intervals', 'degree', 'iterations', 'discretization_error', 'a', 'norm']
         """
         return table.to_pandas(self.points)
 

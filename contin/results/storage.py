@@ -114,6 +114,7 @@ def _row(point: Point, at: int) -> dict[str, Any]:
     return {
         "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
         "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
+        "discretization_error": point.discretization_error,
         "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
         "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
         "spread": getattr(point.details, "spread", 0.0),
@@ -275,4 +276,5 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
         row["iterations"], row["newton_error"], row["errors"], details, row.get("index"), row.get("nullity", 0),
         None if row.get("index_change") is None else tuple(row["index_change"]), tuple(row.get("breaks", ())),
         *_column_of(row, parameters),
+        row.get("discretization_error", np.nan),
     )  # fmt: skip

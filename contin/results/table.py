@@ -22,7 +22,7 @@ def to_pandas(points: Sequence[Point]) -> Any:
     rows = [
         {
             "label": point.label, "name": point.name, "arclength": point.arclength, "intervals": point.system.intervals,
-            "degree": point.system.degree, "iterations": point.iterations,
+            "degree": point.system.degree, "iterations": point.iterations, "discretization_error": point.discretization_error,
             **({} if point.index is None else {"index": point.index}),
             **({} if point.normal_form is None else {"normal_form": point.normal_form}), **point.parameters,
             **point.functionals,
