@@ -104,7 +104,7 @@ class Inspection:
         trivial quantity without a zero of it on the branch.
         """
         if self._own_home is not None:
-            return True  # the equations are singular there, and what they say of other points is blurred
+            return ""  # the equations are singular there, and what they say of other points is blurred
         count, clear = self._branch_points.count if self.settings.branch_points else (0, True)
         if not clear:
             return "the linearized equations come close to singular: branch points may have been passed"
