@@ -238,17 +238,19 @@ def _described(manifold: _Manifold, s: Array, row: Array, slopes: Array) -> Mult
 
 
 def _spread(G: Array, slopes: Array, a: Array) -> float:
-    """Return the largest distance along a direction a at which G, across a, is singular: G + distance (slopes a).
+    """Return about the largest distance along a direction a from a point to where G, across a, is singular.
 
-    Where G does not change along a, the distance at which it would change by as much as it is.
+    It is singular at the zeros of det(G + distance (slopes a)). Gauss-Newton has moved the point across a, too, which makes G
+    smaller than it is on the branch; the distance is not less than that at which G changes by as much as is left of it.
     """
     across = np.linalg.svd(a[None])[2][1:].T
     here, change = G @ across, (slopes @ a) @ across
+    least = float(np.linalg.norm(G)) / max(float(np.linalg.norm(change)), np.finfo(float).tiny)
     try:
         distances = np.abs(np.linalg.eigvals(np.linalg.solve(change, here)))
     except np.linalg.LinAlgError:
-        distances = np.array([np.linalg.norm(here) / max(float(np.linalg.norm(change)), np.finfo(float).tiny)])
-    return float(distances.max())
+        return least
+    return max(least, float(distances.max()))
 
 
 @functools.singledispatch
