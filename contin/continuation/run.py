@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -93,14 +94,15 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
-#: A point's estimated error may be this many times the tolerance of the mesh, whose density knows it to a power of ten or two.
-#: Ten times larger lets through what the density underrates by ten; at 1, every second step of the bank would be made twice.
-_POOR = 100.0
+#: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again: a third more
+#: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
+_MARGIN = 0.1
 #: Times that a step is made on finer and finer meshes, and the factor by which the number of intervals grows at most each time:
 #: where the error is large, its estimate is no guide to how many are needed.
 _ATTEMPTS, _GROWTH = 4, 4
-#: Least tolerance that a finer mesh is asked for.
-_STRICTEST = 1e-40
+#: A finer mesh stays if it makes the error smaller than this part of it. Where it does not, as at round-off or at a jump of the
+#: equations inside an interval, meshes would grow without end.
+_HELPS = 0.5
 #: Labels of points that must be found again on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
 _CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
 #: Smallest angle and rate, in place of zero where they are divided by.
@@ -233,7 +235,7 @@ class Continuation:
     ) -> tuple[Discretization, Array, Linearization]:
         """Return the first point on a mesh on which its error is within the tolerance, as far as one is found."""
         for _ in range(_ATTEMPTS):
-            accuracy = self._accuracy_of(system, x, linear.tangent)
+            accuracy = self._accuracy_of(Trial(system, x, linear))
             finer = self._finer_mesh(system, x, accuracy.error) if self._is_poor(accuracy) else None
             if finer is None:
                 break
@@ -266,7 +268,8 @@ class Continuation:
         if not self._resumed:
             trial = self._state_trial()
             first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
-            yield self._point(self._located(dataclasses.replace(first, label=own_end(trial.system, first).label)), self.state)
+            located = self._located(dataclasses.replace(first, label=own_end(trial.system, first).label))
+            yield self._point(located, self.state, accuracy=self._accuracy if self.state.singular else None)
             if (stop := self._out_of_limits(trial) or self._out_of_domain(trial)) is not None:
                 self.stop = stop
                 return
@@ -327,7 +330,7 @@ class Continuation:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
         found_at_end = self._located(SpecialPoint(segment.step, label, name, segment.trial))
-        yield self._point(found_at_end, segment.state, accuracy=None if label else self._accuracy)
+        yield self._point(found_at_end, segment.state, accuracy=self._accuracy)
 
     def _failure(self, error: ConvergenceError) -> Stop:
         """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
@@ -343,38 +346,40 @@ class Continuation:
 
         The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point.
         """
-        for attempt in range(_ATTEMPTS):
-            step = self._step(self.state)
-            trial = step[0].trial
-            self._accuracy = self._accuracy_of(trial.system, trial.x, trial.tangent)
-            if not self._is_poor(self._accuracy) or attempt == _ATTEMPTS - 1:
-                break
-            finer = self._finer_mesh(trial.system, trial.x, self._accuracy.error)
+        step = self._step(self.state)
+        self._accuracy = self._accuracy_of(step[0].trial)
+        for _ in range(_ATTEMPTS):
+            trial, known = step[0].trial, (self.state, self._end)
+            finer = self._finer_mesh(trial.system, trial.x, self._accuracy.error) if self._is_poor(self._accuracy) else None
             if finer is None or not self._move_to(finer):
                 break
+            again = self._step(self.state)
+            accuracy = self._accuracy_of(again[0].trial)
+            if not accuracy.error < _HELPS * self._accuracy.error:
+                self.state, self._end = known
+                break
+            step, self._accuracy = again, accuracy
         return step
 
-    def _accuracy_of(self, system: Discretization, x: Array, tangent: Array) -> Accuracy:
-        wanted = _POOR * self.settings.mesh.tolerance
-        return accuracy_of(system, x, tangent, wanted) if self.settings.errors else Accuracy(np.nan)
+    def _accuracy_of(self, trial: Trial) -> Accuracy:
+        return accuracy_of(trial, self.settings.mesh.tolerance)
 
     def _is_poor(self, accuracy: Accuracy) -> bool:
-        """Return whether a point has a larger error than its mesh was made for, which a finer one would lower."""
+        """Return whether a point has a larger error than the tolerance of the mesh, which a finer one would lower."""
         control = self.settings.mesh
-        return bool(control.every and not accuracy.is_round_off and accuracy.error > _POOR * control.tolerance)
+        return bool(control.every and not accuracy.is_round_off and accuracy.error > control.tolerance)
 
     def _finer_mesh(self, system: Discretization, x: Array, error: float) -> tuple[Discretization, Carrier] | None:
-        """Return the system on a mesh that is adapted to x and has the error wanted; None where it may have no more intervals.
+        """Return the system on a mesh that is adapted to x, with as many more intervals as the error takes; None if it may not.
 
-        The density of the mesh underrates the error by as much as that is larger than the tolerance.
+        The error is of the order h^(2 d).
         """
-        control = self.settings.mesh
-        strict = max(control.tolerance**2 / error, _STRICTEST)
-        fewest = min(system.intervals + 1, control.max_intervals)
-        most = max(min(_GROWTH * system.intervals, control.max_intervals), fewest)
-        if most <= system.intervals:
+        control, now = self.settings.mesh, system.intervals
+        factor = min((error / (_MARGIN * control.tolerance)) ** (1 / (2 * system.degree)), _GROWTH)
+        count = min(max(math.ceil(now * factor), now + 1), control.max_intervals)
+        if count <= now:
             return None
-        return system.adapted(x, dataclasses.replace(control, tolerance=strict, min_intervals=fewest, max_intervals=most))
+        return system.adapted(x, dataclasses.replace(control, min_intervals=count, max_intervals=count))
 
     def _step(self, state: State) -> tuple[Segment, Inspection, float, str]:
         """Predict and correct, halving the step until the corrected point can be believed.
@@ -411,8 +416,7 @@ class Continuation:
         settings = self.settings
         guess = predict(state, step)
         trial = corrected(state, guess, step, settings.newton)
-        residual = state.system.residual(trial.x)
-        if not np.all(np.isfinite(residual)):
+        if not self._is_finite(trial):
             raise ConvergenceError("the equations are not finite at the corrected point")
         if collapsed(state.system, state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
@@ -425,7 +429,7 @@ class Continuation:
             )
         if hidden_turn(state, trial) > settings.angle:
             raise ConvergenceError("the corrected point does not lie where the tangents at both ends lead")
-        if self._fold is not None and self._may_turn(trial, residual):
+        if self._fold is not None and self._may_turn(trial):
             trial = sharpened(state, trial)
         if self._fold is not None and self._jumped(state, guess, trial, step):
             raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
@@ -467,11 +471,19 @@ class Continuation:
                 problem = error
         raise problem
 
-    def _may_turn(self, trial: Trial, residual: Array) -> bool:
+    def _is_finite(self, trial: Trial) -> bool:
+        """Return whether the equations are finite at a point: they are where its discretization error is."""
+        if trial.system.intervals and np.isfinite(trial.discretization_error):
+            return True
+        return bool(np.all(np.isfinite(trial.system.residual(trial.x))))
+
+    def _may_turn(self, trial: Trial) -> bool:
         """Return whether the primary parameter is so near to a fold that an approximate tangent may have the wrong sign."""
         at = trial.system.parameter_index(self.primary)
         component = abs(trial.tangent[at])
-        return component < _STEEP and not abs(tangent_error(trial, residual)[at]) < _DOUBT * component
+        if component >= _STEEP:
+            return False
+        return not abs(tangent_error(trial, trial.system.residual(trial.x))[at]) < _DOUBT * component
 
     def _jumped(self, state: State, guess: Array, trial: Trial, step: float) -> bool:
         """Return whether the primary parameter misses its prediction by much of what it changes at all.
@@ -614,7 +626,7 @@ class Continuation:
             return False
         if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, self.settings.newton):
             return False
-        if system.intervals < state.system.intervals and self._is_poor(self._accuracy_of(system, end.x, end.tangent)):
+        if system.intervals < state.system.intervals and self._is_poor(self._accuracy_of(end)):
             return False
         self._end = end
         self.state = dataclasses.replace(
@@ -644,7 +656,7 @@ class Continuation:
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
         if accuracy is None and np.all(np.isfinite(trial.tangent)):
-            accuracy = self._accuracy_of(system, trial.x, trial.tangent)
+            accuracy = self._accuracy_of(trial)
         elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on a coarser mesh
             accuracy = self._accuracy
         stability = Stability()

@@ -98,7 +98,7 @@ def _watched(before: Factors, after: Factors, size: int, watched: int) -> Comple
             values, vectors = _eigenvalues(right @ earlier.T, right @ later.T)
             if not np.all(np.isfinite(values)):
                 return values
-            first, last = vectors.T @ earlier, vectors.T @ later
+            first, last = _combined(vectors, earlier), _combined(vectors, later)
             missed = _lengths(last - values[:, None] * first)
             converged = missed < _CONVERGED * (_lengths(last) + np.abs(values) * _lengths(first))
             changes = _lengths(first - _KEPT * last)
@@ -121,6 +121,16 @@ def _eigenvalues(earlier: Array, later: Array) -> tuple[ComplexArray, ComplexArr
         except np.linalg.LinAlgError:
             pass
     return np.full(len(later), np.nan, dtype=complex), np.full(later.shape, np.nan, dtype=complex)
+
+
+def _combined(vectors: ComplexArray, rows: Array) -> ComplexArray:
+    """Return the combinations of rows whose coefficients are the columns of ``vectors``.
+
+    In real numbers: OpenBLAS gives products of complex matrices of this size to several threads, which took 14 ms instead of
+    20 us, and different last digits.
+    """
+    found: ComplexArray = (vectors.real.T @ rows) + 1j * (vectors.imag.T @ rows)
+    return found
 
 
 def _lengths(rows: ComplexArray) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 from contin.arrays import Array, Indices
 from contin.discretization.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.discretization.basis import basis, interpolation
+from contin.discretization.defect import Defect
 from contin.discretization.mesh import MeshControl, adapted_mesh, with_breaks
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
@@ -177,36 +178,47 @@ class Collocation(System):
         states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self._scaled_states(x))[j])
         return states
 
-    def observed(self, x: Array, every: int = 1) -> Array:
-        """Return what the discretization error of a point is measured in.
+    # --- the discretization error --------------------------------------------------------------------------------
 
-        States and free parameters divided by their sizes, rates of the states and integrands times the length of the domain, at
-        every so many mesh points (superconvergence holds there), and the integrals.
+    @functools.cached_property
+    def _defect(self) -> Defect:
+        return Defect(self)
+
+    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+        """Return the estimated error of a solution that is due to the mesh, relative to 1 + size; see `Defect`."""
+        return self._defect.error(x, factors, columns)
+
+    def newton_error(self, x: Array, factors: Factors) -> float:
+        """Return what Newton's method or round-off has left, measured in the same way."""
+        return self._defect.left_by_newton(x, factors)
+
+    @property
+    def states_count(self) -> int:
+        """Number of states, n."""
+        return self._n
+
+    @property
+    def integrated(self) -> tuple[str, ...]:
+        """Names of the functionals that are integrals."""
+        return self._integrated
+
+    def scaled_parameters(self, x: Array) -> Array:
+        """Return all parameters divided by their sizes."""
+        return self._scaled_parameters(x)
+
+    def field_values(self, times: Array, points: Array, p: Array) -> Array:
+        """Return right-hand side and integrands of conditions, shape (K, n + their number).
+
+        ``points`` (K, n) are states at ``times`` (K,), ``p`` all parameters; they are divided by their sizes, as the values are.
         """
-        u, p = self._scaled_states(x), self._scaled_parameters(x)
-        times, at = self.mesh[::every].copy(), u[:: self._d * every].copy()
-        rates = self._field.values(times, at, _NONE(self._n), p) * (self.mesh[-1] - self.mesh[0])
-        integrals = self._quadrature @ self._integrands(x, 0.0) if self._integrated else np.empty(0)
-        return np.concatenate([at.ravel(), x[self.state_size :], rates.ravel(), integrals])
+        values: Array = self._field.values(times, points, _NONE(self._n), p)
+        return values
 
-    def observed_sizes(self, x: Array, values: Array) -> Array:
-        """Return the sizes of what `observed` has returned at x: 1 + |value|.
-
-        That of an integral is the integral of its integrand's size, at the solution and where states are larger by theirs.
-        """
-        sizes, count = 1 + np.abs(values), len(self._integrated)
-        if count:
-            beside = np.abs(self._integrands(x, 1.0))
-            beside[~np.isfinite(beside)] = 0.0
-            found = self._quadrature @ (np.abs(self._integrands(x, 0.0)) + beside)
-            sizes[-count:] = np.where(found > 0, found, 1.0)
-        return sizes
-
-    def _integrands(self, x: Array, further: float) -> Array:
-        """Return the integrands of the functionals at the Gauss points, with all states larger by this part of their sizes."""
-        points = self.at_gauss_points(x) + further
+    def integrands(self, x: Array, times: Array, points: Array) -> Array:
+        """Return the integrands of the functionals, with the parameters of x, for states (K, n) divided by their sizes."""
+        batch = self.problem.batch("functionals")
         points = points if self.scales is None else points * self.scales.states
-        values: Array = self.problem.batch("functionals").values(self._times, points, _NONE(self._n), self.all_parameters(x))
+        values: Array = batch.values(times, points, _NONE(self._n), self.all_parameters(x))
         return values
 
     # --- the discrete equations ----------------------------------------------------------------------------------
