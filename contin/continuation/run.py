@@ -94,9 +94,11 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
-#: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again: a third more
+#: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
 #: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
 _MARGIN = 0.1
+#: Part of the tolerance below which an error may be round-off: at the usual tolerance it is some 1e-14.
+_FAR_BELOW = 0.03
 #: Times that a step is made on finer and finer meshes, and the factor by which the number of intervals grows at most each time:
 #: where the error is large, its estimate is no guide to how many are needed.
 _ATTEMPTS, _GROWTH = 4, 4
@@ -170,9 +172,9 @@ class Continuation:
         self._fold = fold(self.primary) if settings.folds else None
         self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
-        self._at_start: dict[str, float] = {}
         general = self._general_test_functions()
         self._tests = [*general, *self._own]
+        self._ends = [test for test in self._tests if test.terminal and not test.limit]
         self._comparable = general  # have the same sign on every mesh
         self._index = index_of(self.state.system)
         self._census = census_of(self.state.system) if settings.folds and settings.branch_points else None
@@ -295,8 +297,8 @@ class Continuation:
 
     def _out_of_domain(self, trial: Trial) -> Stop | None:
         """Return the reason to stop at the first point: a test function of the kind of problem that ends runs is negative."""
-        self._at_start = {test.name: test.function(trial) for test in self._own if test.terminal}
-        return next((Stop("event", f"{name} at the first point") for name, value in self._at_start.items() if value < 0), None)
+        ends = [test for test in self._own if test.terminal]
+        return next((Stop("event", f"{test.name} at the first point") for test in ends if trial.value(test) < 0), None)
 
     def _advance(self) -> Iterator[Point]:
         """Make one step: yield the labelled points inside it, then the point at its end."""
@@ -305,7 +307,9 @@ class Continuation:
             segment, inspection, distance, doubt = self._accurate_step()
         except ConvergenceError as error:
             self.stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
-            yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
+            met = self.stop.reason == "event"
+            label, name = ("EP", self.stop.message.removeprefix("met ")) if met else ("MX", "no convergence")
+            yield self._point(SpecialPoint(0.0, label, name, self._state_trial()), self.state, accuracy=self._accuracy)
             return
         special = [own_end(segment.trial.system, point) for point in inspection.special_points(self._tests)]
         special = within_limits(segment, special, self._limits)
@@ -334,8 +338,9 @@ class Continuation:
 
     def _failure(self, error: ConvergenceError) -> Stop:
         """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
-        for test in self._own:
-            if test.terminal and abs(test.function(self._state_trial())) < _NEARLY * abs(self._at_start.get(test.name, 0.0)):
+        first, here = Trial(*self.start[:2], Linearization(self.start[2], np.nan)), self._state_trial()
+        for test in self._ends:
+            if abs(here.value(test)) < _NEARLY * abs(first.value(test)):
                 return Stop("event", f"met {test.name}")
         return no_convergence(self.state, self.settings, error)
 
@@ -350,7 +355,9 @@ class Continuation:
         self._accuracy = self._accuracy_of(step[0].trial)
         for _ in range(_ATTEMPTS):
             trial, known = step[0].trial, (self.state, self._end)
-            finer = self._finer_mesh(trial.system, trial.x, self._accuracy.error) if self._is_poor(self._accuracy) else None
+            if not self._is_poor(self._accuracy) or self._ends_inside(step[0]):
+                break
+            finer = self._finer_mesh(trial.system, trial.x, self._accuracy.error)
             if finer is None or not self._move_to(finer):
                 break
             again = self._step(self.state)
@@ -361,6 +368,14 @@ class Continuation:
             step, self._accuracy = again, accuracy
         return step
 
+    def _ends_inside(self, segment: Segment) -> bool:
+        """Return whether the run ends inside a step, and not at a limit: the point at its end is not accepted.
+
+        The equations may not hold there, and no mesh be fine enough.
+        """
+        before, trial = segment.before, segment.trial
+        return any(test.passed(before.value(test), trial.value(test)) for test in self._ends)
+
     def _accuracy_of(self, trial: Trial) -> Accuracy:
         return accuracy_of(trial, self.settings.mesh.tolerance)
 
@@ -370,13 +385,9 @@ class Continuation:
         return bool(control.every and not accuracy.is_round_off and accuracy.error > control.tolerance)
 
     def _finer_mesh(self, system: Discretization, x: Array, error: float) -> tuple[Discretization, Carrier] | None:
-        """Return the system on a mesh that is adapted to x, with as many more intervals as the error takes; None if it may not.
-
-        The error is of the order h^(2 d).
-        """
+        """Return the system on a finer mesh that is adapted to x, as fine as the error takes; None if it may not be finer."""
         control, now = self.settings.mesh, system.intervals
-        factor = min((error / (_MARGIN * control.tolerance)) ** (1 / (2 * system.degree)), _GROWTH)
-        count = min(max(math.ceil(now * factor), now + 1), control.max_intervals)
+        count = min(max(self._intervals_for(system, error), now + 1), control.max_intervals)
         if count <= now:
             return None
         return system.adapted(x, dataclasses.replace(control, min_intervals=count, max_intervals=count))
@@ -531,7 +542,7 @@ class Continuation:
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
-            way or state.sense, free_values(trial) if way else state.sensed,
+            way or state.sense, free_values(trial) if way else state.sensed, trial.discretization_error,
         )  # fmt: skip
 
     # --- the index -----------------------------------------------------------------------------------------------
@@ -594,9 +605,27 @@ class Continuation:
         due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
         if state.singular or not due or state.accepted % due:
             return
+        control = dataclasses.replace(control, min_intervals=self._fewest_intervals(state))
         adapted = state.system.adapted(state.x, control) or outgrown(state.system, state.x)
         if adapted is not None:
             self._move_to(adapted)
+
+    def _intervals_for(self, system: Discretization, error: float) -> int:
+        """Return the number of intervals with which a point of this error, of the order h^(2 d), is within the tolerance."""
+        order = 2 * max(system.degree, 1)
+        factor = (error / (_MARGIN * self.settings.mesh.tolerance)) ** (1 / order)
+        return math.ceil(system.intervals * min(factor, _GROWTH))
+
+    def _fewest_intervals(self, state: State) -> int:
+        """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.
+
+        An error far below the tolerance may be round-off, which does not grow on coarser meshes: half of the intervals may do.
+        """
+        control, now, error = self.settings.mesh, state.system.intervals, state.discretization_error
+        if math.isnan(error) or not now:
+            return control.min_intervals
+        count = now // 2 if error < _FAR_BELOW * control.tolerance else min(self._intervals_for(state.system, error), now)
+        return max(control.min_intervals, min(count, control.max_intervals))
 
     def _move_to(self, adapted: tuple[Discretization, Carrier]) -> bool:
         """Correct the state's point on another mesh, or with other sizes, and return whether the run goes on from there.
@@ -630,8 +659,9 @@ class Continuation:
             return False
         self._end = end
         self.state = dataclasses.replace(
-            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
-        )
+            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign,
+            discretization_error=end.discretization_error,
+        )  # fmt: skip
         return True
 
     # --- results -------------------------------------------------------------------------------------------------
@@ -655,9 +685,9 @@ class Continuation:
         """Return the point of a branch; its accuracy is estimated where it is not known."""
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
-        if accuracy is None and np.all(np.isfinite(trial.tangent)):
+        if accuracy is None and found.name != "closed" and np.all(np.isfinite(trial.tangent)):
             accuracy = self._accuracy_of(trial)
-        elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on a coarser mesh
+        elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on no finer mesh
             accuracy = self._accuracy
         stability = Stability()
         if self._index is not None:

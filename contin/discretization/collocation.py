@@ -209,7 +209,7 @@ class Collocation(System):
     def field_values(self, times: Array, points: Array, p: Array) -> Array:
         """Return right-hand side and integrands of conditions, shape (K, n + their number).
 
-        ``points`` (K, n) are states at ``times`` (K,), ``p`` all parameters; they are divided by their sizes, as the values are.
+        ``points`` (K, n) are states at ``times`` (K,), ``p`` all parameters; all are divided by their sizes, as are the values.
         """
         values: Array = self._field.values(times, points, _NONE(self._n), p)
         return values

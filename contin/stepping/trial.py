@@ -148,7 +148,7 @@ class Trial:
 
     @property
     def discretization_error(self) -> float:
-        """Estimated error that is due to the mesh, relative to 1 + size; computed when first asked for, with Newton's factors."""
+        """Estimated error that is due to the mesh, relative to 1 + size; computed with Newton's factors when asked for."""
         if self._discretization_error is None:
             if self.factors is None and self.system.intervals:
                 self.refactor(self.system.weights * self.tangent)
