@@ -42,7 +42,7 @@ def test_a_layer_that_leaves_its_mesh_behind(degree, tolerance):
         assert point.discretization_error < tolerance or point.label
 
 
-@pytest.mark.parametrize(("degree", "intervals"), [(2, 100), (3, 60), (4, 40), (4, 100), (5, 40), (7, 80)])
+@pytest.mark.parametrize(("degree", "intervals"), [(2, 100), (3, 60), (4, 40), (4, 100), (5, 40), (7, 30)])
 def test_the_estimate_on_a_mesh_that_is_kept(degree, intervals):
     """Without adaptation the errors are large, and stated: neither too small, nor too large by much.
 
@@ -51,7 +51,9 @@ def test_the_estimate_on_a_mesh_that_is_kept(degree, intervals):
     control = contin.MeshControl(every=0)
     start = contin.solve(LAYER, [0.0], degree=degree, intervals=intervals, mesh=control)
     branch = contin.trace(start, free=["c"], limits={"c": (0.1, 0.8)}, step=0.5, mesh=control)
-    ratios = np.array([point.discretization_error / (layer_error(point) + 1e-14) for point in branch])
+    errors = np.array([(point.discretization_error, layer_error(point)) for point in branch])
+    ratios = errors[:, 0] / errors[:, 1]
+    ratios = ratios[errors[:, 1] > 1e-12]  # others are round-off
     assert ratios.min() > 0.3 and np.median(ratios) < 3 and ratios.max() < 150
 
 
