@@ -613,8 +613,8 @@ class Continuation:
     def _intervals_for(self, system: Discretization, error: float) -> int:
         """Return the number of intervals with which a point of this error, of the order h^(2 d), is within the tolerance."""
         order = 2 * max(system.degree, 1)
-        factor = (error / (_MARGIN * self.settings.mesh.tolerance)) ** (1 / order)
-        return math.ceil(system.intervals * min(factor, _GROWTH))
+        factor = float(error / (_MARGIN * self.settings.mesh.tolerance)) ** (1 / order)
+        return math.ceil(system.intervals * min(float(factor), _GROWTH))
 
     def _fewest_intervals(self, state: State) -> int:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.

@@ -103,11 +103,13 @@ class Extended(Discretization):
 
     def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
         """Return the estimated error of the solution and the parameters; that of the singular vectors is not in it."""
-        return self.base.discretization_error(x[: self.base.size], _Inside(factors, self), columns)
+        inside: Any = _Inside(factors, self)
+        return self.base.discretization_error(x[: self.base.size], inside, columns)
 
     def newton_error(self, x: Array, factors: Factors) -> float:
         """Return that of the underlying system."""
-        return self.base.newton_error(x[: self.base.size], _Inside(factors, self))
+        inside: Any = _Inside(factors, self)
+        return self.base.newton_error(x[: self.base.size], inside)
 
     def states(self, x: Array) -> Array:
         """Return the states of the underlying system."""

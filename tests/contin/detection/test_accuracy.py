@@ -109,7 +109,9 @@ def test_a_corner_inside_an_interval_does_not_make_meshes_grow_without_end():
         lambda t, u, p: (p.a * (1 + 2 * max(u.u - 0.4, 0.0)),), lambda a, b, p: (a.u,), ["u"], {"a": 1.0}
     )
     control = contin.MeshControl(tolerance=1e-8, max_intervals=400)
-    branch = contin.trace(contin.solve(corner, [0.0], mesh=control), free=["a"], limits={"a": (1, 2)}, mesh=control, errors=False)
+    branch = contin.trace(
+        contin.solve(corner, [0.0], mesh=control), free=["a"], limits={"a": (1, 2)}, mesh=control, errors=False
+    )
     assert branch.stop.reason == "limit" and len(branch) < 50
     for point in branch:
         error = abs(point.system.states(point.x)[-1, 0] - 0.4 - (math.exp(2 * point["a"] - 0.8) - 1) / 2)
