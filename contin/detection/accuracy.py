@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from contin.stepping.trial import Trial
 
-#: An error up to this many times what Newton's method has left, measured alike, is round-off. On meshes of 146 to 328 intervals
-#: of the bank's stiffest problem it is 0.5 to 3 times that. Ten times larger, an error of 1e-10 would stay where Newton's method
-#: leaves 1e-12.
+#: An error up to this many times what Newton's method has left, measured alike, is round-off. On 146 to 328 intervals of the
+#: bank's stiffest problem it is 0.5 to 3 times that. Ten times larger, an error of 1e-10 would stay where Newton leaves 1e-12.
 _UNITS = 10.0
 
 

@@ -89,8 +89,8 @@ class Coefficient(NamedTuple):
         """Return the coefficient of terms; ``terms(s)`` are those of critical vectors that are moved by the part s of their
         size.
 
-        The relative error of the derivatives of ``system`` is part of the error. The vectors are known to round-off only, which may be more than some of
-        their components, so the terms are computed again with moved ones.
+        The relative error of the derivatives of ``system`` is part of the error. The vectors are known to round-off only, which
+        may be more than some of their components, so the terms are computed again with moved ones.
         """
         (best, moved), error = system.with_derivative_error(lambda: (terms(0.0), terms(_MOVED)))
         size = float(np.abs(best).sum())

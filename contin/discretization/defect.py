@@ -26,6 +26,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.discretization.basis import basis, interpolation
+from contin.discretization.mesh import near
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector
 
@@ -88,6 +89,8 @@ class Defect:
         #: Places in a residual where the integral conditions begin.
         self.conditions = self.n * system.degree * system.intervals + system.problem.boundary_size
         self.least_sizes = self._least_sizes()
+        #: Mesh points where the right-hand side jumps: it has no value there that holds on both sides.
+        self.broken = near(system.mesh, system.breaks, system.mesh[-1] - system.mesh[0])
 
     def error(self, x: Array, factors: Any, columns: Mapping[str, float]) -> float:
         """Return the largest estimated error of states, rates, free parameters and integrals, relative to 1 + size.
@@ -115,6 +118,7 @@ class Defect:
         with np.errstate(all="ignore"):
             p = system.scaled_parameters(x)
             rates = system.field_values(system.mesh, at_mesh, p)
+            rates[self.broken] = np.nan
             fill_points(n, tables, h, x, rates, points)
             fill_left(n, tables, h, x, system.field_values(self.times, points, p), left, self.conditions)
             error = factors.solve(left)
@@ -164,7 +168,7 @@ class Defect:
 def fill_points(n: int, tables: Finer, h: Vector, x: ReadOnlyVector, rates: Matrix, points: Matrix) -> None:
     """Fill the states of w, step 2, at the finer Gauss points, (N (d + 1), n); ``rates`` are those at the mesh points.
 
-    c is taken from one end of an interval where the rate at the other one is not finite.
+    c is taken from one end of an interval where the rate at the other one is not finite; it is zero without either.
     """
     d, ends = tables.slope.shape[0], tables.end_slopes
     sign = 1.0 - 2.0 * (d % 2)

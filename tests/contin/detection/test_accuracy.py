@@ -99,6 +99,25 @@ def test_the_integral_of_a_function_that_changes_faster_than_the_solution():
         assert abs(point["mean"] - (1 - math.cos(40 * point["a"])) / (40 * point["a"])) < 1e-9
 
 
+def test_jumps_that_are_mesh_points():
+    """u' = a, and 3 a from t = 0.4 on, has no error at all: one side's rate at the jump says nothing of the other side."""
+    jump = contin.BoundaryValueProblem(
+        lambda t, u, p: (p.a * (1.0 if t < 0.4 else 3.0),), lambda a, b, p: (a.u,), ["u"], {"a": 1.0}
+    )
+    branch = contin.trace(contin.solve(jump, [0.0]), free=["a"], limits={"a": (1, 2)})
+    assert all(point.discretization_error < 1e-14 for point in branch)
+    bent = contin.BoundaryValueProblem(
+        lambda t, u, p: (p.a * u.u * (1.0 if t < 0.4 else 3.0),), lambda a, b, p: (a.u - 1,), ["u"], {"a": 1.0}
+    )
+    control = contin.MeshControl(every=0)
+    start = contin.solve(bent, [1.0], degree=3, intervals=10, mesh=control)
+    branch = contin.trace(start, free=["a"], limits={"a": (1, 2)}, mesh=control, errors=False)
+    for point in branch.points[1:]:
+        exact = math.exp(2.2 * point["a"])
+        error = abs(point.system.states(point.x)[-1, 0] - exact) / (1 + exact)
+        assert error < 3 * point.discretization_error < 30 * error
+
+
 def test_a_corner_inside_an_interval_does_not_make_meshes_grow_without_end():
     """u' = a up to u = 0.4, and a (1 + 2 (u - 0.4)) above: u(1) = 0.4 + (exp(2 a - 0.8) - 1) / 2.
 
