@@ -23,7 +23,7 @@ from contin import checks, threads
 from contin.arrays import Array
 from contin.continuation.failure import no_convergence
 from contin.continuation.scaling import outgrown, scaled
-from contin.detection.accuracy import Accuracy, accuracy_of
+from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
 from contin.detection.hopf_end import collapsed
@@ -271,7 +271,7 @@ class Continuation:
             trial = self._state_trial()
             first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
             located = self._located(dataclasses.replace(first, label=own_end(trial.system, first).label))
-            yield self._point(located, self.state, accuracy=self._accuracy if self.state.singular else None)
+            yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
             if (stop := self._out_of_limits(trial) or self._out_of_domain(trial)) is not None:
                 self.stop = stop
                 return

@@ -30,6 +30,10 @@ from contin.discretization.mesh import near
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector
 
+#: Distance from a jump, relative to the interval, at which rates are taken on either side: jumps are mesh points to 1e-12 of the
+#: domain. Ten times larger, the rates are off by 1e-8 of their change in the interval.
+_ASIDE = 1e-9
+
 
 class Finer(NamedTuple):
     """Tables of a degree d on the unit interval.
@@ -118,8 +122,8 @@ class Defect:
         with np.errstate(all="ignore"):
             p = system.scaled_parameters(x)
             rates = system.field_values(system.mesh, at_mesh, p)
+            fill_points(n, tables, h, x, *self._rates_of_intervals(rates, at_mesh, p), points)
             rates[self.broken] = np.nan
-            fill_points(n, tables, h, x, rates, points)
             fill_left(n, tables, h, x, system.field_values(self.times, points, p), left, self.conditions)
             error = factors.solve(left)
             better = x - error
@@ -130,6 +134,18 @@ class Defect:
                 integrands = system.integrands(better, self.times, points)
                 largest = largest_miss(self.weights, integrands, known, self.least_sizes, largest)
         return float(largest)
+
+    def _rates_of_intervals(self, rates: Array, at_mesh: Array, p: Array) -> tuple[Array, Array]:
+        """Return the rates at the first and at the last ends of the intervals, from those at the mesh points.
+
+        At a jump they are taken beside it.
+        """
+        first, last, mesh = rates[:-1], rates[1:], self.system.mesh
+        if self.broken.any():
+            aside = _ASIDE * self.h
+            first = self.system.field_values(mesh[:-1] + aside, at_mesh[:-1], p)
+            last = self.system.field_values(mesh[1:] - aside, at_mesh[1:], p)
+        return first, last
 
     def left_by_newton(self, x: Array, factors: Any) -> float:
         """Return the part of such an error that no mesh makes smaller: of states, rates and free parameters, by the residual.
@@ -165,20 +181,20 @@ class Defect:
 
 
 @kernel(reorder=False)
-def fill_points(n: int, tables: Finer, h: Vector, x: ReadOnlyVector, rates: Matrix, points: Matrix) -> None:
-    """Fill the states of w, step 2, at the finer Gauss points, (N (d + 1), n); ``rates`` are those at the mesh points.
+def fill_points(n: int, tables: Finer, h: Vector, x: ReadOnlyVector, begins: Matrix, ends: Matrix, points: Matrix) -> None:
+    """Fill the states of w, step 2, at the finer Gauss points, (N (d + 1), n), from rates at both ends of the intervals.
 
     c is taken from one end of an interval where the rate at the other one is not finite; it is zero without either.
     """
-    d, ends = tables.slope.shape[0], tables.end_slopes
+    d, slopes = tables.slope.shape[0], tables.end_slopes
     sign = 1.0 - 2.0 * (d % 2)
     for j in range(h.size):
         for a in range(n):
-            first, last = -sign * h[j] * rates[j, a], -h[j] * rates[j + 1, a]
+            first, last = -sign * h[j] * begins[j, a], -h[j] * ends[j, a]
             for node in range(d + 1):
                 value = x[(j * d + node) * n + a]
-                first += ends[0, node] * value
-                last += ends[1, node] * value
+                first += slopes[0, node] * value
+                last += slopes[1, node] * value
             if first - first != 0:
                 first = last
             if last - last != 0:
