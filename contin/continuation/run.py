@@ -368,6 +368,13 @@ class Continuation:
             step, self._accuracy = again, accuracy
         return step
 
+    def _lost_end(self, segment: Segment, inspection: Inspection) -> str:
+        """Return a clause if the run ends inside a step, at a place that was not located; "" otherwise."""
+        if not self._ends_inside(segment):
+            return ""
+        ends = [point for point in inspection.special_points(self._tests) if point.stop is not None]
+        return "" if all(point.is_located for point in ends) else "the end of the run inside the step was not located"
+
     def _ends_inside(self, segment: Segment) -> bool:
         """Return whether the run ends inside a step, and not at a limit: the point at its end is not accepted.
 
@@ -404,7 +411,7 @@ class Continuation:
             try:
                 segment, distance = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
-                doubt = inspection.doubt() or self._contradiction(segment, inspection)
+                doubt = inspection.doubt() or self._contradiction(segment, inspection) or self._lost_end(segment, inspection)
                 if step < 2 * finest or not doubt:
                     inspection.special_points(self._tests)  # where points inside cannot be found the step is halved
                     return segment, inspection, distance, doubt

@@ -30,8 +30,8 @@ from contin.discretization.mesh import near
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector
 
-#: Distance from a jump, relative to the interval, at which rates are taken on either side: jumps are mesh points to 1e-12 of the
-#: domain. Ten times larger, the rates are off by 1e-8 of their change in the interval.
+#: Distance from a jump, relative to the interval, at which rates are taken on either side: jumps are mesh points to 1e-12 of
+#: the domain. Ten times larger, the rates are off by 1e-8 of their change in the interval.
 _ASIDE = 1e-9
 
 
