@@ -99,6 +99,8 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
         outcome = _follow(config, run, writer, display, Interruption())
         seconds = time.perf_counter() - began
         display.summary(config, writer.events(), writer.count, seconds, path, outcome, _shown(run.stop))
+        for note in run.notes:
+            display.note(note)
     return outcome
 
 

@@ -18,7 +18,10 @@ from branches.open_branch import OpenBranch
 from contin import exact_text
 
 #: Columns that say nothing of a state.
-_LEFT_OUT = ("point", "stage", "iterations", "newton_error", "intervals", "index", "index_before", "index_after", "kernel")
+_LEFT_OUT = (
+    "point", "stage", "iterations", "newton_error", "discretization_error", "intervals", "index", "index_before", "index_after",
+    "kernel",
+)  # fmt: skip
 
 
 def new_graph(title: str):

@@ -38,6 +38,7 @@ _BOOKKEEPING = (
     ("intervals", "i4", "mesh intervals N of this point's solution"),
     ("iterations", "i4", "Newton iterations"),
     ("newton_error", "f8", "estimated relative error left by Newton's method"),
+    ("discretization_error", "f8", "estimated error due to the mesh, relative to 1 + size"),
 )
 MEANINGS = {
     "kappa_n": "natural curvature kappa_n L / 2 pi (dimensionless)",
@@ -272,6 +273,7 @@ class BranchWriter:
             **point.parameters, **point.functionals, "point": number, "label": point.label.encode(),
             "name": point.name.encode(), "arclength": point.arclength, "intervals": point.system.intervals,
             "iterations": point.iterations, "newton_error": point.newton_error,
+            "discretization_error": point.discretization_error,
             **{f"error_{name}": point.errors.get(name, np.nan) for name in self._free}, **self.kind.values(point),
         }  # fmt: skip
         if table == "events" and self.kind.uncertain:
@@ -296,8 +298,10 @@ class BranchWriter:
         group = self._file.create_group("resume")
         group.attrs["meaning"] = "the state of the run after its first `points` points, for --resume"
         group.attrs["points"] = points
-        for name in ("previous_step", "step", "sign", "arclength", "accepted", "singular"):
+        for name in ("previous_step", "step", "sign", "arclength", "accepted", "singular", "sense", "discretization_error"):
             group.attrs[name] = getattr(state, name)
+        if state.sensed is not None:
+            group.attrs["sensed"] = state.sensed
         here = {"x": state.x, "tangent": state.tangent, "previous": state.previous_tangent}
         _write_vectors(group.create_group("here"), state.system, **here)
         _write_vectors(group.create_group("start"), start[0], x=start[1], tangent=start[2])
@@ -412,5 +416,6 @@ def _read_state(file, problem, free):
     state = State(
         system, here["x"], here["tangent"], here.get("previous"), numbers["previous_step"], numbers["step"], float(a["sign"]),
         numbers["arclength"], int(a["accepted"]), bool(a["singular"]),
+        float(a["sense"]), None if "sensed" not in a else np.array(a["sensed"]), float(a["discretization_error"]),
     )  # fmt: skip
     return state, (first, start["x"], start["tangent"]), last

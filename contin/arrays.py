@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Indices = NDArray[np.int64]
+#: One truth value an entry.
+Mask = NDArray[np.bool_]
 #: Sparsity pattern, shape (values, inputs): which values depend on which inputs.
 Pattern = NDArray[np.bool_]
 #: A user's function, which the engine compiles.

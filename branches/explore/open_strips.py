@@ -16,7 +16,7 @@ from branches.read import read_branch
 #: Nodes of a shape. Twice as many make pages twice as large; a quarter of them shows corners where a strip bends most.
 _NODES = 97
 #: Columns that no map needs.
-_LEFT_OUT = ("point", "label", "stage", "iterations", "newton_error", "intervals", "kernel")
+_LEFT_OUT = ("point", "label", "stage", "iterations", "newton_error", "discretization_error", "intervals", "kernel")
 
 
 def gathered(files: list[Path], title: str) -> dict:

@@ -228,7 +228,7 @@ class _Explorer:
             elif self._is_known(point, number, depth) and run.stop is None:
                 branch.stop = Stop("known branch", "came to a branch that was followed before")
                 break
-        branch.stop = branch.stop or run.stop
+        branch.stop, branch.notes = branch.stop or run.stop, run.notes
 
     def _is_known(self, point: Point, number: int, depth: int) -> bool:
         """Note a point that a run passes, if it is one to leave a branch at; return True if the way ahead was followed."""

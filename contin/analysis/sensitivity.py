@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from contin import checks
 from contin.arrays import Array
 from contin.detection.bordered import BorderedMatrix
 from contin.detection.branch_point import BranchPoint
+from contin.detection.hopf import critical_real_part
+from contin.discretization.algebraic import Algebraic
 from contin.discretization.differences import derivative
 from contin.discretization.system import System
 from contin.errors import ProblemError
@@ -31,8 +33,9 @@ def sensitivities(
     by : sequence of str, optional
         The other parameters; all that are not free by default.
     held : str or callable, optional
-        For points that are neither, the quantity that stays fixed: a parameter, a functional, or ``held(trial)``; the column
-        that the point is about by default, else the first free parameter.
+        For points that are neither, the quantity that stays fixed: a parameter, a functional, a state of an equilibrium, or
+        ``held(trial)``. By default it is the column that the point is about, the real part of the critical pair at a Hopf point
+        of an equilibrium, and at points of no special kind the first free parameter. At other special points it must be given.
 
     Returns
     -------
@@ -42,7 +45,7 @@ def sensitivities(
     Raises
     ------
     ProblemError
-        A name that is not a parameter that is held fixed on the branch.
+        A name that is not a parameter that is held fixed on the branch; ``held`` is no column, or missing.
 
     Examples
     --------
@@ -68,7 +71,30 @@ def sensitivities(
         return _of_fold(point, wide, x, by)
     if isinstance(point.details, BranchPoint):
         return {name: _of_branch_point(point, name) for name in by}
-    return {name: _held(point, name, held) for name in by}
+    fixed = _fixed(point, held)
+    return {name: _held(point, name, fixed) for name in by}
+
+
+def _fixed(point: Point, held: str | Callable[[Trial], float] | None) -> str | Callable[[Trial], float]:
+    """Return the quantity that stays fixed: a column, or a function of a trial.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if callable(held):
+        return held
+    system = system_of(point, "point")
+    columns = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
+    if held is None and point.label == "HB" and isinstance(system, Algebraic) and isinstance(point.details, Mapping):
+        return critical_real_part(point.details["frequency"])
+    if held is None:
+        held = point.column or (system.free[0] if point.label in ("", "EP") else None)
+    if held is None:
+        raise ProblemError(f"held: must be given at a point {point.label} {point.name!r}: a column, or a function of a trial")
+    if held not in columns:
+        raise ProblemError(f"held: {checks.shown(held)} is no column of this problem ({checks.listed(columns)})")
+    return held
 
 
 def _of_fold(point: Point, wide: System, x: Array, by: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -99,11 +125,9 @@ def _with(point: Point, name: str) -> tuple[System, Array, Array, float]:
     return wide, x, system.parameter_columns(point.x, (name,))[:, 0], float(wide.free_scales[-1])
 
 
-def _held(point: Point, name: str, held: str | Callable[[Trial], float] | None) -> dict[str, float]:
+def _held(point: Point, name: str, held: str | Callable[[Trial], float]) -> dict[str, float]:
     """Return the response, moved along the branch until the held quantity is what it was."""
     system, (wide, x, column, size) = system_of(point, "point"), _with(point, name)
-    if held is None:
-        held = point.column or system.free[0]
     response = _response(point, column)
     gradient = None if callable(held) else wide.column_gradient(x, held)
     if gradient is not None:

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from contin import checks, threads
 from contin.arrays import Array
 from contin.continuation.failure import no_convergence
 from contin.continuation.scaling import outgrown, scaled
+from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
+from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
 from contin.detection.hopf_end import collapsed
 from contin.detection.inspection import Inspection, Start
@@ -42,7 +45,7 @@ from contin.detection.test_functions import (
     within_limits,
 )
 from contin.detection.trivial import crossed, jumped
-from contin.discretization.protocol import Discretization, inner
+from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
 from contin.names import value_names
 from contin.results.branch import Branch
@@ -91,6 +94,19 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
+#: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
+#: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
+_MARGIN = 0.1
+#: Part of the tolerance below which an error may be round-off: at the usual tolerance it is some 1e-14.
+_FAR_BELOW = 0.03
+#: Times that a step is made on finer and finer meshes, and the factor by which the number of intervals grows at most each time:
+#: where the error is large, its estimate is no guide to how many are needed.
+_ATTEMPTS, _GROWTH = 4, 4
+#: A finer mesh stays if it makes the error smaller than this part of it. Where it does not, as at round-off or at a jump of the
+#: equations inside an interval, meshes would grow without end.
+_HELPS = 0.5
+#: Labels of points that must be found again on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
+_CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
@@ -156,13 +172,15 @@ class Continuation:
         self._fold = fold(self.primary) if settings.folds else None
         self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
-        self._at_start: dict[str, float] = {}
         general = self._general_test_functions()
         self._tests = [*general, *self._own]
+        self._ends = [test for test in self._tests if test.terminal and not test.limit]
         self._comparable = general  # have the same sign on every mesh
         self._index = index_of(self.state.system)
+        self._census = census_of(self.state.system) if settings.folds and settings.branch_points else None
         self.notes: list[str] = []
         self._resumed = state is not None
+        self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
     def _check(self, system: Discretization) -> None:
@@ -209,9 +227,24 @@ class Continuation:
         if rescaled is not system:
             x, row = self._first_correction(rescaled, z)
             system, linear = rescaled, linearization(rescaled, x, row)
+        system, x, linear = self._accurate_first(system, x, linear)
         unit = settings.direction * growing(system, x, linear.tangent, self.primary, settings.newton)
         state = standing_at(system, x, unit, settings.step)
         return dataclasses.replace(state, sign=system.linearize(x, (state.row,))[1].sign)
+
+    def _accurate_first(
+        self, system: Discretization, x: Array, linear: Linearization
+    ) -> tuple[Discretization, Array, Linearization]:
+        """Return the first point on a mesh on which its error is within the tolerance, as far as one is found."""
+        for _ in range(_ATTEMPTS):
+            accuracy = self._accuracy_of(Trial(system, x, linear))
+            finer = self._finer_mesh(system, x, accuracy.error) if self._is_poor(accuracy) else None
+            if finer is None:
+                break
+            system, carry = finer
+            x, row = self._first_correction(system, carry(x))
+            linear = linearization(system, x, row)
+        return system, x, linear
 
     def _first_correction(self, system: Discretization, x: Array) -> tuple[Array, Array]:
         """Correct x at fixed primary parameter or, where that is singular (at a fold), across a random direction.
@@ -237,7 +270,8 @@ class Continuation:
         if not self._resumed:
             trial = self._state_trial()
             first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
-            yield self._point(dataclasses.replace(first, label=own_end(trial.system, first).label), self.state)
+            located = self._located(dataclasses.replace(first, label=own_end(trial.system, first).label))
+            yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
             if (stop := self._out_of_limits(trial) or self._out_of_domain(trial)) is not None:
                 self.stop = stop
                 return
@@ -263,22 +297,29 @@ class Continuation:
 
     def _out_of_domain(self, trial: Trial) -> Stop | None:
         """Return the reason to stop at the first point: a test function of the kind of problem that ends runs is negative."""
-        self._at_start = {test.name: test.function(trial) for test in self._own if test.terminal}
-        return next((Stop("event", f"{name} at the first point") for name, value in self._at_start.items() if value < 0), None)
+        ends = [test for test in self._own if test.terminal]
+        return next((Stop("event", f"{test.name} at the first point") for test in ends if trial.value(test) < 0), None)
 
     def _advance(self) -> Iterator[Point]:
         """Make one step: yield the labelled points inside it, then the point at its end."""
         self._adapt_mesh()
         try:
-            segment, inspection, distance = self._step(self.state)
+            segment, inspection, distance, doubt = self._accurate_step()
         except ConvergenceError as error:
             self.stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
-            yield self._point(SpecialPoint(0.0, "MX", "no convergence", self._state_trial()), self.state)
+            met = self.stop.reason == "event"
+            label, name = ("EP", self.stop.message.removeprefix("met ")) if met else ("MX", "no convergence")
+            yield self._point(SpecialPoint(0.0, label, name, self._state_trial()), self.state, accuracy=self._accuracy)
             return
         special = [own_end(segment.trial.system, point) for point in inspection.special_points(self._tests)]
         special = within_limits(segment, special, self._limits)
-        changes = self._index_changes(segment, special)
-        for point, change in zip(special, changes):
+        end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
+        found = [self._located(point) for point in special[: end + 1]]
+        found = [point for point in found if self._is_confirmed(point, segment)]
+        changes = self._index_changes(segment, found)
+        if end == len(special):
+            self._note_doubts(segment, found, doubt if len(found) == len(special) else "")
+        for point, change in zip(found, changes):
             if point.stop is not None:
                 self.stop = own_stop(point.trial.system, point.trial, point.stop)
                 point = with_details(point, self.stop)
@@ -292,22 +333,77 @@ class Continuation:
         elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
-        yield self._point(SpecialPoint(segment.step, label, name, segment.trial), segment.state)
+        found_at_end = self._located(SpecialPoint(segment.step, label, name, segment.trial))
+        yield self._point(found_at_end, segment.state, accuracy=self._accuracy)
 
     def _failure(self, error: ConvergenceError) -> Stop:
         """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
-        for test in self._own:
-            if test.terminal and abs(test.function(self._state_trial())) < _NEARLY * abs(self._at_start.get(test.name, 0.0)):
+        first, here = Trial(*self.start[:2], Linearization(self.start[2], np.nan)), self._state_trial()
+        for test in self._ends:
+            if abs(here.value(test)) < _NEARLY * abs(first.value(test)):
                 return Stop("event", f"met {test.name}")
         return no_convergence(self.state, self.settings, error)
 
     # --- one step ------------------------------------------------------------------------------------------------
 
-    def _step(self, state: State) -> tuple[Segment, Inspection, float]:
+    def _accurate_step(self) -> tuple[Segment, Inspection, float, str]:
+        """Make a step whose end has an error within the tolerance of the mesh, as far as a finer mesh makes it smaller.
+
+        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point.
+        """
+        step = self._step(self.state)
+        self._accuracy = self._accuracy_of(step[0].trial)
+        for _ in range(_ATTEMPTS):
+            trial, known = step[0].trial, (self.state, self._end)
+            if not self._is_poor(self._accuracy) or self._ends_inside(step[0]):
+                break
+            finer = self._finer_mesh(trial.system, trial.x, self._accuracy.error)
+            if finer is None or not self._move_to(finer):
+                break
+            again = self._step(self.state)
+            accuracy = self._accuracy_of(again[0].trial)
+            if not accuracy.error < _HELPS * self._accuracy.error:
+                self.state, self._end = known
+                break
+            step, self._accuracy = again, accuracy
+        return step
+
+    def _lost_end(self, segment: Segment, inspection: Inspection) -> str:
+        """Return a clause if the run ends inside a step, at a place that was not located; "" otherwise."""
+        if not self._ends_inside(segment):
+            return ""
+        ends = [point for point in inspection.special_points(self._tests) if point.stop is not None]
+        return "" if all(point.is_located for point in ends) else "the end of the run inside the step was not located"
+
+    def _ends_inside(self, segment: Segment) -> bool:
+        """Return whether the run ends inside a step, and not at a limit: the point at its end is not accepted.
+
+        The equations may not hold there, and no mesh be fine enough.
+        """
+        before, trial = segment.before, segment.trial
+        return any(test.passed(before.value(test), trial.value(test)) for test in self._ends)
+
+    def _accuracy_of(self, trial: Trial) -> Accuracy:
+        return accuracy_of(trial, self.settings.mesh.tolerance)
+
+    def _is_poor(self, accuracy: Accuracy) -> bool:
+        """Return whether a point has a larger error than the tolerance of the mesh, which a finer one would lower."""
+        control = self.settings.mesh
+        return bool(control.every and not accuracy.is_round_off and accuracy.error > control.tolerance)
+
+    def _finer_mesh(self, system: Discretization, x: Array, error: float) -> tuple[Discretization, Carrier] | None:
+        """Return the system on a finer mesh that is adapted to x, as fine as the error takes; None if it may not be finer."""
+        control, now = self.settings.mesh, system.intervals
+        count = min(max(self._intervals_for(system, error), now + 1), control.max_intervals)
+        if count <= now:
+            return None
+        return system.adapted(x, dataclasses.replace(control, min_intervals=count, max_intervals=count))
+
+    def _step(self, state: State) -> tuple[Segment, Inspection, float, str]:
         """Predict and correct, halving the step until the corrected point can be believed.
 
-        Returns the step and the distance from prediction to corrected point. At the first failure the state's tangent is taken
-        anew, right at its point.
+        Returns the step, the distance from prediction to corrected point, and the doubt that is left where the step cannot be
+        halved any more. At the first failure the state's tangent is taken anew, right at its point.
         """
         step, settings, exact = up_to_limits(state, self.settings.limits, self.settings.min_step), self.settings, False
         finest = max(settings.min_step, _FINEST * step)
@@ -315,10 +411,11 @@ class Continuation:
             try:
                 segment, distance = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
-                if step < 2 * finest or (inspection.is_simple() and self._is_explained(segment, inspection)):
+                doubt = inspection.doubt() or self._contradiction(segment, inspection) or self._lost_end(segment, inspection)
+                if step < 2 * finest or not doubt:
                     inspection.special_points(self._tests)  # where points inside cannot be found the step is halved
-                    return segment, inspection, distance
-                problem = ConvergenceError("several branch points in one step, or another branch at its end")
+                    return segment, inspection, distance, doubt
+                problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
             if not exact and not state.singular:
@@ -337,8 +434,7 @@ class Continuation:
         settings = self.settings
         guess = predict(state, step)
         trial = corrected(state, guess, step, settings.newton)
-        residual = state.system.residual(trial.x)
-        if not np.all(np.isfinite(residual)):
+        if not self._is_finite(trial):
             raise ConvergenceError("the equations are not finite at the corrected point")
         if collapsed(state.system, state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
@@ -351,7 +447,7 @@ class Continuation:
             )
         if hidden_turn(state, trial) > settings.angle:
             raise ConvergenceError("the corrected point does not lie where the tangents at both ends lead")
-        if self._fold is not None and self._may_turn(trial, residual):
+        if self._fold is not None and self._may_turn(trial):
             trial = sharpened(state, trial)
         if self._fold is not None and self._jumped(state, guess, trial, step):
             raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
@@ -393,11 +489,19 @@ class Continuation:
                 problem = error
         raise problem
 
-    def _may_turn(self, trial: Trial, residual: Array) -> bool:
+    def _is_finite(self, trial: Trial) -> bool:
+        """Return whether the equations are finite at a point: they are where its discretization error is."""
+        if trial.system.intervals and np.isfinite(trial.discretization_error):
+            return True
+        return bool(np.all(np.isfinite(trial.system.residual(trial.x))))
+
+    def _may_turn(self, trial: Trial) -> bool:
         """Return whether the primary parameter is so near to a fold that an approximate tangent may have the wrong sign."""
         at = trial.system.parameter_index(self.primary)
         component = abs(trial.tangent[at])
-        return component < _STEEP and not abs(tangent_error(trial, residual)[at]) < _DOUBT * component
+        if component >= _STEEP:
+            return False
+        return not abs(tangent_error(trial, trial.system.residual(trial.x))[at]) < _DOUBT * component
 
     def _jumped(self, state: State, guess: Array, trial: Trial, step: float) -> bool:
         """Return whether the primary parameter misses its prediction by much of what it changes at all.
@@ -445,17 +549,42 @@ class Continuation:
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
-            way or state.sense, free_values(trial) if way else state.sensed,
+            way or state.sense, free_values(trial) if way else state.sensed, trial.discretization_error,
         )  # fmt: skip
 
     # --- the index -----------------------------------------------------------------------------------------------
 
-    def _is_explained(self, segment: Segment, inspection: Inspection) -> bool:
-        """Return whether the special points of a step allow the change of the index over it."""
-        if self._index is None:
+    def _contradiction(self, segment: Segment, inspection: Inspection) -> str:
+        """Return how the change of index or number of eigenvalues over a step contradicts its special points; "" if not."""
+        if not contradiction(self._census, segment, ()):
+            return ""  # without special points, which take time
+        return contradiction(self._census, segment, inspection.special_points(self._tests))
+
+    def _note_doubts(self, segment: Segment, found: list[SpecialPoint], doubt: str) -> None:
+        """Note what the labelled points of a step do not explain: a change of the count or, without one, a doubt."""
+        contradicts = contradiction(self._census, segment, found)
+        if contradicts and (self._census is not self._index or not found):  # beside points, changes of the index are noted
+            self._note(f"{contradicts}, and the labelled points do not explain it", segment)
+        elif doubt and not contradicts:
+            self._note(doubt, segment)
+
+    def _note(self, text: str, segment: Segment) -> None:
+        """Note what was seen inside a step and not understood."""
+        ends = (trial[self.primary] for trial in (segment.before, segment.trial))
+        self.notes.append(f"{text} (between {self.primary} = {' and '.join(f'{end:.10g}' for end in ends)})")
+
+    def _is_confirmed(self, point: SpecialPoint, segment: Segment) -> bool:
+        """Return whether a special point was located and, where that was asked for, found again on a finer mesh.
+
+        Others are noted: they get no label. The end of a run keeps its own.
+        """
+        lost = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
+        if point.stop is not None or (point.is_located and not lost):
             return True
-        before, after = segment.before.value(self._index), segment.trial.value(self._index)
-        return not abs(after - before) > sum(map(nullity_of, inspection.special_points(self._tests)))
+        why = "was not found again on a finer mesh" if point.is_located else "was bracketed, and not located"
+        what = f"{point.label} {point.name.removeprefix('possible').strip()}".strip()
+        self._note(f"a possible {what} {why}", segment)
+        return False
 
     def _index_changes(self, segment: Segment, special: list[SpecialPoint]) -> list[IndexChange | None]:
         """Return the index before and after each special point of a step, and note what contradicts itself."""
@@ -483,10 +612,35 @@ class Continuation:
         due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
         if state.singular or not due or state.accepted % due:
             return
+        control = dataclasses.replace(control, min_intervals=self._fewest_intervals(state))
         adapted = state.system.adapted(state.x, control) or outgrown(state.system, state.x)
-        if adapted is None:
-            return
-        system, carry = adapted
+        if adapted is not None:
+            self._move_to(adapted)
+
+    def _intervals_for(self, system: Discretization, error: float) -> int:
+        """Return the number of intervals with which a point of this error, of the order h^(2 d), is within the tolerance."""
+        order = 2 * max(system.degree, 1)
+        factor = float(error / (_MARGIN * self.settings.mesh.tolerance)) ** (1 / order)
+        return math.ceil(system.intervals * min(float(factor), _GROWTH))
+
+    def _fewest_intervals(self, state: State) -> int:
+        """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.
+
+        An error far below the tolerance may be round-off, which does not grow on coarser meshes: half of the intervals may do.
+        """
+        control, now, error = self.settings.mesh, state.system.intervals, state.discretization_error
+        if math.isnan(error) or not now:
+            return control.min_intervals
+        count = now // 2 if error < _FAR_BELOW * control.tolerance else min(self._intervals_for(state.system, error), now)
+        return max(control.min_intervals, min(count, control.max_intervals))
+
+    def _move_to(self, adapted: tuple[Discretization, Carrier]) -> bool:
+        """Correct the state's point on another mesh, or with other sizes, and return whether the run goes on from there.
+
+        It does not where the point is not found there, where a special point would fall between the meshes, or where a mesh of
+        fewer intervals is not good enough.
+        """
+        state, (system, carry) = self.state, adapted
         tangent = carry(state.tangent)
         length = float(np.sqrt(inner(system, tangent, tangent)))
         tangent /= length
@@ -497,48 +651,59 @@ class Continuation:
         try:
             done = correct(system, x, row, row @ x, self.settings.newton)
         except ConvergenceError:
-            return  # the old mesh still serves; the step control will notice if it does not
+            return False  # the old mesh still serves; the step control will notice if it does not
         if collapsed(system, x, done.x):
-            return
+            return False
         end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0))
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):
-            return  # a special point would fall between the meshes; the next point will do as well
+            return False  # the next point will do as well
         if self._sense(before) * self._sense(end) < 0:
-            return  # so would a fold
+            return False
         if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, self.settings.newton):
-            return
+            return False
+        if system.intervals < state.system.intervals and self._is_poor(self._accuracy_of(end)):
+            return False
         self._end = end
         self.state = dataclasses.replace(
-            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
-        )
+            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign,
+            discretization_error=end.discretization_error,
+        )  # fmt: skip
+        return True
 
     # --- results -------------------------------------------------------------------------------------------------
 
-    def _point(self, found: SpecialPoint, state: State, change: IndexChange | None = None) -> Point:
-        """Return the point of a branch; a labelled one is located again on finer meshes, if errors are wanted."""
-        errors: Mapping[str, float] = {}
+    def _located(self, found: SpecialPoint) -> SpecialPoint:
+        """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
         labelled = found.label not in ("", "MX") and found.name != "closed"  # closed: the first point once more
         coarse = own_normal_form(found.trial.system, found)
-        if found.errors is not None:
-            errors = found.errors
-        elif labelled and self.settings.errors:
+        if found.errors is None and labelled and self.settings.errors:
             again = refined(found.same_as or found, self.settings)
             details = found.details if found.same_as else again.details
-            found, errors = dataclasses.replace(found, trial=again.trial, details=details), again.errors
+            found = dataclasses.replace(found, trial=again.trial, details=details, errors=again.errors)
         if coarse is not None:
-            better = own_normal_form(found.trial.system, found) if errors else coarse
+            better = own_normal_form(found.trial.system, found) if found.errors else coarse
             found = with_normal_form(found, better or coarse, coarse)
+        return found
+
+    def _point(
+        self, found: SpecialPoint, state: State, change: IndexChange | None = None, accuracy: Accuracy | None = None
+    ) -> Point:
+        """Return the point of a branch; its accuracy is estimated where it is not known."""
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
+        if accuracy is None and found.name != "closed" and np.all(np.isfinite(trial.tangent)):
+            accuracy = self._accuracy_of(trial)
+        elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on no finer mesh
+            accuracy = self._accuracy
         stability = Stability()
         if self._index is not None:
             stability = stability_of(found)
         return Point(
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
-            state.arclength + found.at, trial.iterations, trial.newton_error, errors, found.details,
+            state.arclength + found.at, trial.iterations, trial.newton_error, found.errors or {}, found.details,
             stability.index, stability.nullity, change, stability.breaks,
-            *(("", None) if found.test is None else (found.test.column, found.test.value)),
+            *(("", None) if found.test is None else (found.test.column, found.test.value)), accuracy.error,
         )  # fmt: skip
 
 

@@ -101,6 +101,16 @@ class Extended(Discretization):
         """Names of the states that are columns of the underlying system."""
         return self.base.named_states
 
+    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+        """Return the estimated error of the solution and the parameters; that of the singular vectors is not in it."""
+        inside: Any = _Inside(factors, self)
+        return self.base.discretization_error(x[: self.base.size], inside, columns)
+
+    def newton_error(self, x: Array, factors: Factors) -> float:
+        """Return that of the underlying system."""
+        inside: Any = _Inside(factors, self)
+        return self.base.newton_error(x[: self.base.size], inside)
+
     def states(self, x: Array) -> Array:
         """Return the states of the underlying system."""
         return self.base.states(x[: self.base.size])
@@ -158,6 +168,20 @@ class Extended(Discretization):
             return None
         other = self.on(changed[0])
         return other, self.carrier(other)
+
+
+class _Inside:
+    """Factors of an extended system for right-hand sides of the underlying one: its own equations hold."""
+
+    def __init__(self, factors: Factors, system: Extended) -> None:
+        self._factors, self._system = factors, system
+
+    def solve(self, b: Array) -> Array:
+        """Return the unknowns of the underlying system."""
+        wide, base = np.zeros(self._system.equations + 1), self._system.base
+        wide[: base.equations], wide[-1] = b[:-1], b[-1]
+        found: Array = self._factors.solve(wide)[: base.size]
+        return found
 
 
 def cosine(a: Array, b: Any) -> float:

@@ -19,7 +19,7 @@ from contin.curves.extended import Borders
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.system import System
-from contin.linalg.dense import DenseFactors
+from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.stepping.trial import TestFunction, Trial
 
 #: A kappa below this part of its first value is zero: Bogdanov-Takens points are located more exactly than that.
@@ -76,7 +76,7 @@ class HopfCurve(CriticalCurve):
 
     def others(self, x: Array) -> ComplexArray:
         """Return the eigenvalues but the two that are critical."""
-        values = np.linalg.eigvals(self.matrix(x)).astype(complex)
+        values = eigenvalues(self.matrix(x))
         return values[np.argsort(np.abs(values**2 + self.kappa(x)))[2:]]
 
 

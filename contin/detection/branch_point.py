@@ -199,6 +199,8 @@ class _Search:
         if np.max(np.abs(self.x - self._origin)) > _MOVED:
             matrix = BorderedMatrix(system, self.x, *self._borders)
             hessian = matrix.hessian(self.x)
+        if not (np.all(np.isfinite(matrix.kernel)) and np.all(np.isfinite(hessian)) and matrix.is_regular()):
+            raise ConvergenceError("no simple branch point near by: the kernel has more than two dimensions")
         tangents = [a @ matrix.kernel for a in _null_directions(hessian)]
         tangents = [oriented(tangent / np.sqrt(inner(system, tangent, tangent))) for tangent in tangents]
         tangents = [tangents[i] for i in ordered(tangents, [0.0] * len(tangents))]

@@ -13,7 +13,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.detection.branch_point import locate_branch_point
-from contin.detection.crossings import calm, crossings, quotients
+from contin.detection.crossings import calm, crossings, passed, quotients
 from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
 from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.protocol import inner
@@ -37,8 +37,6 @@ _GAP_WITHOUT_MESH = 1e-5
 _HALVINGS = 12
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
 _TOGETHER = 0.1
-#: Rounds of the power method where it gives more than the one singular value that the determinant's sign tells of, or another.
-_MORE_ROUNDS = 8
 
 
 class BranchPointSearch:
@@ -58,14 +56,12 @@ class BranchPointSearch:
         row, size = state.row, state.system.size
         if before.factors is None:
             before.refactor(row)
-        if before.sign == trial.sign and calm(quotients(before.factors, trial.factors, size, 1)):
+        if before.sign == trial.sign and calm(before.factors, trial.factors, size):
             return 0, True
         before.refactor(row)
         trial.sharpen_factors(row)
         values = quotients(before.factors, trial.factors, size)
-        if crossings(values)[0] != self.sign_changes:  # several, or the determinant knows better: look once more
-            values = quotients(before.factors, trial.factors, size, _MORE_ROUNDS)
-        shares = _shares(values)
+        shares = _shares(values[values.real < 0])
         if len(shares):
             self._share, self._spread = float(np.mean(shares)), float(np.ptp(shares))
         count, clear = crossings(values)
@@ -135,12 +131,13 @@ class BranchPointSearch:
         there = segment.at(middle)
         there.refactor(segment.state.row)
         values = quotients(segment.before.factors, there.factors, segment.state.system.size)
-        passed, _ = crossings(values)
-        return 0 < passed < count or (passed == count and float(np.ptp(_shares(values))) > _TOGETHER)
+        passing, vanishing = passed(values)
+        shares = _shares(values[passing | vanishing])
+        return 0 < len(shares) < count or (len(shares) == count and float(np.ptp(shares)) > _TOGETHER)
 
 
 def _shares(values: ComplexArray) -> Array:
-    """Return at which part of the step singular values pass zero that change evenly, from `quotients`."""
-    passing = np.abs(values[values.real < 0])
-    shares: Array = passing / (1 + passing)
+    """Return at which part of the step singular values pass zero that change evenly, from their `quotients`."""
+    sizes = np.abs(values)
+    shares: Array = sizes / (1 + sizes)
     return shares

@@ -177,4 +177,4 @@ class NormalForms:
         def products(s: float) -> Array:
             return np.array([self._product(w, term).real for term in terms(moved(here, s))]) / factor
 
-        return Coefficient.of(products, self.system.derivative_error)
+        return Coefficient.of(products, self.system)

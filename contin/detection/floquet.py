@@ -307,7 +307,7 @@ def _doubtful(point: SpecialPoint) -> SpecialPoint:
     """Return a special point, named "possible" where the multiplier that is 1 has such an error that others mean little."""
     system: Any = point.trial.system
     trivial = _trivial(system, point.trial.x)
-    if trivial is None or point.name.startswith("possible"):
+    if trivial is None or not point.is_located:
         return point
     error = abs(np.expm1(system.eigenvalues(point.trial.x)[trivial]))
     return dataclasses.replace(point, name=f"possible {point.name}") if error > _MEANINGLESS else point
@@ -315,7 +315,7 @@ def _doubtful(point: SpecialPoint) -> SpecialPoint:
 
 def _passes(segment: Segment, point: SpecialPoint) -> bool:
     """Return whether the pair of a torus bifurcation lies inside the circle on one side of it, and outside on the other."""
-    if point.name.startswith("possible") or point.test is None:
+    if not point.is_located or point.test is None:
         return True
     sides = [segment.near(point.at + way * _BESIDE * segment.step) for way in (-1, 1)]
     before, behind = (point.test.function(trial) for trial in sides)

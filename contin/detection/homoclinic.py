@@ -15,6 +15,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.discretization.cycles import CycleCollocation
 from contin.errors import ConvergenceError
+from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
 from contin.problems.cycle import PERIOD
 from contin.stepping.newton import correct
@@ -110,8 +111,7 @@ def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, Compl
             break
     else:
         return None
-    eigenvalues: ComplexArray = np.linalg.eigvals(system.rates_by_states(x, states[None])[0]).astype(complex)
-    values = eigenvalues / system.unit_time(x)
+    values = eigenvalues(system.rates_by_states(x, states[None])[0]) / system.unit_time(x)
     return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), values[np.argsort(-values.real)]
 
 

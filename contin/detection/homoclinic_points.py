@@ -63,7 +63,7 @@ def _closeness(trial: Trial) -> float:
 
 def own_names(point: SpecialPoint) -> tuple[str, str] | None:
     """Return label and name of a neutral saddle, or of the end of a curve, whose leading eigenvalue is complex; else None."""
-    if point.label not in ("NSS", "NCH") or point.name.startswith("possible"):
+    if point.label not in ("NSS", "NCH") or not point.is_located:
         return None
     kinds = [_is_complex(_leading(point.trial, side)[0]) for side in (0, 1)]
     if point.label == "NSS" and any(kinds):

@@ -9,6 +9,8 @@ one pair lies on the axis, the piece is halved. Real eigenvalues that cross (fol
 from __future__ import annotations
 
 import itertools
+import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -43,12 +45,17 @@ def hopf() -> TestFunction:
     return TestFunction("HB", "Hopf", function, search=hopf_points)
 
 
+def critical_real_part(frequency: float) -> Callable[[Trial], float]:
+    """Return the function of a trial that vanishes at a Hopf point of this frequency: the real part of the critical pair."""
+    return _nearest(1j * frequency).function
+
+
 def _nearest(value: complex) -> TestFunction:
     """Return the test function of one pair: the real part of the eigenvalue that is nearest to a value."""
 
     def function(trial: Trial) -> float:
         values = _upper(trial)
-        return float(values[np.argmin(np.abs(values - value))].real)
+        return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
 
     return TestFunction("HB", "Hopf", function, search=hopf_points)
 
@@ -89,25 +96,41 @@ def _passes_as_pair(left: Trial, right: Trial) -> bool:
 
 def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
     """Return the eigenvalues at both ends that changed the side of the imaginary axis."""
-    system: Any = left.system
-    first, last = system.eigenvalues(left.x), system.eigenvalues(right.x)
-    if not (np.all(np.isfinite(first)) and np.all(np.isfinite(last))):
-        return np.empty(0, complex), np.empty(0, complex)
-    last = last[_nearest_to_each(np.abs(first[:, None] - last))]
+    first, last = _matched(left, right)
     changed = (first.real > 0) != (last.real > 0)
     upper = (first.imag > -_REAL * (1 + np.abs(first))) | (last.imag > -_REAL * (1 + np.abs(last)))
     return first[changed & upper], last[changed & upper]
 
 
-def _nearest_to_each(gaps: Array) -> Indices:
-    """Return the column that belongs to each row of a square matrix, so that the sum of these entries is the least."""
-    nearest: Indices = gaps.argmin(axis=1)
-    if len(set(nearest.tolist())) == len(nearest):
-        return nearest
+def _matched(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
+    """Return the eigenvalues at two places, each beside the one that it becomes; none where they are not finite.
+
+    Of a large matrix only those right of the axis or near to it are known, and their number differs from place to place. One
+    right of the axis that is left over at one place has gone far to the left at the other: it is looked for there.
+    """
+    system: Any = left.system
+    first, last = system.eigenvalues(left.x), system.eigenvalues(right.x)
+    if not (np.all(np.isfinite(first)) and np.all(np.isfinite(last))):
+        return np.empty(0, complex), np.empty(0, complex)
+    rows, columns = _nearest_pairs(np.abs(first[:, None] - last))
+    ahead = [z for i, z in enumerate(first) if i not in rows and z.real > 0]
+    behind = [z for j, z in enumerate(last) if j not in columns and z.real > 0]
+    if not ahead and not behind:
+        return first[rows], last[columns]
+    gone = [system.eigenvalue_near(right.x, z) for z in ahead]
+    came = [system.eigenvalue_near(left.x, z) for z in behind]
+    return np.concatenate([first[rows], ahead, came]), np.concatenate([last[columns], gone, behind])
+
+
+def _nearest_pairs(gaps: Array) -> tuple[Indices, Indices]:
+    """Return rows and columns of a matrix that belong together, as many as the shorter side has: their sum is the least."""
+    nearest: Indices = gaps.argmin(axis=1) if gaps.size else np.empty(0, dtype=np.int64)
+    if len(set(nearest.tolist())) == len(gaps):
+        return np.arange(len(gaps)), nearest
     from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]  # takes .1 s; most steps do without
 
-    columns: Indices = linear_sum_assignment(gaps)[1]
-    return columns
+    rows, columns = linear_sum_assignment(gaps)
+    return rows, columns
 
 
 def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
@@ -136,7 +159,10 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
     (a, b), (first, last) = (left[0], right[0]), pair
 
     def real_part(s: float) -> float:
-        return _nearest(first + (last - first) * (s - a) / (b - a)).function(segment.at(s))
+        found = _nearest(first + (last - first) * (s - a) / (b - a)).function(segment.at(s))
+        if not math.isfinite(found):
+            raise ConvergenceError("no eigenvalue is known there")
+        return found
 
     lost = ""
     try:
@@ -145,6 +171,8 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
     except ConvergenceError:
         (at, there), lost = right, "possible "
     values = _upper(there)
+    if not values.size:
+        return None
     here = first + (last - first) * (at - a) / (b - a)
     frequency = float(values[np.argmin(np.abs(values - here))].imag)
     system: Any = there.system

@@ -97,22 +97,29 @@ class Inspection:
 
     # --- does the step stay on its branch? -----------------------------------------------------------------------
 
-    def is_simple(self) -> bool:
-        """Return whether the step stays on its branch, and passes one point at most, simple or multiple, where others cross.
+    def doubt(self) -> str:
+        """Return why the step may have left its branch, or passes more than one point where branches cross; "" where not.
 
         A change of the determinant's sign without a branch point means that Newton's method left the branch; so does one of the
         trivial quantity without a zero of it on the branch.
         """
         if self._own_home is not None:
-            return True  # the equations are singular there, and what they say of other points is blurred
+            return ""  # the equations are singular there, and what they say of other points is blurred
         count, clear = self._branch_points.count if self.settings.branch_points else (0, True)
-        if not clear or (self._home is not None and self._home.name.startswith("possible")) or not self._is_steady():
-            return False
+        if not clear:
+            return "the linearized equations come close to singular: branch points may have been passed"
+        if self._home is not None and not self._home.is_located:
+            return f"{self.settings.trivial} changes its sign, and no zero of it was found on the branch"
+        if not self._is_steady():
+            return "the primary parameter does not go where the tangents say: folds may have been passed"
         if not self.settings.branch_points:
-            return True
+            return ""
         if count > 1:
-            return self._branch_points.multiple.name != "possible"
-        return not self._branch_points.sign_changes or self._branch_points.simple.name != "possible"
+            located, what = self._branch_points.multiple.is_located, f"{count} branch points in one step were not told apart"
+        else:
+            located = not self._branch_points.sign_changes or self._branch_points.simple.is_located
+            what = "the determinant changes its sign, and no branch point was found"
+        return "" if located else what
 
     def _is_steady(self) -> bool:
         """Return whether the primary parameter goes, between its folds, the way that the tangents say."""
@@ -154,7 +161,7 @@ class Inspection:
             found.append(self._branch_points.multiple)
         elif self.settings.branch_points and self._branch_points.sign_changes:
             found.append(self._branch_points.simple)
-        crossings = [point for point in found if not point.name.startswith("possible")]
+        crossings = [point for point in found if point.is_located]
         for test in tests:
             found += self._zeros(test, crossings)
         found += [fold for fold in self._folds if not self._same_place(fold, found)]
@@ -217,7 +224,7 @@ class Inspection:
             if not test.passed(before, after):
                 continue
             point = self.segment.locate(test, left, right)
-            if point.name.startswith("possible") and (special := self._nearly(test, crossings)) is not None:
+            if not point.is_located and (special := self._nearly(test, crossings)) is not None:
                 point = self._at_special(test, special)
             again = any(abs(point.at - other.at) < _CLOSE * self.segment.step for other in same)
             if not again and (test.confirm is None or test.confirm(point.trial)):
@@ -228,7 +235,7 @@ class Inspection:
 
     def _coincides(self, test: TestFunction, point: SpecialPoint) -> bool:
         """Return whether a test function vanishes at a special point of the step."""
-        if self._at_the_start(point) or point.name.startswith("possible"):
+        if self._at_the_start(point) or not point.is_located:
             return False
         largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
         return bool(abs(point.trial.value(test)) <= _COINCIDENT * largest)
@@ -319,7 +326,7 @@ class Inspection:
         assert name is not None
         largest = max(abs(segment.before[name]), abs(segment.trial[name]))
         zero = max(_TRIVIAL * largest, round_off(point.trial, name, segment.newton))
-        if point.name.startswith("possible") or abs(point.trial[name]) > zero:
+        if not point.is_located or abs(point.trial[name]) > zero:
             return False
         return segment.distance(point.trial.x, point.at) < _OFF * segment.step
 
@@ -368,7 +375,7 @@ class Inspection:
         others = [other for other in found if other.label in ("BP", "CP") or other is self._home]
         if fold.label != "LP" or not others:
             return False
-        if fold.name.startswith("possible"):  # the equations are singular at the crossing: nothing else was found
+        if not fold.is_located:  # the equations are singular at the crossing: nothing else was found
             return True
         near = _SAME + _SAME_SHARE * self.segment.step
         close = [other for other in others if np.max(np.abs(fold.trial.x - other.trial.x)) < near]

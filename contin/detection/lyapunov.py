@@ -85,14 +85,14 @@ class Coefficient(NamedTuple):
     size: float
 
     @classmethod
-    def of(cls, terms: Callable[[float], Array], error: float) -> Coefficient:
+    def of(cls, terms: Callable[[float], Array], system: Any) -> Coefficient:
         """Return the coefficient of terms; ``terms(s)`` are those of critical vectors that are moved by the part s of their
         size.
 
-        ``error`` is the relative error of derivatives. The vectors are known to round-off only, which may be more than some of
-        their components, so the terms are computed again with moved ones.
+        The relative error of the derivatives of ``system`` is part of the error. The vectors are known to round-off only, which
+        may be more than some of their components, so the terms are computed again with moved ones.
         """
-        best, moved = terms(0.0), terms(_MOVED)
+        (best, moved), error = system.with_derivative_error(lambda: (terms(0.0), terms(_MOVED)))
         size = float(np.abs(best).sum())
         return cls(float(best.sum()), float(abs(best.sum() - moved.sum())) + error * size, size)
 
@@ -131,7 +131,7 @@ def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficie
         return found
 
     try:
-        return Coefficient.of(terms, system.derivative_error)
+        return Coefficient.of(terms, system)
     except np.linalg.LinAlgError:
         return Coefficient(float("nan"), float("nan"), float("nan"))
 

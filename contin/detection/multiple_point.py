@@ -67,6 +67,10 @@ class MultiplePoint:
         ends, none where the point was not located.
     continuum : bool
         The branches are not isolated: a continuous symmetry turns each into a whole family.
+    spread : float
+        Largest distance along the branch between this point and the places where single singular values vanish: round-off at a
+        point that is really multiple, else half the length of a cluster of branch points, or what the mesh has split. It is a
+        part of the point's errors.
 
     Examples
     --------
@@ -83,6 +87,7 @@ class MultiplePoint:
     x: Array | None = None
     tangents: tuple[Array, ...] = ()
     continuum: bool = False
+    spread: float = 0.0
 
 
 class _Manifold:
@@ -186,7 +191,7 @@ def locate_multiple_point(
             if np.max(np.abs(update)) < _ROUND_OFF:
                 if np.max(np.abs(residual)) > _CONSISTENT:
                     break
-                return _described(manifold, s, row)
+                return _described(manifold, s, row, slopes)
     raise ConvergenceError(f"no multiple point of dimension {dimension} near by")
 
 
@@ -211,10 +216,10 @@ def _orthonormal(system: Discretization, vectors: Array) -> Array:
     return result
 
 
-def _described(manifold: _Manifold, s: Array, row: Array) -> MultiplePoint:
-    """Return the point at coordinates s with its kernel and tangents."""
+def _described(manifold: _Manifold, s: Array, row: Array, slopes: Array) -> MultiplePoint:
+    """Return the point at coordinates s with its kernel and tangents; ``slopes`` are the derivatives of G."""
     system = manifold.system
-    x = manifold.at(s)[0]
+    x, _, G = manifold.at(s)
     vectors = manifold.vectors
     basis = _orthonormal(system, vectors)
     home = row / system.weights
@@ -228,7 +233,24 @@ def _described(manifold: _Manifold, s: Array, row: Array) -> MultiplePoint:
     cosines = [inner(system, tangent, ours) for tangent in tangents]
     tangents = [oriented_along(tangents[i], cosines[i]) for i in ordered(tangents, cosines)] or [ours]
     across = canonical_basis(np.linalg.svd(along[None])[2][1:] @ basis, system.weights)
-    return MultiplePoint(manifold.d, across, x, tuple(tangents), continuum)
+    spread = _spread(G, slopes, manifold.phi @ (system.weights * ours))
+    return MultiplePoint(manifold.d, across, x, tuple(tangents), continuum, spread)
+
+
+def _spread(G: Array, slopes: Array, a: Array) -> float:
+    """Return about the largest distance along a direction a from a point to where G, across a, is singular.
+
+    It is singular at the zeros of det(G + distance (slopes a)). Gauss-Newton has moved the point across a, too, which makes G
+    smaller than it is on the branch; the distance is not less than that at which G changes by as much as is left of it.
+    """
+    across = np.linalg.svd(a[None])[2][1:].T
+    here, change = G @ across, (slopes @ a) @ across
+    least = float(np.linalg.norm(G)) / max(float(np.linalg.norm(change)), np.finfo(float).tiny)
+    try:
+        distances = np.abs(np.linalg.eigvals(np.linalg.solve(change, here)))
+    except np.linalg.LinAlgError:
+        return least
+    return max(least, float(distances.max()))
 
 
 @functools.singledispatch

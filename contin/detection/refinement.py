@@ -75,7 +75,8 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
         if np.any(steps > _FAR * size) or np.max(steps / size) > last:
             break
-        sizes = steps[: len(system.free)] * system.free_scales  # a curve of branch points has one unknown more
+        known = steps + _split(found, system)  # a curve of branch points has one unknown more
+        sizes = known[: len(system.free)] * system.free_scales
         errors, last = dict(zip(system.free, map(float, sizes))), np.max(steps / size)
         if finer is None or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
             break  # such a mesh serves the estimate only
@@ -83,6 +84,13 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         if np.all(steps <= settings.mesh.tolerance * size):
             break
     return Refined(trial, errors, details)
+
+
+def _split(details: Any, system: Discretization) -> Any:
+    """Return by how much free parameters differ between a multiple point and the simple ones that it may consist of."""
+    if not isinstance(details, MultiplePoint):
+        return 0.0
+    return details.spread * np.abs(details.tangents[0][system.state_size :])
 
 
 def _again(

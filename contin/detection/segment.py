@@ -60,6 +60,11 @@ class SpecialPoint:
     same_as: SpecialPoint | None = None
     errors: Mapping[str, float] | None = None
 
+    @property
+    def is_located(self) -> bool:
+        """The point was found, and not only bracketed."""
+        return not self.name.startswith("possible")
+
 
 class Segment:
     """The piece of a curve between the state of a run and the corrected point at the end of a step.

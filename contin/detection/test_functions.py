@@ -156,7 +156,7 @@ def _of_hopf_points(system: Algebraic, point: SpecialPoint) -> Coefficient | Non
 def _of_bifurcations_of_cycles(system: PeriodicCollocation, point: SpecialPoint) -> Coefficient | None:
     """The coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
     with np.errstate(all="ignore"):
-        if point.label == "LP" and point.details is None and not point.name.startswith("possible"):
+        if point.label == "LP" and point.details is None and point.is_located:
             return NormalForms(system, point.trial.x).fold()
         if point.label in ("PD", "BP") and _is_simple(point):
             return NormalForms(system, point.trial.x).period_doubling()
@@ -168,7 +168,7 @@ def _of_bifurcations_of_cycles(system: PeriodicCollocation, point: SpecialPoint)
 def _is_simple(point: SpecialPoint) -> bool:
     """Return whether one eigenvalue or pair is critical at a located point."""
     simple = isinstance(point.details, dict) and point.details.get("pairs") == 1
-    return simple and not point.name.startswith("possible")
+    return simple and point.is_located
 
 
 def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient) -> SpecialPoint:

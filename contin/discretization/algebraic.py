@@ -15,9 +15,9 @@ from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
 from contin.functions.batch import Batch
-from contin.linalg.dense import DenseFactors
+from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.linalg.factors import Factors
-from contin.linalg.rightmost import rightmost
+from contin.linalg.rightmost import nearest, rightmost
 from contin.linalg.sparse import SparseFactors
 from contin.problems.algebraic import AlgebraicProblem
 
@@ -222,7 +222,14 @@ class Algebraic(System):
             if key not in self._found:  # the ends of a step and of its parts are asked for several times
                 self._found = {**dict(list(self._found.items())[-_KEPT:]), key: rightmost(self.as_field().field_jacobian(x))}
             return self._found[key]
-        return np.linalg.eigvals(self.jacobian(x)).astype(complex, copy=False)
+        return eigenvalues(self.jacobian(x))
+
+    def eigenvalue_near(self, x: Array, value: complex) -> complex:
+        """Return the eigenvalue of F_u that is nearest to a value; NaN where none is found."""
+        if self.is_sparse:
+            return nearest(self.as_field().field_jacobian(x), value)
+        values = self.eigenvalues(x)
+        return complex(values[np.argmin(np.abs(values - value))])
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a point where a pair of eigenvalues with this frequency crosses the imaginary axis."""

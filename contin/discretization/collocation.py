@@ -16,6 +16,7 @@ import numpy as np
 from contin.arrays import Array, Indices
 from contin.discretization.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.discretization.basis import basis, interpolation
+from contin.discretization.defect import Defect
 from contin.discretization.mesh import MeshControl, adapted_mesh, with_breaks
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
@@ -176,6 +177,49 @@ class Collocation(System):
         matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
         states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self._scaled_states(x))[j])
         return states
+
+    # --- the discretization error --------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _defect(self) -> Defect:
+        return Defect(self)
+
+    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+        """Return the estimated error of a solution that is due to the mesh, relative to 1 + size; see `Defect`."""
+        return self._defect.error(x, factors, columns)
+
+    def newton_error(self, x: Array, factors: Factors) -> float:
+        """Return what Newton's method or round-off has left, measured in the same way."""
+        return self._defect.left_by_newton(x, factors)
+
+    @property
+    def states_count(self) -> int:
+        """Number of states, n."""
+        return self._n
+
+    @property
+    def integrated(self) -> tuple[str, ...]:
+        """Names of the functionals that are integrals."""
+        return self._integrated
+
+    def scaled_parameters(self, x: Array) -> Array:
+        """Return all parameters divided by their sizes."""
+        return self._scaled_parameters(x)
+
+    def field_values(self, times: Array, points: Array, p: Array) -> Array:
+        """Return right-hand side and integrands of conditions, shape (K, n + their number).
+
+        ``points`` (K, n) are states at ``times`` (K,), ``p`` all parameters; all are divided by their sizes, as are the values.
+        """
+        values: Array = self._field.values(times, points, _NONE(self._n), p)
+        return values
+
+    def integrands(self, x: Array, times: Array, points: Array) -> Array:
+        """Return the integrands of the functionals, with the parameters of x, for states (K, n) divided by their sizes."""
+        batch = self.problem.batch("functionals")
+        points = points if self.scales is None else points * self.scales.states
+        values: Array = batch.values(times, points, _NONE(self._n), self.all_parameters(x))
+        return values
 
     # --- the discrete equations ----------------------------------------------------------------------------------
 

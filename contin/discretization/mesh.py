@@ -98,14 +98,14 @@ def density(basis: Basis, mesh: Array, states: Array, breaks: Array = _NOWHERE) 
 
 def _without_breaks(jumps: Array, mesh: Array, breaks: Array) -> Array:
     """Return the jumps at inner mesh points, that at a break no larger than the next ones on both sides."""
-    inside = _near(mesh[1:-1], breaks, mesh[-1] - mesh[0])
+    inside = near(mesh[1:-1], breaks, mesh[-1] - mesh[0])
     beside = np.concatenate([[-1.0], np.where(inside, -1.0, jumps), [-1.0]])
     largest = np.maximum(beside[:-2], beside[2:])  # -1 where there is none
     found: Array = np.where(inside & (largest >= 0), np.minimum(jumps, largest), jumps)
     return found
 
 
-def _near(places: Array, breaks: Array, length: float) -> Array:
+def near(places: Array, breaks: Array, length: float) -> Array:
     """Return which places lie on a break."""
     found: Any = (np.abs(places[:, None] - breaks) <= _ON_IT * length).any(axis=1)
     return np.asarray(found)
@@ -139,7 +139,7 @@ def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl,
     allowed = share(basis, control.tolerance)
     wanted = int(min(max(np.ceil(total / allowed), control.min_intervals), control.max_intervals))
     enough = wanted <= h.size <= max(_TOO_MANY * wanted, control.min_intervals)
-    there = breaks[_near(breaks, mesh, mesh[-1] - mesh[0])] if len(breaks) else breaks
+    there = breaks[near(breaks, mesh, mesh[-1] - mesh[0])] if len(breaks) else breaks
     enough = enough and len(there) == len(breaks)
     if enough and (phi * h).max() <= _TOO_LARGE * max(total / h.size, allowed * wanted / h.size):
         return None

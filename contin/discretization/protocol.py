@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -73,6 +73,18 @@ class Discretization(Equations, Protocol):
     @abstractmethod
     def nodes(self) -> Array:
         """Values of t at the nodes, where the states are given; shape (K,)."""
+
+    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+        """Return the estimated error of a solution x that is due to the mesh, relative to 1 + size: 0 without a mesh.
+
+        ``factors`` are those of [F_x; row] at x or close to it, ``columns`` the functionals of x. Kinds of system with a mesh
+        that say nothing return NaN.
+        """
+        return float("nan") if self.intervals else 0.0
+
+    def newton_error(self, x: Array, factors: Factors) -> float:
+        """Return what Newton's method or round-off has left, measured in the same way."""
+        return 0.0
 
     @property
     def named_states(self) -> tuple[str, ...]:

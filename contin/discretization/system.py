@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -166,10 +166,20 @@ class System(Discretization):
         found: Array = derivative(lambda s: self.column_gradient(x + s * v, name), 1, 1 / longest)[0]
         return found
 
-    @property
-    def derivative_error(self) -> float:
-        """Estimated relative error of second and third derivatives: round-off, or that of differences."""
-        return max([_ROUND_OFF, *(batch.interpreted.error for batch in self._evaluated if batch.interpreted is not None)])
+    def with_derivative_error(self, function: Callable[[], Any]) -> tuple[Any, float]:
+        """Return what a function returns, and the estimated relative error of the derivatives that it took.
+
+        That is round-off, or the error of differences: of these alone, whatever was computed before.
+        """
+        batches = [batch.interpreted for batch in self._evaluated if batch.interpreted is not None]
+        before = [batch.error for batch in batches]
+        for batch in batches:
+            batch.error = 0.0
+        found = function()
+        error = max([_ROUND_OFF, *(batch.error for batch in batches)])
+        for batch, known in zip(batches, before):
+            batch.error = max(batch.error, known)
+        return found, error
 
     @property
     def _evaluated(self) -> Sequence[Batch]:

@@ -167,7 +167,11 @@ class Interpreted:
         *others, last = directions
         if not others and self._complex:
             return self._complex_step(t, x, last)
-        return self._difference(lambda t, x: self._along(t, x, others), t, x, last)
+
+        def inner(t: Array, x: Array, places: Indices) -> Array:
+            return self._along(t, x, [direction[places] for direction in others])
+
+        return self._difference(inner, t, x, last)
 
     def _complex_step(self, t: Array, x: Array, direction: Array) -> Array:
         """Return the derivative along a direction from one evaluation with complex numbers."""
@@ -175,8 +179,11 @@ class Interpreted:
         found: Array = self._values(t, moved).imag / _STEP
         return found
 
-    def _difference(self, function: Callable[[Array, Array], Array], t: Array, x: Array, direction: Array) -> Array:
-        """Return the derivative of a function along a direction, by differences as long as its error estimate allows."""
+    def _difference(self, function: Callable[[Array, Array, Indices], Array], t: Array, x: Array, direction: Array) -> Array:
+        """Return the derivative of a function along a direction, by differences as long as its error estimate allows.
+
+        ``function`` takes times and inputs of some places, and the numbers of these places.
+        """
         moving = direction != 0
         sizes = np.maximum(np.abs(np.where(np.isfinite(x), x, 0.0)), _LEAST) / np.where(moving, np.abs(direction), 1.0)
         length = _DIFFERENCE * np.where(moving, sizes, np.inf).min(axis=1)
@@ -185,10 +192,8 @@ class Interpreted:
         left = np.arange(len(x))
         for _ in range(_TIMES + 1):
             h = length[left, None]
-            sides = [
-                function(t[left], x[left] + k * h * direction[left]) - function(t[left], x[left] - k * h * direction[left])
-                for k in (1, 2)
-            ]
+            step = h * direction[left]
+            sides = [function(t[left], x[left] + k * step, left) - function(t[left], x[left] - k * step, left) for k in (1, 2)]
             with np.errstate(all="ignore"):
                 fourth = sum(weight * side for weight, side in zip(_WEIGHTS, sides)) / h
                 scale = np.abs(fourth).max(axis=1, initial=0.0) + 1e-300
@@ -216,7 +221,7 @@ class Interpreted:
         try:
             for unit in _directions(x.shape[1]):
                 direction = np.broadcast_to(unit, places.shape)
-                difference = self._difference(self._values, times, places, direction)
+                difference = self._difference(lambda t, x, _: self._values(t, x), times, places, direction)
                 known = np.all(np.isfinite(difference), axis=1)
                 step = self._complex_step(times[known], places[known], direction[known])
                 scale = 1 + np.abs(difference[known])

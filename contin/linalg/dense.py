@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array
+from contin.arrays import Array, ComplexArray
 
 
 @functools.cache
@@ -19,6 +19,19 @@ def _lapack() -> Any:
     from scipy.linalg import lapack  # type: ignore[import-untyped]
 
     return lapack
+
+
+def eigenvalues(matrix: Array) -> ComplexArray:
+    """Return the eigenvalues of a real matrix, complex; NaN where it is not finite, as outside the domain of the equations.
+
+    Examples
+    --------
+    >>> eigenvalues(np.diag([1.0, 2.0])).tolist(), eigenvalues(np.full((1, 1), np.inf)).tolist()
+    ([(1+0j), (2+0j)], [(nan+0j)])
+    """
+    if not np.all(np.isfinite(matrix)):
+        return np.full(len(matrix), np.nan, dtype=complex)
+    return np.linalg.eigvals(matrix).astype(complex, copy=False)
 
 
 class DenseFactors:

@@ -62,9 +62,38 @@ def rightmost(matrix: Any) -> ComplexArray:
     return _distinct(np.concatenate(found))
 
 
+def nearest(matrix: Any, value: complex) -> complex:
+    """Return the eigenvalue of a real sparse matrix that is nearest to a value; NaN where none is found.
+
+    Examples
+    --------
+    >>> from scipy.sparse import diags_array
+    >>> print(np.round(nearest(diags_array([np.arange(50.0)], offsets=[0]), 7.3), 9))
+    (7+0j)
+    """
+    from scipy.sparse import csc_array, eye_array
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu  # type: ignore[import-untyped]
+
+    n = matrix.shape[0]
+    shifted = csc_array(matrix, dtype=complex) - complex(value) * eye_array(n, format="csc")
+    if not np.all(np.isfinite(shifted.data)):
+        return complex("nan")
+    start = np.random.default_rng(11).standard_normal(n).astype(complex)
+    try:
+        factors = splu(shifted)
+    except RuntimeError:  # exactly singular
+        return complex(value)
+    inverse = LinearOperator((n, n), factors.solve, dtype=complex)
+    try:
+        found = eigs(inverse, 1, v0=start, tol=_TOLERANCE, return_eigenvectors=False)
+    except ArpackError:
+        return complex("nan")
+    return complex(value + 1 / found[0])
+
+
 def _transformed(matrix: Any, one: Any, pole: float, zero: float, count: int = _COUNT) -> ComplexArray:
     """Return the eigenvalues z of largest |(z + zero) / (z - pole)|, or of largest 1 / |z - pole| without a zero."""
-    from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, splu  # type: ignore[import-untyped]
+    from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, splu
 
     n = matrix.shape[0]
     try:

@@ -16,7 +16,11 @@ from contin.stepping.state import Stop
 
 @dataclass
 class Branch:
-    """The points of one branch in order, and why its run ended; ``notes`` tell what contradicts itself on it, if anything does.
+    """The points of one branch in order, and why its run ended.
+
+    ``notes`` tell what was seen and not understood, with the place: special points that were bracketed and not located, or not
+    found again on a finer mesh; a change of the index, or of the number of unstable eigenvalues, that the labelled points do
+    not explain. Empty on most branches.
 
     Examples
     --------
@@ -35,7 +39,8 @@ class Branch:
 
     def __repr__(self) -> str:
         labels = " ".join(point.label for point in self.points if point.label)
-        return f"Branch({len(self.points)} points{table.meshes(self.points)}: {labels}; {self.stop or 'not ended'})"
+        notes = f"; {len(self.notes)} note{'s' * (len(self.notes) != 1)}" if self.notes else ""
+        return f"Branch({len(self.points)} points{table.meshes(self.points)}: {labels}; {self.stop or 'not ended'}{notes})"
 
     def __len__(self) -> int:
         return len(self.points)
@@ -89,7 +94,7 @@ class Branch:
         >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
         >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
         >>> list(branch.to_pandas().columns)
-        ['label', 'name', 'arclength', 'intervals', 'degree', 'iterations', 'a', 'norm']
+        ['label', 'name', 'arclength', 'intervals', 'degree', 'iterations', 'discretization_error', 'a', 'norm']
         """
         return table.to_pandas(self.points)
 
@@ -131,4 +136,4 @@ class Branch:
         return plot.plot(self.points, x, y, axes)
 
     def _repr_html_(self) -> str:
-        return table.to_html(self.points, self.stop)
+        return table.to_html(self.points, self.stop, self.notes)

@@ -20,8 +20,8 @@ class StoredColumns:
     Attributes
     ----------
     columns : dict of str to ndarray
-        By name, one value a point: all parameters, all functionals, ``arclength``, and ``index`` where it is known (-1 where
-        it is not).
+        By name, one value a point: all parameters, all functionals, ``arclength``, ``discretization_error`` (of files that hold
+        it), and ``index`` where it is known (-1 where it is not).
     labels, names : list of str
         Of the points; "" for regular ones.
     free : tuple of str
@@ -75,7 +75,7 @@ def read_columns(path: str | Path) -> StoredColumns:
     ...     save(branch, pathlib.Path(folder) / "b.npz")
     ...     stored = read_columns(pathlib.Path(folder) / "b.npz")
     >>> list(stored.columns), stored.free, stored.states
-    (['arclength', 'a'], ('a',), ('x',))
+    (['arclength', 'discretization_error', 'a'], ('a',), ('x',))
     """
     return contents(path, _columns)
 
@@ -84,6 +84,8 @@ def _columns(head: dict[str, Any], arrays: dict[str, Array]) -> StoredColumns:
     rows, places = head["points"], [head["names"].index(name) for name in head["free"]]
     values = np.array([_parameters(head, row, arrays, number, places) for number, row in enumerate(rows)])
     columns = {"arclength": np.array([row["arclength"] for row in rows])}
+    if any("discretization_error" in row for row in rows):
+        columns["discretization_error"] = np.array([row.get("discretization_error", np.nan) for row in rows])
     columns |= dict(zip(head["names"], values.T))
     columns |= {name: np.array([row["functionals"][name] for row in rows]) for name in rows[0]["functionals"]}
     if any(row.get("index") is not None for row in rows):

@@ -31,6 +31,8 @@ _OTHER_MARK = (".", "#000000")
 _CRITICAL = ("LP", "BP", "PD", "TR", "HB")
 #: Dashes and legend of pieces, by whether they are stable; None: not known.
 _LINES = {True: ("-", "stable"), False: ((0, (3, 2)), "unstable"), None: ("-", None)}
+#: A point with a larger estimated discretization error, relative to 1 + size, is crossed out: it would be seen in the picture.
+_VISIBLE = 1e-3
 #: Areas of the marks in points squared: a star needs a larger one to look as large.
 _AREA = {"*": 90, "": 30}
 
@@ -68,6 +70,12 @@ def _draw(
         area, again = _AREA.get(marker, _AREA[""]), label in known
         axes.scatter(across[here], up[here], s=area, marker=marker, color=colour, label=None if again else label, zorder=2)
         named.add(label)
+    doubtful = [i for i, point in enumerate(points) if point.discretization_error > _VISIBLE]
+    if doubtful:
+        meaning = f"discretization error above {_VISIBLE:g}"
+        shown = None if meaning in known else meaning
+        axes.scatter(across[doubtful], up[doubtful], s=30, marker="x", color="#999999", label=shown, zorder=3)
+        named.add(meaning)
     return named
 
 
@@ -145,7 +153,7 @@ def picture(points: Sequence[Point]) -> str:
 
 
 def column(points: Sequence[Point], name: str) -> Array:
-    """Return a parameter, a functional, a state of equilibria, ``"arclength"`` or ``"norm"`` over all points.
+    """Return a parameter, functional, state of equilibria, ``"arclength"``, ``"norm"`` or ``"discretization_error"``.
 
     The norm is the root mean square of the states over the nodes.
     """
@@ -154,8 +162,8 @@ def column(points: Sequence[Point], name: str) -> Array:
     if points and name in _states(points[0]):
         at = _states(points[0]).index(name)
         return np.array([point.system.states(point.x).ravel()[at] for point in points])
-    if name == "arclength":
-        return np.array([point.arclength for point in points])
+    if name in ("arclength", "discretization_error"):
+        return np.array([getattr(point, name) for point in points])
     return np.array([np.sqrt(np.mean(np.sum(point.system.states(point.x) ** 2, axis=1))) for point in points])
 
 
@@ -169,7 +177,7 @@ def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str
     if not points:
         raise ProblemError("the branch has no points to draw")
     first = points[0]
-    known = [*first.parameters, *first.functionals, "arclength", "norm", *_states(first)]
+    known = [*first.parameters, *first.functionals, "arclength", "norm", "discretization_error", *_states(first)]
     x = first.system.free[0] if x is None else x
     states = first.system.problem.state_names if isinstance(first.system, PeriodicCollocation) else ()
     y = (states[0] if states else next(iter(first.functionals), "norm")) if y is None else y

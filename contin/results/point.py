@@ -95,6 +95,9 @@ class Point:
         at other points.
     value : float, optional
         That value, as it was given.
+    discretization_error : float
+        Estimated error of the solution that is due to the mesh: of states, their rates, free parameters and integrals, at mesh
+        points, relative to 1 + size. 0 without a mesh; NaN where errors were not asked for.
 
     Examples
     --------
@@ -124,6 +127,7 @@ class Point:
     breaks: tuple[str, ...] = ()
     column: str = ""
     value: float | None = None
+    discretization_error: float = np.nan
 
     def __getitem__(self, name: str) -> float:
         """Return a parameter, a functional, or a state of an equilibrium, by name.

@@ -98,7 +98,7 @@ def save(branch: Branch, path: str | Path) -> None:
     head = {
         "format": _OF_CURVE if curves else _FORMAT, "points": rows, "stop": stop, "free": first.free,
         "degrees": [s.degree for s in systems], "states": first.problem.states, "names": list(first.problem.parameters),
-        "symmetry": _symmetry(first.problem),
+        "symmetry": _symmetry(first.problem), "notes": list(branch.notes),
     } | ({"curves": curves, "further": further} if curves else {})  # fmt: skip
     image = io.BytesIO()
     np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
@@ -115,8 +115,10 @@ def _row(point: Point, at: int) -> dict[str, Any]:
     return {
         "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
         "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
+        "discretization_error": point.discretization_error,
         "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
         "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
+        "spread": getattr(point.details, "spread", 0.0),
         "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
         "details": _numbers(point.details), "column": point.column, "value": point.value,
     }  # fmt: skip
@@ -181,7 +183,7 @@ def load(problem: BoundaryValueProblem | AlgebraicProblem, path: str | Path) -> 
             raise ProblemError(f"{str(path)!r} is of a problem with the symmetry {head.get('symmetry')}")
         systems = [_system(problem, head, arrays, i) for i in range(len(head["degrees"]))]
         points = [_point(row, systems[row["system"]], arrays, number) for number, row in enumerate(head["points"])]
-        return Branch(points, Stop(*head["stop"]) if head["stop"] else None)
+        return Branch(points, Stop(*head["stop"]) if head["stop"] else None, list(head.get("notes", [])))
 
     return contents(path, branch)
 
@@ -275,11 +277,14 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
         details = BranchPoint(x, tuple(arrays[f"tangents{number}"]), imperfection=row["imperfection"], **kept)
     elif row.get("dimension") is not None:
         tangents = tuple(arrays[f"tangents{number}"])
-        details = MultiplePoint(row["dimension"], arrays[f"kernel{number}"], x, tangents, row["continuum"])
+        details = MultiplePoint(
+            row["dimension"], arrays[f"kernel{number}"], x, tangents, row["continuum"], row.get("spread", 0.0)
+        )
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     return Point(
         row["label"], row["name"], parameters, row["functionals"], x, arrays[f"tangent{number}"], system, row["arclength"],
         row["iterations"], row["newton_error"], row["errors"], details, row.get("index"), row.get("nullity", 0),
         None if row.get("index_change") is None else tuple(row["index_change"]), tuple(row.get("breaks", ())),
         *_column_of(row, parameters),
+        row.get("discretization_error", np.nan),
     )  # fmt: skip

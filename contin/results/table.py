@@ -22,7 +22,7 @@ def to_pandas(points: Sequence[Point]) -> Any:
     rows = [
         {
             "label": point.label, "name": point.name, "arclength": point.arclength, "intervals": point.system.intervals,
-            "degree": point.system.degree, "iterations": point.iterations,
+            "degree": point.system.degree, "iterations": point.iterations, "discretization_error": point.discretization_error,
             **({} if point.index is None else {"index": point.index}),
             **({} if point.normal_form is None else {"normal_form": point.normal_form}), **point.parameters,
             **point.functionals,
@@ -42,12 +42,13 @@ def meshes(points: Sequence[Point]) -> str:
     return f" on {between} interval{'s' * (most != 1)} of degree {points[0].system.degree}"
 
 
-def to_html(points: Sequence[Point], stop: object) -> str:
-    """Return a branch for a notebook: a picture where it can be drawn, the labelled points, and why the run ended."""
+def to_html(points: Sequence[Point], stop: object, notes: Sequence[str] = ()) -> str:
+    """Return a branch for a notebook: a picture where it can be drawn, labelled points, notes, and why the run ended."""
     count, ended = len(points), f"; {html.escape(str(stop))}" if stop else ""
     parts = [f"<p><b>Branch</b> of {count} point{'s' * (count != 1)}{meshes(points)}{ended}</p>"]
     if points:
         parts += [picture(points), _table(points)]
+    parts += [f"<p>{html.escape(note)}</p>" for note in notes]
     return f"<div>{''.join(parts)}</div>"
 
 

@@ -36,6 +36,8 @@ class State:
         The sign in which the primary parameter went where that could be told last; zero where it never could.
     sensed : ndarray, or None
         The free parameters there, in the user's units.
+    discretization_error : float
+        Estimated error of the point that is due to the mesh; NaN where it is not known.
 
     Examples
     --------
@@ -63,6 +65,7 @@ class State:
     singular: bool
     sense: float = 0.0
     sensed: Array | None = None
+    discretization_error: float = np.nan
 
     @property
     def row(self) -> Array:

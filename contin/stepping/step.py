@@ -93,8 +93,7 @@ def _corrected(state: State, guess: Array, step: float, newton: Newton, factors:
 
 def sharpened(state: State, trial: Trial) -> Trial:
     """Return the same point linearized right there (Newton leaves the factors of the iterate before)."""
-    linear = linearization(state.system, trial.x, state.row)
-    return Trial(state.system, trial.x, linear, trial.iterations, trial.newton_error)
+    return trial.sharpened(linearization(state.system, trial.x, state.row))
 
 
 def tangent_error(trial: Trial, residual: Array) -> Array:

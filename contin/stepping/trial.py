@@ -84,6 +84,7 @@ class Trial:
         self.iterations, self.newton_error = iterations, newton_error
         self._linear = linear
         self._functionals: dict[str, float] | None = None
+        self._discretization_error: float | None = None
         self._values: dict[TestFunction, float] = {}
 
     @classmethod
@@ -144,6 +145,21 @@ class Trial:
             values = self.system.functionals(self.x)
             self._functionals = dict(zip(self.system.problem.functionals, map(float, values)))
         return self._functionals
+
+    @property
+    def discretization_error(self) -> float:
+        """Estimated error that is due to the mesh, relative to 1 + size; computed with Newton's factors when asked for."""
+        if self._discretization_error is None:
+            if self.factors is None and self.system.intervals:
+                self.refactor(self.system.weights * self.tangent)
+            self._discretization_error = self.system.discretization_error(self.x, self.factors, self.functionals)
+        return self._discretization_error
+
+    def sharpened(self, linear: Linearization) -> Trial:
+        """Return the same point with a better linearization; what was computed of it is kept."""
+        other = Trial(self.system, self.x, linear, self.iterations, self.newton_error)
+        other._functionals, other._discretization_error = self._functionals, self._discretization_error
+        return other
 
     def __getitem__(self, name: str) -> float:
         """Return a parameter, a functional, or a state of an equilibrium, by name."""

@@ -163,6 +163,30 @@ def test_sensitivity_of_a_user_zero():
         sensitivities(here, by=["lam"])
 
 
+BRUSSELATOR = AlgebraicProblem(
+    lambda u, p: (p.A - (p.B + 1) * u.x + u.x**2 * u.y, p.B * u.x - u.x**2 * u.y), ["x", "y"], {"A": 1.5, "B": 1.0}
+)
+
+
+def test_sensitivity_of_a_hopf_point():
+    """Of the Brusselator's at B = 1 + A^2."""
+    branch = trace(solve(BRUSSELATOR, [1.5, 0.7]), free=["B"], limits={"B": (1, 5)})
+    (hopf,) = branch.labelled("HB")
+    assert sensitivities(hopf)["A"]["B"] == pytest.approx(3.0, abs=1e-8)
+    assert sensitivities(branch.points[0])["A"]["B"] == pytest.approx(0, abs=1e-12)  # an end: the first free parameter is held
+
+
+def test_what_is_held_must_be_a_column():
+    branch = trace(solve(BRUSSELATOR, [1.5, 0.7]), free=["B"], limits={"B": (1, 5)}, extrema=["B"], test_functions=[
+        TestFunction("UZ", "large", lambda trial: trial["y"] - 2)])  # fmt: skip
+    (large,) = branch.labelled("UZ")  # y = B / A = 2
+    with pytest.raises(ProblemError, match="held: must be given at a point UZ 'large'"):
+        sensitivities(large)
+    with pytest.raises(ProblemError, match="held: 'z' is no column of this problem"):
+        sensitivities(large, held="z")
+    assert sensitivities(large, held="y")["A"]["B"] == pytest.approx(2, abs=1e-8)
+
+
 def test_bad_starts():
     branch = cusp_branch()
     with pytest.raises(ProblemError, match="must be one of LP, BP"):

@@ -1,7 +1,5 @@
 """Error estimates of special points: not smaller than the error, and none where the point is not found again."""
 
-import math
-
 import pytest
 from bank import abc, bru
 from bank.closed_forms import bratu
@@ -21,8 +19,8 @@ def test_branch_points_on_a_coarse_mesh_are_refined_to_themselves():
         assert abs(point["L"] - length) < point.errors["L"] < 1e-6
 
 
-def test_a_point_that_runs_away_on_finer_meshes_stays_as_it_was(monkeypatch):
-    """No estimate is given then, rather than a wrong one."""
+def test_a_point_that_runs_away_on_finer_meshes_gets_no_label(monkeypatch):
+    """It is noted, with where it was seen."""
     start = solve(bratu(), [0, 0], degree=6)
     settings = Settings(limits={"lam": (0, 4), "mean": (-1, 1)})
     coarse = trace(start, settings, free=["lam"], errors=False)
@@ -31,8 +29,12 @@ def test_a_point_that_runs_away_on_finer_meshes_stays_as_it_was(monkeypatch):
         return Trial(system, x + 0.5, Linearization(tangent, 1.0))
 
     monkeypatch.setattr(refinement, "_zero_again", elsewhere)
-    (fold,) = trace(start, settings, free=["lam"]).labelled("LP")
-    assert fold["lam"] == coarse.labelled("LP")[0]["lam"] and math.isnan(fold.errors["lam"])
+    branch = trace(start, settings, free=["lam"])
+    assert not branch.labelled("LP")
+    (note,) = branch.notes
+    assert note.startswith("a possible LP lam was not found again on a finer mesh (between lam = ")
+    low, high = map(float, note.rstrip(")").partition("lam = ")[2].split(" and "))
+    assert max(low, high) < coarse.labelled("LP")[0]["lam"] and "1 note" in repr(branch)
 
 
 @pytest.mark.parametrize("case", abc.CASES, ids=lambda case: case.name)

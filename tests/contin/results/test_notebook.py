@@ -21,7 +21,8 @@ def branch():
 def test_table_has_every_point(branch):
     table = branch.to_pandas()
     assert len(table) == len(branch)
-    assert list(table) == ["label", "name", "arclength", "intervals", "degree", "iterations", "lam", "mean", "norm"]
+    columns = ["label", "name", "arclength", "intervals", "degree", "iterations", "discretization_error", "lam", "mean", "norm"]
+    assert list(table) == columns
     assert np.array_equal(table["lam"], branch.column("lam"))
     assert table[table.label == "LP"].lam.iloc[0] == pytest.approx(bratu_fold(), abs=1e-11)
     assert contin.Branch().to_pandas().empty
