@@ -78,6 +78,9 @@ def _half_plane(values: ComplexArray) -> Any:
 
 def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the Hopf points between places of a step, in order."""
+    symmetric: Any = getattr(segment.trial.system, "is_symmetric", None)
+    if symmetric is not None and symmetric(segment.state.x) and symmetric(segment.trial.x):
+        return []  # all eigenvalues are real
     inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda knot: knot[0])
     if any(_passes_as_pair(left[1], right[1]) for left, right in itertools.pairwise(looked)):

@@ -224,6 +224,13 @@ class Algebraic(System):
             return self._found[key]
         return eigenvalues(self.jacobian(x))
 
+    def is_symmetric(self, x: Array) -> bool:
+        """Return whether F_u is a large symmetric matrix, up to round-off: its eigenvalues are real."""
+        if not self.is_sparse:
+            return False
+        matrix: Any = self.as_field().field_jacobian(x)
+        return bool(abs(matrix - matrix.T).max() <= _SYMMETRIC * abs(matrix).max())
+
     def eigenvalue_near(self, x: Array, value: complex) -> complex:
         """Return the eigenvalue of F_u that is nearest to a value; NaN where none is found."""
         if self.is_sparse:
@@ -315,6 +322,8 @@ _FEW = 0.1
 #: Sets of eigenvalues that are kept: more than a search for Hopf points compares.
 _KEPT = 16
 #: The t of functions that do not take it.
+#: Entries on both sides of the diagonal that differ by less, relative to the largest entry, are equal: round-off of sums.
+_SYMMETRIC = 1e-13
 _NO_TIME = np.zeros(1)
 
 

@@ -216,6 +216,10 @@ class MapSystem(Algebraic):
         values.real = np.maximum(values.real, np.log(_NO_MULTIPLIER))
         return values
 
+    def is_symmetric(self, x: Array) -> bool:
+        """Return False: F_u couples the points of a cycle."""
+        return False
+
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a torus bifurcation; None near a double multiplier -1."""
         return None if is_opposite(frequency) else ("TR", "torus")
