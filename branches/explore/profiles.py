@@ -34,7 +34,8 @@ def gathered(files: list[Path]) -> dict:
     if not free:
         raise StoreError(f"the branches have no free parameter in common; that of {str(files[0])!r} is {', '.join(first.free)}")
     axes = [name for name in common if name != "index" and _varies(name, stored)]
-    upwards = [name for name in axes if name not in (*free, "arclength", NORM)] + [NORM]
+    beside = ("arclength", "discretization_error", NORM)  # not what a branch is drawn by at first
+    upwards = [name for name in axes if name not in (*free, *beside)] + [NORM]
     branches = [_branch(path, one, axes) for path, one in stored.items()]
     family = {"name": "branches", "parameter": free[0], "branches": branches, "circles": []}
     return {

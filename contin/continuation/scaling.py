@@ -45,6 +45,9 @@ _LASTS = 0.1
 #: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16, the
 #: finite time of a homoclinic orbit 2e-11. A true value that is smaller is known to four digits with the larger size.
 _NOTHING = 1e-8
+#: A parameter that changes less than this while the branch goes on by one stands still: a fold. Ten times larger, a parameter of
+#: that unit must have its size stated.
+_STILL = 1e-12
 #: Largest number of states that are looked at one by one: more would take longer than the run.
 _MOST = 200
 #: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
@@ -100,7 +103,7 @@ class _FirstPoint:
         self.place = system.parameter_index(primary)
         self.at = len(system.problem.states) + system.free.index(primary)
         rate = linear.tangent[self.place]
-        self.tangent = linear.tangent / rate if rate else np.zeros_like(x)
+        self.tangent = linear.tangent / rate if abs(rate) > _STILL else np.zeros_like(x)
         self._random = np.random.default_rng(11)
 
     def sizes(self, stated: Array, said: float) -> Array:
@@ -109,7 +112,9 @@ class _FirstPoint:
         values = _largest(self.system, self.x)
         known = np.where(stated > 0, stated, np.where(values > error, values, 0.0))
         self.tangent = self._kept(self.tangent, _largest(self.system, self.tangent) > error_of_tangent)
-        if not self.tangent.any() or any(batch.interpreted is not None for batch in self.system._evaluated):
+        if not self.tangent.any():  # a fold: sizes that are small are known on the branch that led here
+            return np.where((known > _NOTHING) | (stated > 0), known, 0.0)
+        if any(batch.interpreted is not None for batch in self.system._evaluated):
             return known  # differences are taken over lengths of order one: they show no other sizes
         at = np.arange(known.size) == self.at
         terms = [_largest(self.system, term) for term in self._terms()]
@@ -120,6 +125,7 @@ class _FirstPoint:
         change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
         natural = _larger(natural, _sizes(terms, change), ~at, error)
         branches = [self._settled_branch(mode) for mode in modes if mode.vector.any()]
+        branches = [(parts, size) for parts, size in branches if np.any(parts)]  # some are nothing but what changes
         held = [_held(size, parts[0], known) for parts, size in branches]
         for (parts, _), size in zip(branches, held):
             if np.isfinite(size):

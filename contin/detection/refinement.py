@@ -30,8 +30,10 @@ _HALVINGS = 4
 _UNITS = 16
 #: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
 _FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
-#: ... or one that leads further than this from the point of the coarser mesh, in units of the arclength.
-_AWAY = 0.3
+#: Rates of a parameter below this on both sides of a fold are round-off: on a plateau it changes by 1e-12 on the first step.
+_FLAT = 1e-9
+#: A step of it that leads further than this from the point of the coarser mesh, in units of the arclength, ends it, too.
+_AWAY = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +150,8 @@ def _zero_again(system: Discretization, x: Array, tangent: Array, test: TestFunc
             return trial
         trial, before = at(s), value
         value = test.function(trial)
+        if test.label == "LP" and max(abs(before), abs(value)) < _FLAT:
+            return trial  # the parameter stands still all around: its value there is that of the fold
         if abs(s - last) < _LAST:
             return trial
         if value == before:

@@ -18,6 +18,8 @@ _IDLE = 1e3
 #: A value where the bracket closes is no zero if it is above this part of the larger one at its first ends: the function jumps.
 #: At a zero with an infinite slope, as of a square root, it is 1e-6 of them.
 _JUMP = 1e-3
+#: A value at one end below this part of that at the other is round-off of zero.
+_NOISE = 1e-13
 #: A zero takes 4 evaluations on average; where as many as bisection to round-off would need do not do, the function jumps.
 _MOST_EVALUATIONS = 60
 
@@ -49,7 +51,8 @@ def find_zero(
         return b
     known = [left, right]
     best, idle, c, fc = (np.inf, b), 0, guess, np.nan
-    small = _JUMP * max(abs(fa), abs(fb))
+    small, least = _JUMP * max(abs(fa), abs(fb)), min(abs(fa), abs(fb))
+    level = least / 2 if least > _NOISE * max(abs(fa), abs(fb)) else np.inf  # a value that stays above it has not come nearer
     for _ in range(_MOST_EVALUATIONS):
         if c is None or not min(a, b) < c < max(a, b):
             c = b - fb * (b - a) / (fb - fa)
@@ -69,6 +72,9 @@ def find_zero(
         if following is None:
             following = b - fb * (b - a) / (fb - fa)
         move = abs(following - c)
+        if move < _IDLE * tolerance and level <= abs(fc) <= small:
+            c = (a + b) / 2  # it is as small all along one side, and jumps somewhere
+            continue
         if move <= tolerance and abs(fc) <= small:
             return c
         idle = idle + 1 if move < _IDLE * tolerance and abs(fc) > best[0] / 2 else 0

@@ -177,7 +177,8 @@ def _settled(
 ) -> Corrected:
     """Go on until the update is small relative to the size of each unknown, or round-off, or leads to zero.
 
-    An unknown that is zero has no size: its updates vanish much faster than they become small.
+    An unknown that is zero has no size: its updates vanish much faster than they become small. What is left of it is round-off
+    of the iterate before.
 
     Raises
     ------
@@ -185,6 +186,7 @@ def _settled(
         It does not become so; the message holds the last updates, relative to these sizes.
     """
     rows, relative, before = () if row is None else (row,), [], np.zeros_like(x)
+    noise = np.zeros_like(x)
     for _ in range(newton.max_iterations):
         residual, factors = system.linearize(x, rows)
         update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
@@ -193,7 +195,8 @@ def _settled(
             break
         least = newton.tolerance * np.maximum(sizes(x), before)
         if not np.all(np.abs(update) <= least):
-            least = np.maximum(least, UNITS * rounded_off(system, x, rows))
+            now = rounded_off(system, x, rows)
+            least, noise = np.maximum(least, UNITS * np.maximum(noise, now)), now
         small = np.all(np.abs(update) <= least)
         error, before = _move(x, update), np.abs(update)
         if small:

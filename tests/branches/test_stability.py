@@ -91,7 +91,8 @@ def test_the_index_ends_with_the_law(silent, tmp_path):
     scene = "{m: 3, n: 1, law: finite width, Gamma: 10, stability: true, limits: {kappa_n: [-60, 100]}, stride: 50}"
     assert run_branch(parse(scene, "scene"), tmp_path / "x.h5", silent()) == "complete"
     branch = read_branch(tmp_path / "x.h5")
-    assert branch.events[-1]["name"] == b"the end of the convex strain energy" and branch.events[-1]["index"] == -1
+    assert branch.events[-1]["name"] == b"the end of the convex strain energy"
+    assert branch.events[-1]["index"] in (-1, branch.points["index"][-2])  # right at the end there may be one
 
 
 #: Primary branches of the ribbon and nu, and the number of their secondary bifurcations down to kappa_n = -150.

@@ -105,3 +105,10 @@ def test_a_jump_is_not_taken_for_a_zero_where_the_place_is_to_be_known_better_th
 def test_a_jump_is_no_zero(function):
     with pytest.raises(ConvergenceError, match="no zero between"):
         find_zero(function, (0.0, function(0.0)), (1.0, function(1.0)), 1e-12)
+
+
+def test_a_small_step_before_a_jump_is_no_zero():
+    """1e-10 up to .3 and -1 beyond: small all along one side, it has no zero."""
+    with pytest.raises(ConvergenceError, match="no zero"):
+        find_zero(lambda x: 1e-10 * (1 - 1e-3 * x) if x < 0.3 else -1.0, (0.0, 1e-10), (1.0, -1.0), 1e-12)
+    assert find_zero(lambda x: 1e-10 - x, (0.0, 1e-10), (1.0, -1.0), 1e-14) == pytest.approx(1e-10, rel=1e-6)
