@@ -63,7 +63,7 @@ def curves(folder: Path) -> Section:
 
 
 def _highest(line: np.ndarray) -> tuple[float, float]:
-    """Return the largest nu of a curve (nu, kappa_n), and kappa_n there, from the polynomial through the five highest points."""
+    """Return the largest nu of a curve (nu, kappa_n), and kappa_n there, by the polynomial through its five highest points."""
     near = line[np.argsort(-line[:, 0])[:5]]
     nu = np.polynomial.Polynomial.fit(near[:, 1], near[:, 0], 4)
     low, high = near[:, 1].min(), near[:, 1].max()

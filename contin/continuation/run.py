@@ -165,6 +165,7 @@ class Continuation:
     ) -> None:
         self.settings = settings
         self.stop: Stop | None = None
+        self._is_noisy = False  # some point is not known to the tolerance
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         self._check(system)
         self.primary = settings.primary or system.free[0]
@@ -328,6 +329,11 @@ class Continuation:
                 return
         self.state = self._accept(segment, distance, inspection.turns)
         self._end = segment.trial
+        if segment.trial.newton_error > self.settings.newton.tolerance and not self._is_noisy:
+            self._is_noisy = True
+            self._note(
+                "from here on the updates of Newton's method are round-off above its tolerance: see newton_error", segment
+            )
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
         elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:

@@ -45,8 +45,8 @@ _LASTS = 0.1
 #: A value below this part of the size that the expansion gives is zero: sin(pi) in a boundary condition leaves 1e-16, the
 #: finite time of a homoclinic orbit 2e-11. A true value that is smaller is known to four digits with the larger size.
 _NOTHING = 1e-8
-#: A parameter that changes less than this while the branch goes on by one stands still: a fold. Ten times larger, a parameter of
-#: that unit must have its size stated.
+#: A parameter that changes less than this while the branch goes on by one stands still: a fold. Ten times larger, a parameter
+#: of that unit must have its size stated.
 _STILL = 1e-12
 #: Largest number of states that are looked at one by one: more would take longer than the run.
 _MOST = 200
@@ -103,8 +103,14 @@ class _FirstPoint:
         self.place = system.parameter_index(primary)
         self.at = len(system.problem.states) + system.free.index(primary)
         rate = linear.tangent[self.place]
-        self.tangent = linear.tangent / rate if abs(rate) > _STILL else np.zeros_like(x)
+        self.tangent = np.zeros_like(x) if self._stands_still(rate) else linear.tangent / rate
         self._random = np.random.default_rng(11)
+
+    def _stands_still(self, rate: float) -> bool:
+        """Return whether the primary parameter stands still while states go on: by itself, and relative to all values."""
+        value, moving = abs(self.x[self.place]), (self.x != 0) & (self.linear.tangent != 0)
+        fastest = np.max(np.abs(self.linear.tangent[moving] / self.x[moving]), initial=0.0)
+        return bool(abs(rate) <= _STILL and abs(rate) <= _STILL * fastest * value)
 
     def sizes(self, stated: Array, said: float) -> Array:
         """Return sizes; 0 where nothing is known. ``stated`` are those that are given, ``said`` bounds that of the primary."""

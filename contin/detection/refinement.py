@@ -30,8 +30,8 @@ _HALVINGS = 4
 _UNITS = 16
 #: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
 _FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
-#: Rates of a parameter below this on both sides of a fold are round-off: on a plateau it changes by 1e-12 on the first step.
-_FLAT = 1e-9
+#: Rates of a parameter below this on both sides of a fold are round-off: on a plateau it changes by 1e-15 on the first step.
+_FLAT = 1e-12
 #: A step of it that leads further than this from the point of the coarser mesh, in units of the arclength, ends it, too.
 _AWAY = 1.0
 

@@ -39,6 +39,8 @@ UNITS = 30
 _DRAWS = 3
 #: A larger update is not taken for round-off in any case. Ten times larger, a matrix that is singular could pass.
 _COARSE = 1e-3
+#: Nor is one larger than this on the way: stiff meshes of strips leave 1e-8. Ten times larger, a step could end elsewhere.
+_STAGNANT = 1e-6
 #: An update of a few units in the last place: with it x solves the equations as well as any number can.
 _EXACT = 1e-15
 
@@ -167,8 +169,9 @@ def _newton(
                 break
             if progress.wants_jacobian:
                 factors = None
-        if sizes is not None and _is_noise(system, x, update, rows):
-            return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), progress.sizes[-1])
+        coarse = _COARSE if sizes is not None else _STAGNANT
+        if size <= coarse and _is_noise(system, x, update, rows, coarse):
+            return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), max(progress.sizes[-2:]))
     raise _failure(progress.sizes)
 
 
@@ -256,7 +259,7 @@ _ENOUGH = (0.5, 0.2)
 _NEAR, _MOST_DAMPED, _LEAST_PART = 1e-2, 100, 1e-4
 
 
-def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...]) -> bool:
+def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...], coarse: float) -> bool:
     """Return whether an update is no larger than round-off of x makes it.
 
     With unknowns of very different sizes, round-off of the large ones reaches the small ones.
@@ -265,7 +268,7 @@ def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...
     if not (np.all(np.isfinite(noise)) and np.all(np.isfinite(update))):
         return False
     level = float(np.max(noise / (1 + np.abs(x))))
-    return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(UNITS * level, _COARSE))
+    return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(UNITS * level, coarse))
 
 
 def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Array:

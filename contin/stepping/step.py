@@ -50,10 +50,11 @@ def up_to_limits(state: State, limits: Mapping[str, Sequence[float]], least: flo
         rate, value = state.tangent[at] * size, state.x[at] * size
         earlier = state.previous_tangent
         bend = 0.0 if earlier is None else (rate - earlier[at] * size) / (2 * state.previous_step)
-        room = limits[name][int(rate > 0)] - value
-        square = rate * rate + 4 * bend * room
-        if rate * room > 0 and square >= 0:
-            step = min(step, _BEYOND * 2 * room / (rate + math.copysign(math.sqrt(square), rate)))
+        with np.errstate(over="ignore"):  # a limit may be the largest number
+            room = limits[name][int(rate > 0)] - value
+            square = rate * rate + 4 * bend * room
+            if rate * room > 0 and square >= 0:
+                step = min(step, _BEYOND * 2 * room / (rate + math.copysign(math.sqrt(square), rate)))
     return max(step, least)
 
 

@@ -613,7 +613,7 @@ def test_page_of_a_stored_branch_holds_its_columns_and_states(stored):
     data = data_of(folder / "bratu.html")
     ((about,),) = [family["branches"] for family in data["families"]]
     assert (data["kind"], data["shown"], [axis[0] for axis in data["axes"]]) == (
-        "branches", ["lam", "mean"], ["arclength", "lam", "mean", "norm"],
+        "branches", ["lam", "mean"], ["arclength", "discretization_error", "lam", "mean", "norm"],
     )  # fmt: skip
     for name in ("lam", "mean"):
         assert np.array_equal(column(about, name), branch.column(name))
