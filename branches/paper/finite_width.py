@@ -84,7 +84,7 @@ def fold_curve() -> tuple[np.ndarray, tuple[float, float]]:
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 2, NU, 10, 7, Gamma=10.0)
     branch = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}), tangent)
     fold = branch.labelled("LP")[0]
-    limits = {"Gamma": (4.0, 2000.0), "M2": (1e-3, 50.0)}
+    limits = {"Gamma": (4.0, 2000.0), "M2": (-1e-3, 50.0)}
     up, down = (curve(fold, "Gamma", direction=sense, limits=limits, zeros={"Gamma": CHECKED[1:]}) for sense in (1, -1))
     (birth,) = down.labelled("BP")  # the last point
     fold = np.array([(point["Gamma"], point["kappa_n"]) for point in [*reversed(down.points), *up.points[1:]]])

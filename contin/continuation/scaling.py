@@ -120,7 +120,8 @@ class _FirstPoint:
         self.tangent = self._kept(self.tangent, _largest(self.system, self.tangent) > error_of_tangent)
         if not self.tangent.any():  # a fold: sizes that are small are known on the branch that led here
             return np.where((known > _NOTHING) | (stated > 0), known, 0.0)
-        if any(batch.interpreted is not None for batch in self.system._evaluated):
+        own = type(self.system).along is not Discretization.along  # a kind of system of others has differences
+        if not own or any(batch.interpreted is not None for batch in self.system._evaluated):
             return known  # differences are taken over lengths of order one: they show no other sizes
         at = np.arange(known.size) == self.at
         terms = [_largest(self.system, term) for term in self._terms()]

@@ -276,7 +276,7 @@ def test_a_flat_rod_of_no_width():
 def test_the_fold_of_1_2_is_born_at_the_pitchfork():
     """Gamma is a parameter like any other: the curve of folds runs down to where it meets the branch point of the circle."""
     fold = branch(1, 2, 10.0).labelled("LP")[0]
-    folds = contin.curve(fold, "Gamma", direction=-1, limits={"Gamma": (4, 20), "M2": (1e-3, 50)})
+    folds = contin.curve(fold, "Gamma", direction=-1, limits={"Gamma": (4, 20), "M2": (-1e-3, 50)})
     (birth,) = folds.labelled("BP")
     assert 4 < birth["Gamma"] < 5
     assert birth["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 1, 2, NU, birth["Gamma"])[0], abs=1e-9)
