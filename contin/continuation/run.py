@@ -85,6 +85,8 @@ _SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
 #: the curvature, it is one half.
 _MISSED = 0.75
 #: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. Twice the error that
+#: Round-off above the tolerance is noted from this error on: ten times smaller, runs in small units that soon change would be.
+_NOISY = 1e-9
 #: Newton's method left comes on top: where cycles shrink onto a Hopf point it is 1e-10, and steps of 1e-6 were refused.
 _NOISE = 1e-12
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
@@ -329,7 +331,7 @@ class Continuation:
                 return
         self.state = self._accept(segment, distance, inspection.turns)
         self._end = segment.trial
-        if segment.trial.newton_error > self.settings.newton.tolerance and not self._is_noisy:
+        if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
             self._is_noisy = True
             self._note(
                 "from here on the updates of Newton's method are round-off above its tolerance: see newton_error", segment
