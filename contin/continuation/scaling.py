@@ -142,7 +142,7 @@ class _FirstPoint:
                 sizes = _sizes(parts, _balanced(parts, np.where(known > 0, known, natural)))
                 natural = _larger(natural, sizes, natural == 0, error)
         found = np.where(_counts(known, natural) | (stated > 0), known, natural)
-        small = (found < USUAL[0]) & (stated == 0) & ~at
+        small = (found > 0) & (found < USUAL[0]) & (stated == 0) & ~at
         apart = self._apart(small)
         return np.where(small & ~_counts(found, apart), apart, found)
 
@@ -272,11 +272,13 @@ class _FirstPoint:
     def _equal(self, term: Array, mode: _Mode) -> float:
         """Return how much longer a null vector is than a term along it: what the power method leaves of the term.
 
-        Infinity where that is nothing but round-off.
+        Infinity where that is nothing but round-off. Only states that take part in the null vector count: others may have
+        larger eigenvalues.
         """
-        left = term
+        mine = _largest(self.system, mode.vector) > 0
+        left = term = self._kept(term, mine)
         for _ in range(_ITERATIONS if term.any() else 0):
-            left = self._changed(left, self.tangent, mode.order) / mode.rate
+            left = self._kept(self._changed(left, self.tangent, mode.order) / mode.rate, mine)
         size = float(np.linalg.norm(left))
         return float(np.linalg.norm(mode.vector)) / size if size > _NOTHING * np.linalg.norm(term) else np.inf
 
