@@ -48,6 +48,9 @@ _NOTHING = 1e-8
 #: A parameter that changes less than this while the branch goes on by one stands still: a fold. Ten times larger, a parameter
 #: of that unit must have its size stated.
 _STILL = 1e-12
+#: A size that only a null vector gives is a guess on the side of small ones: above this it is one. Guesses of 1e-3 to 8e-3
+#: make a branch of configs/open_shear.yaml so long that its points do not do.
+_FAR = 9e-4
 #: Largest number of states that are looked at one by one: more would take longer than the run.
 _MOST = 200
 #: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
@@ -144,7 +147,9 @@ class _FirstPoint:
         found = np.where(_counts(known, natural) | (stated > 0), known, natural)
         small = (found > 0) & (found < USUAL[0]) & (stated == 0) & ~at
         apart = self._apart(small)
-        return np.where(small & ~_counts(found, apart), apart, found)
+        found = np.where(small & ~_counts(found, apart), apart, found)
+        guessed = (known == 0) & (terms[0] == 0) & (stated == 0) & ~at
+        return np.where(guessed & (found > _FAR), np.maximum(found, 1.0), found)
 
     def counts(self, name: str, size: float, sizes: Array) -> bool:
         """Return whether a small value of a parameter is more than nothing: without it, a state would change."""
