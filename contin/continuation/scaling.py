@@ -51,6 +51,8 @@ _STILL = 1e-12
 #: A size that only a null vector gives is a guess on the side of small ones: above this it is one. Guesses of 1e-3 to 8e-3
 #: make a branch of configs/open_shear.yaml so long that its points do not do.
 _FAR = 9e-4
+#: One below this part of the largest is round-off that passed as part of the vector: 2e-14 under one of OpenBLAS's kernels.
+_FAINT = 1e-11
 #: Largest number of states that are looked at one by one: more would take longer than the run.
 _MOST = 200
 #: Highest order of the expansion where functions are recorded: a branch that leaves as x^5 has a size, as x^7 none.
@@ -149,7 +151,8 @@ class _FirstPoint:
         apart = self._apart(small)
         found = np.where(small & ~_counts(found, apart), apart, found)
         guessed = (known == 0) & (terms[0] == 0) & (stated == 0) & ~at
-        return np.where(guessed & (found > _FAR), np.maximum(found, 1.0), found)
+        nothing = found < _FAINT * np.max(found[guessed], initial=0.0)
+        return np.where(guessed & ((found > _FAR) | nothing), np.where(nothing, 0.0, np.maximum(found, 1.0)), found)
 
     def counts(self, name: str, size: float, sizes: Array) -> bool:
         """Return whether a small value of a parameter is more than nothing: without it, a state would change."""
