@@ -82,7 +82,7 @@ def advice(state: State, settings: Settings) -> str:
             return f"the run goes on with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
     for part in _SHORTER:
         shorter = part * settings.min_step
-        if _goes_on(state, dataclasses.replace(settings, min_step=shorter, step=max(shorter, settings.step)), way):
+        if _goes_on(state, dataclasses.replace(settings, min_step=shorter), way):
             return f"the run goes on with steps of {shorter:g}: set min_step to that or less"
     finer = _on_finer_mesh(state)
     return _mesh_advice(finer.system, settings) if finer is not None and _goes_on(finer, settings, way) else ""

@@ -85,10 +85,10 @@ _SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
 #: the curvature, it is one half.
 _MISSED = 0.75
 #: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. Twice the error that
-#: Round-off above the tolerance is noted from this error on: ten times smaller, runs in small units that soon change would be.
-_NOISY = 1e-9
 #: Newton's method left comes on top: where cycles shrink onto a Hopf point it is 1e-10, and steps of 1e-6 were refused.
 _NOISE = 1e-12
+#: Round-off above the tolerance is noted from this error on: ten times smaller, runs in small units that soon change would be.
+_NOISY = 1e-9
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
 _ROUNDS = 3
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as

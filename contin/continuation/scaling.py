@@ -70,7 +70,7 @@ def scaled(
         return system, x
     problem, states = system.problem, list(system.problem.states)
     names, stated = [*states, *system.free], settings.scales
-    sizes, held = _largest(system, x), dict(zip(problem.parameters, np.abs(system.parameters)))
+    sizes, held = system.largest(x), dict(zip(problem.parameters, np.abs(system.parameters)))
     if np.any(sizes < USUAL[0]) or any(0 < size < USUAL[0] for size in held.values()):
         first = _FirstPoint(system, x, linear, primary, settings.newton)
         sizes = first.sizes(np.array([stated.get(name, 0.0) for name in names]), _said(primary, settings))
@@ -120,16 +120,16 @@ class _FirstPoint:
     def sizes(self, stated: Array, said: float) -> Array:
         """Return sizes; 0 where nothing is known. ``stated`` are those that are given, ``said`` bounds that of the primary."""
         error, error_of_tangent = self._errors()
-        values = _largest(self.system, self.x)
+        values = self.system.largest(self.x)
         known = np.where(stated > 0, stated, np.where(values > error, values, 0.0))
-        self.tangent = self._kept(self.tangent, _largest(self.system, self.tangent) > error_of_tangent)
+        self.tangent = self._kept(self.tangent, self.system.largest(self.tangent) > error_of_tangent)
         if not self.tangent.any():  # a fold: sizes that are small are known on the branch that led here
             return np.where((known > _NOTHING) | (stated > 0), known, 0.0)
         own = type(self.system).along is not Discretization.along  # a kind of system of others has differences
         if not own or any(batch.interpreted is not None for batch in self.system._evaluated):
             return known  # differences are taken over lengths of order one: they show no other sizes
         at = np.arange(known.size) == self.at
-        terms = [_largest(self.system, term) for term in self._terms()]
+        terms = [self.system.largest(term) for term in self._terms()]
         modes = list(self._modes(known))
         reach = min([_reach(terms), *(mode.distance for mode in modes)])
         reach = _held(reach, terms[0], np.where(at, 0.0, known))
@@ -160,7 +160,7 @@ class _FirstPoint:
             return True
         with np.errstate(all="ignore"):
             column = self.system.parameter_columns(self.x, (name,))[:, 0]
-            change = size * _largest(self.system, self._factors.solve(np.append(column, 0.0)))
+            change = size * self.system.largest(self._factors.solve(np.append(column, 0.0)))
         return bool(np.any(change > _NOTHING * sizes))
 
     # --- the expansion -------------------------------------------------------------------------------------------
@@ -179,7 +179,7 @@ class _FirstPoint:
             found, other = self._factors.solve(both) if right.any() else np.zeros_like(both)
         if not np.all(np.isfinite(found)):
             return np.zeros_like(found)
-        return self._kept(found, _largest(self.system, found) > UNITS * _largest(self.system, found - other))
+        return self._kept(found, self.system.largest(found) > UNITS * self.system.largest(found - other))
 
     def _modes(self, known: Array) -> Iterator[_Mode]:
         """Return singular points along the branch: the nearest one, then those of states that take no part in it."""
@@ -189,7 +189,7 @@ class _FirstPoint:
             if mode is None:
                 return
             yield mode
-            part = _largest(self.system, mode.vector) > 0
+            part = self.system.largest(mode.vector) > 0
             if not np.any(part & left):
                 return
             left = left & ~part
@@ -237,9 +237,9 @@ class _FirstPoint:
         mode, sign = max(((v + image, 1.0), (v - image, -1.0)), key=lambda pair: float(np.linalg.norm(pair[0])))
         missed = self._changed(mode, direction, order) / rate - sign * mode
         noise = self._changed(self._rounded(v), direction, order) / rate - image
-        errors = np.maximum(_largest(self.system, missed) / _LASTS, UNITS * _largest(self.system, noise))
-        found = self._kept(mode, _largest(self.system, mode) > errors)
-        alone, left_out = (_largest(self.system, each) for each in (found, self._changed(found, direction, order)))
+        errors = np.maximum(self.system.largest(missed) / _LASTS, UNITS * self.system.largest(noise))
+        found = self._kept(mode, self.system.largest(mode) > errors)
+        alone, left_out = (self.system.largest(each) for each in (found, self._changed(found, direction, order)))
         return np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found
 
     def _settled_branch(self, mode: _Mode) -> tuple[list[Array], float]:
@@ -261,7 +261,7 @@ class _FirstPoint:
         At this size a term of higher order in a, there or at the singular point, is as large along v as the change of F_x v
         from here to the singular point. It is infinity where F is linear along v.
         """
-        v, size, parts, second = mode.vector, np.inf, [_largest(self.system, mode.vector)], np.zeros_like(mode.vector)
+        v, size, parts, second = mode.vector, np.inf, [self.system.largest(mode.vector)], np.zeros_like(mode.vector)
         for order in range(2, _HIGHEST + 1):
             if order > 3 and np.isfinite(size):
                 break
@@ -274,7 +274,7 @@ class _FirstPoint:
             if order == 3:
                 here = here - self._solved([v, second])
             size = min(size, *(self._equal(term, mode) ** (1 / (order - 1)) for term in (here, there)))
-            parts.append(np.maximum(_largest(self.system, here), _largest(self.system, there)))
+            parts.append(np.maximum(self.system.largest(here), self.system.largest(there)))
         return parts, size
 
     def _equal(self, term: Array, mode: _Mode) -> float:
@@ -283,7 +283,7 @@ class _FirstPoint:
         Infinity where that is nothing but round-off. Only states that take part in the null vector count: others may have
         larger eigenvalues.
         """
-        mine = _largest(self.system, mode.vector) > 0
+        mine = self.system.largest(mode.vector) > 0
         left = term = self._kept(term, mine)
         for _ in range(_ITERATIONS if term.any() else 0):
             left = self._kept(self._changed(left, self.tangent, mode.order) / mode.rate, mine)
@@ -297,15 +297,15 @@ class _FirstPoint:
         system, x, at = self.system, self.x, self.place
         row = system.weights * self.linear.tangent
         other = linearization(system, self._rounded(x), row).tangent
-        error = UNITS * _largest(system, rounded_off(system, x, (row,)))
+        error = UNITS * system.largest(rounded_off(system, x, (row,)))
         rate = other[at] or 1.0
-        error_of_tangent = UNITS * _largest(system, other / rate - self.tangent)
+        error_of_tangent = UNITS * system.largest(other / rate - self.tangent)
         finer = None if system.refined() is None else on_finer_mesh(Trial(system, x, self.linear), self._newton)
         if finer is not None:
             carry, rate = system.carrier(finer.system), finer.tangent[finer.system.parameter_index(self._primary)] or 1.0
-            error = np.maximum(error, 2 * _largest(finer.system, finer.x - carry(x)))
+            error = np.maximum(error, 2 * finer.system.largest(finer.x - carry(x)))
             turned = finer.tangent / rate - carry(self.tangent)
-            error_of_tangent = np.maximum(error_of_tangent, 2 * _largest(finer.system, turned))
+            error_of_tangent = np.maximum(error_of_tangent, 2 * finer.system.largest(turned))
         return error, error_of_tangent
 
     @property
@@ -323,12 +323,6 @@ class _FirstPoint:
         kept_states = np.tile(kept[:count], self.system.state_size // count)
         result: Array = v * np.concatenate([kept_states, kept[count:]])
         return result
-
-
-def _largest(system: Discretization, v: Array) -> Array:
-    """Return the largest absolute value of each state, and that of each free parameter."""
-    states = np.abs(v[: system.state_size]).reshape(-1, len(system.problem.states)).max(axis=0, initial=0.0)
-    return np.append(states, np.abs(v[system.state_size :]))
 
 
 def _reach(terms: Sequence[Array]) -> float:
@@ -388,8 +382,8 @@ def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier]
     states, parameters = np.ones(count), np.ones(len(names))
     if system.scales is not None:
         states, parameters = system.scales.states, system.scales.parameters.copy()
-    size = usual(np.abs(x[: system.state_size]).reshape(-1, count).max(axis=0, initial=0.0))
-    size_of_free = usual(x[system.state_size :])
+    found = usual(system.largest(x))
+    size, size_of_free = found[:count], found[count:]
     if max(size.max(), size_of_free.max(initial=0.0)) <= 1:
         return None
     parameters[[names.index(name) for name in system.free]] *= np.maximum(1.0, size_of_free)

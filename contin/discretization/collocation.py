@@ -451,9 +451,8 @@ class Collocation(System):
     @functools.cached_property
     def breaks(self) -> Array:
         """Places where the equations have jumps or corners in t, whatever the states are: points of a good mesh."""
-        values = self.parameters
-        names = ["field", *(["functionals"] if self.problem.functionals else [])]
-        found = [self.problem.batch(name).switches(*self.problem.domain, values, self._free) for name in names]
+        names = ["field", *(["functionals"] if self._integrated else [])]
+        found = [self.problem.batch(name).switches(*self.problem.domain, self.parameters, self._free) for name in names]
         return np.unique(np.concatenate(found))
 
     def on_breaks(self) -> Collocation:

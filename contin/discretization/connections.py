@@ -64,11 +64,6 @@ class ConnectionCollocation(Conditioned):
     _target: float
     _bases: Any
 
-    @property
-    def breaks(self) -> Array:
-        """None: the field does not depend on time."""
-        return np.empty(0)
-
     # --- the conditions at the ends ------------------------------------------------------------------------------
 
     @property

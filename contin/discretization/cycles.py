@@ -285,11 +285,6 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         self._drifted: set[bytes] = set()
         self._set_reference(np.zeros((self.nodes.size, self._n)))
 
-    @property
-    def breaks(self) -> Array:
-        """None: the field does not depend on time."""
-        return np.empty(0)
-
     def _set_reference(self, reference: Array) -> None:
         """Take the phase row from an orbit, states at the nodes."""
         self.reference = reference

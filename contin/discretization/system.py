@@ -110,9 +110,14 @@ class System(Discretization):
 
     def magnitudes(self, x: Array) -> Array:
         """Return the largest value of each state, and each free parameter, in the places of the unknowns, shape (size,)."""
-        states = np.abs(x[: self.state_size]).reshape(-1, len(self.problem.states))
-        largest = np.tile(states.max(axis=0, initial=0.0), len(states))
-        return np.append(largest, np.abs(x[self.state_size :]))
+        count = len(self.problem.states)
+        largest = self.largest(x)
+        return np.append(np.tile(largest[:count], self.state_size // count), largest[count:])
+
+    def largest(self, v: Array) -> Array:
+        """Return the largest absolute value of each state, and that of each free parameter, of a vector like x."""
+        states = np.abs(v[: self.state_size]).reshape(-1, len(self.problem.states)).max(axis=0, initial=0.0)
+        return np.append(states, np.abs(v[self.state_size :]))
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[System, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it.

@@ -1,9 +1,8 @@
 """NumPy on recorded numbers: arrays of them, and the functions of NumPy that become operations of a tape.
 
 `Numbers` is an array of objects, so that indexing, slices, `np.concatenate`, `np.roll` and their like work as they are.
-Universal
-functions become operations for each element. Sums, scalar products, and products with constant matrices (dense, or sparse
-ones of SciPy) become one operation for each result.
+Universal functions become operations for each element. Sums, scalar products, and products with constant matrices (dense, or
+sparse ones of SciPy) become one operation for each result.
 """
 
 from __future__ import annotations
@@ -292,7 +291,7 @@ def total(values: Sequence[Any]) -> Any:
     if tape is None:
         return sum(values)
     if any(map(is_complex, values)):
-        return functools.reduce(lambda a, b: a + b, values)
+        return functools.reduce(operator.add, values)
     known = [value for value in values if not isinstance(value, Number)]
     terms = [value for value in values if isinstance(value, Number)]
     constant = math.fsum(map(float, known))
