@@ -302,10 +302,11 @@ class _FirstPoint:
         error_of_tangent = UNITS * system.largest(other / rate - self.tangent)
         finer = None if system.refined() is None else on_finer_mesh(Trial(system, x, self.linear), self._newton)
         if finer is not None:
-            carry, rate = system.carrier(finer.system), finer.tangent[finer.system.parameter_index(self._primary)] or 1.0
-            error = np.maximum(error, 2 * finer.system.largest(finer.x - carry(x)))
+            on: Any = finer.system
+            carry, rate = system.carrier(on), finer.tangent[on.parameter_index(self._primary)] or 1.0
+            error = np.maximum(error, 2 * on.largest(finer.x - carry(x)))
             turned = finer.tangent / rate - carry(self.tangent)
-            error_of_tangent = np.maximum(error_of_tangent, 2 * finer.system.largest(turned))
+            error_of_tangent = np.maximum(error_of_tangent, 2 * on.largest(turned))
         return error, error_of_tangent
 
     @property
