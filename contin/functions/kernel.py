@@ -22,7 +22,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
@@ -31,6 +31,7 @@ import numpy as np
 
 from contin.functions import machine_code
 from contin.functions.cache import cache_directory
+from contin.functions.kernel_parts import length
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -68,14 +69,14 @@ class Kernel:
         if found is not None:
             return found
         _share_work()
-        others = [other for other in _PENDING if other is not self and "compiled" not in vars(other)]
+        others = _by_length(other for other in _PENDING if other is not self and "compiled" not in vars(other))
         while True:
             with machine_code.claim(self.key) as mine:
                 found = self._made() if mine else None
             if found is not None:
                 return found
             if others:  # another process makes this one
-                others.pop().prepare()
+                others.pop(0).prepare()
             else:
                 time.sleep(_WAIT)
 
@@ -166,8 +167,13 @@ def prepare(modules: Sequence[str]) -> None:
     """Make the machine code of the kernels that modules define."""
     for module in modules:
         importlib.import_module(module)
-    for each in list(_PENDING):
+    for each in _by_length(_PENDING):
         each.prepare()
+
+
+def _by_length(kernels: Iterable[Kernel]) -> list[Kernel]:
+    """Return kernels in the order in which two processes make them: short ones, some of which are not needed, last."""
+    return sorted(kernels, key=lambda each: -length(each.function))
 
 
 @functools.cache

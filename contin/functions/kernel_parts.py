@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from types import CodeType
 from typing import Annotated, Any, Concatenate, NamedTuple, ParamSpec, TypeVar, overload
 
 from contin.arrays import Array, Indices
@@ -38,6 +39,29 @@ class Helper:
     def __call__(self, *arguments: Any) -> Any:
         """Run the Python function."""
         return self.function(*arguments)
+
+
+def names_in(code: CodeType) -> set[str]:
+    """Return the global names that a code object, and those inside it, may use."""
+    inner = (constant for constant in code.co_consts if isinstance(constant, CodeType))
+    return set(code.co_names).union(*map(names_in, inner))
+
+
+def length(function: Callable[..., Any]) -> int:
+    """Return the bytes of a function's code and of the helpers that it calls, each counted once."""
+    found: dict[Any, int] = {}
+
+    def add(function: Any) -> None:
+        if function in found:
+            return
+        found[function] = len(function.__code__.co_code)
+        for name in names_in(function.__code__):
+            value = function.__globals__.get(name)
+            if isinstance(value, Helper):
+                add(value.function)
+
+    add(function)
+    return sum(found.values())
 
 
 class Instruction:
