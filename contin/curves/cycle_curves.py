@@ -26,7 +26,9 @@ from contin.curves.critical_curve import CriticalCurve
 from contin.curves.extended import Borders
 from contin.curves.fold_curve import FoldCurve, normal_product, shrinking
 from contin.detection.cycle_normal_forms import NormalForms
+from contin.detection.interpolated import interpolated_zero
 from contin.detection.lyapunov import Coefficient
+from contin.detection.segment import Segment, SpecialPoint
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.round import Round
@@ -41,6 +43,8 @@ _RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
 #: With a smaller imaginary part of the multiplier the curve is at its end, with a smaller difference of kappa at a resonance:
 #: they are located more exactly than that.
 _REAL = 1e-6
+#: Where kappa has an extremum, a value this close to that of a resonance is worth a search.
+_NEAR = 0.05
 
 
 class CycleCurve(CriticalCurve):
@@ -180,6 +184,33 @@ def _resonance(label: str, kappa: float) -> TestFunction:
     return TestFunction(label, name, lambda trial: sign * (_curve(trial).kappa(trial.x) - kappa), terminal=abs(kappa) == 1)
 
 
+def _touched(label: str, kappa: float) -> TestFunction:
+    """Return the test function of points where kappa comes to this value and goes back.
+
+    It does where a symmetry makes a round of several equal parts: the pair of a half passes i and -i where that of the round
+    meets at -1. There the angle has an extremum, and the equations are singular: both vectors of the pair are eigenvectors.
+    """
+
+    def change(trial: Trial) -> float:
+        return float(trial.tangent[-1])
+
+    def distance(trial: Trial) -> float:
+        return _curve(trial).kappa(trial.x) - kappa
+
+    def search(segment: Segment, _: object) -> list[SpecialPoint]:
+        a, b = (trial.value(test) for trial in (segment.before, segment.trial))
+        if not a * b < 0:
+            return []
+        near = segment.low + (segment.step - segment.low) * a / (a - b)
+        if abs(distance(segment.guessed(near))) > _NEAR:
+            return []
+        found = interpolated_zero(segment, (change, distance), near)
+        return [] if found is None else [SpecialPoint(found.at, test.label, test.name, found.trial, None, found, test)]
+
+    test = TestFunction(label, f"resonance 1:{label[1]}", change, search=search)
+    return test
+
+
 def _at_fold(label: str, name: str) -> TestFunction:
     """Return the test function of points where the cycle is at a fold, too: two multipliers are one, up to a square root."""
 
@@ -203,6 +234,7 @@ def _degenerate(label: str, name: str) -> TestFunction:
 def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
     """Strong resonances, Chenciner points, and folds."""
     resonances = [_resonance(label, kappa) for label, kappa in _RESONANCES.items()]
+    resonances += [_touched(label, kappa) for label, kappa in _RESONANCES.items() if abs(kappa) == 1]
     return [*shrinking(system.cycles), *resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
 

@@ -2,8 +2,11 @@
 
 import math
 
+import numpy as np
 import pytest
 from cycles.test_forced import around, duffing, mathieu, two_wells, van_der_pol
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
 from scipy.special import mathieu_a, mathieu_b
 
 import contin
@@ -103,3 +106,36 @@ def test_period_doublings_of_two_wells():
     )
     found = contin.curve(first.labelled("PD")[0], "w", limits={"w": (0.9, 1.05)})
     assert found.points[-1]["g"] == pytest.approx(second.labelled("PD")[0]["g"], abs=1e-9)
+
+
+def half_round_of_van_der_pol(unknowns):
+    """Return what vanishes where half a round, turned by -1, has the multipliers i and -i: by SciPy's solver."""
+    x, v, g, w = unknowns
+
+    def field(t, y):
+        slopes = y[2:].reshape(2, 2)
+        jacobian = np.array([[0, 1], [-2 * y[0] * y[1] - 1, 1 - y[0] ** 2]])
+        return [y[1], (1 - y[0] ** 2) * y[1] - y[0] + g * math.cos(w * t), *(jacobian @ slopes).ravel()]
+
+    done = solve_ivp(field, (0, math.pi / w), [x, v, 1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-13)
+    end = done.y[:, -1]
+    return [end[0] + x, end[1] + v, end[2] + end[5], end[2] * end[5] - end[3] * end[4] - 1]
+
+
+def test_a_resonance_that_a_symmetry_makes_touch():
+    """A pair of half a round passes i and -i: that of the round comes to -1 and goes back, kappa + 1 has no change of sign."""
+
+    def field(t, u, p):
+        return u.v, (1 - u.x**2) * u.v - u.x + p.g * math.cos(p.w * t)
+
+    problem = CycleProblem(field, ["x", "v"], {"w": 2.0, "g": 10.0}, period=around)
+    branch = contin.trace(contin.solve(problem, [0, 0]), free=["g"], direction=-1, limits={"g": (3, 12)})
+    (torus,) = branch.labelled("TR")
+    curve = contin.curve(torus, "w", limits={"w": (1, 2.2)})
+    assert labels(curve) == ["EP", "R2", "EP"] and curve.stop.reason == "limit"
+    (point,) = curve.labelled("R2")
+    start = point.system.base.states(point.x[: point.system.base.size])[0]
+    known = root(half_round_of_van_der_pol, [*start, point["g"], point["w"]], options={"xtol": 1e-14})
+    assert np.abs(known.fun).max() < 1e-11
+    for name, value in zip(("g", "w"), known.x[2:]):
+        assert point[name] == pytest.approx(value, abs=1e-10) and point.errors[name] < 1e-10
