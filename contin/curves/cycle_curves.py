@@ -24,7 +24,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.curves.critical_curve import CriticalCurve
 from contin.curves.extended import Borders
-from contin.curves.fold_curve import FoldCurve, normal_product, shrinking
+from contin.curves.fold_curve import FoldCurve, normal_product, shrinking, turns_back
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.interpolated import interpolated_zero
 from contin.detection.lyapunov import Coefficient
@@ -34,6 +34,7 @@ from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.round import Round
 from contin.discretization.system import System
 from contin.problems.cycle import PERIOD
+from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
 
 #: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
@@ -69,6 +70,10 @@ class CycleCurve(CriticalCurve):
     @abstractmethod
     def coupling(self, x: Array) -> Array:
         """Return P, shape (copies, copies)."""
+
+    def angle(self, x: Array) -> float:
+        """Return the angle of the pair of multipliers."""
+        return math.acos(min(max(self.kappa(x), -1.0), 1.0))
 
     @property
     def copy_shape(self) -> tuple[int, Array]:
@@ -159,16 +164,13 @@ class TorusCurve(CycleCurve):
 
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, and the angle."""
-        return np.append(super().functionals(x), self._angle(x))
-
-    def _angle(self, x: Array) -> float:
-        return math.acos(min(max(self.kappa(x), -1.0), 1.0))
+        return np.append(super().functionals(x), self.angle(x))
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
         if self.imaginary_part(x) < _REAL or abs(self.kappa(x) - _RESONANCES["R3"]) < _REAL:
             return Coefficient(math.nan, math.nan, math.nan)
-        return NormalForms(self.cycles, x[: self.base.size]).torus(self._angle(x))
+        return NormalForms(self.cycles, x[: self.base.size]).torus(self.angle(x))
 
 
 def _curve(trial: Trial) -> CycleCurve:
@@ -178,37 +180,46 @@ def _curve(trial: Trial) -> CycleCurve:
 def _resonance(label: str, kappa: float) -> TestFunction:
     """Return the test function of the angle with this cosine: a strong resonance; the curve ends where the angle is 0 or pi.
 
-    A test function that ends a run is positive on it.
+    A test function that ends a run is positive on it. With a symmetry the angle may come to 0 or pi and go back: `_touched`.
     """
     sign, name = (-1 if kappa == 1 else 1), f"resonance 1:{label[1]}"
-    return TestFunction(label, name, lambda trial: sign * (_curve(trial).kappa(trial.x) - kappa), terminal=abs(kappa) == 1)
-
-
-def _touched(label: str, kappa: float) -> TestFunction:
-    """Return the test function of points where kappa comes to this value and goes back.
-
-    It does where a symmetry makes a round of several equal parts: the pair of a half passes i and -i where that of the round
-    meets at -1. There the angle has an extremum, and the equations are singular: both vectors of the pair are eigenvectors.
-    """
-
-    def change(trial: Trial) -> float:
-        return float(trial.tangent[-1])
 
     def distance(trial: Trial) -> float:
-        return _curve(trial).kappa(trial.x) - kappa
+        return sign * (_curve(trial).kappa(trial.x) - kappa)
 
-    def search(segment: Segment, _: object) -> list[SpecialPoint]:
-        a, b = (trial.value(test) for trial in (segment.before, segment.trial))
-        if not a * b < 0:
-            return []
-        near = segment.low + (segment.step - segment.low) * a / (a - b)
-        if abs(distance(segment.guessed(near))) > _NEAR:
-            return []
-        found = interpolated_zero(segment, (change, distance), near)
-        return [] if found is None else [SpecialPoint(found.at, test.label, test.name, found.trial, None, found, test)]
+    def search(segment: Segment, _: object) -> list[SpecialPoint] | None:
+        return _touched(segment, test, distance)
 
-    test = TestFunction(label, f"resonance 1:{label[1]}", change, search=search)
+    at_end = abs(kappa) == 1
+    test = TestFunction(label, name, distance, terminal=at_end, search=search if at_end else None)
     return test
+
+
+def _touched(segment: Segment, test: TestFunction, distance: Callable[[Trial], float]) -> list[SpecialPoint] | None:
+    """Return the resonance where the angle has an extremum; None where there is none in a step.
+
+    A symmetry makes a round of equal parts. Where the pair of half a round passes i and -i, that of the round comes to -1 and
+    goes back: both vectors are eigenvectors, and the equations of the curve singular. They are, too, where cycles that have an
+    image become their own image: there the pair comes to 1, and the curve goes back on itself.
+    """
+    a, b = (_change(trial) for trial in (segment.before, segment.trial))
+    if not a * b < 0:
+        return None
+    near = segment.low + (segment.step - segment.low) * a / (a - b)
+    if abs(distance(segment.guessed(near))) > _NEAR:
+        return None
+    found = interpolated_zero(segment, (_change, distance), near)
+    if found is None:
+        return None
+    stop = None
+    if turns_back(found.trial, slice(segment.state.system.state_size, None)):
+        stop = Stop("pitchfork", f"met {test.name} on a symmetric cycle: beyond it the curve is its own mirror image")
+    return [SpecialPoint(found.at, test.label, test.name, found.trial, stop, found, test)]
+
+
+def _change(trial: Trial) -> float:
+    """Return how fast kappa changes along the curve."""
+    return float(trial.tangent[-1])
 
 
 def _at_fold(label: str, name: str) -> TestFunction:
@@ -217,7 +228,9 @@ def _at_fold(label: str, name: str) -> TestFunction:
     def confirm(trial: Trial) -> bool:
         curve = _curve(trial)
         exponents = curve.cycles.eigenvalues(trial.x[: curve.base.size])
-        return bool(np.sort(np.abs(exponents))[int(curve.cycles.autonomous)] < _DOUBLE)
+        own = 2 * (curve.copies == 2 and curve.angle(trial.x) < _DOUBLE)  # the pair itself is one at R1
+        known = int(curve.cycles.autonomous) + own
+        return len(exponents) > known and bool(np.sort(np.abs(exponents))[known] < _DOUBLE)
 
     return TestFunction(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)
 
@@ -234,7 +247,6 @@ def _degenerate(label: str, name: str) -> TestFunction:
 def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
     """Strong resonances, Chenciner points, and folds."""
     resonances = [_resonance(label, kappa) for label, kappa in _RESONANCES.items()]
-    resonances += [_touched(label, kappa) for label, kappa in _RESONANCES.items() if abs(kappa) == 1]
     return [*shrinking(system.cycles), *resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
 

@@ -162,9 +162,15 @@ def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
     if found is None:
         return None
     system = segment.state.system
-    turns = np.abs(found.trial.tangent[[system.state_size, system.size - 1]]).max() < _TURNS
-    stop = Stop("pitchfork", "the folds end on a pitchfork: beyond it the curve is its own mirror image") if turns else None
+    stop = None
+    if turns_back(found.trial, [system.state_size, system.size - 1]):
+        stop = Stop("pitchfork", "the folds end on a pitchfork: beyond it the curve is its own mirror image")
     return [SpecialPoint(found.at, _MEETS.label, _MEETS.name, found.trial, stop, found, _MEETS)]
+
+
+def turns_back(trial: Trial, parameters: Any) -> bool:
+    """Return whether the parameters, at these places of x, stand still on a curve: it goes back as its mirror image."""
+    return bool(np.abs(trial.tangent[parameters]).max() < _TURNS)
 
 
 #: Where the fold meets a branch point: w.F_lambda = 0.

@@ -372,7 +372,7 @@ class Inspection:
 
         Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
         """
-        others = [other for other in found if other.label in ("BP", "CP") or other is self._home]
+        others = [other for other in found if other.label in ("BP", "CP") or other is self._home or other.turns_back]
         if fold.label != "LP" or not others:
             return False
         if not fold.is_located:  # the equations are singular at the crossing: nothing else was found

@@ -65,6 +65,11 @@ class SpecialPoint:
         """The point was found, and not only bracketed."""
         return not self.name.startswith("possible")
 
+    @property
+    def turns_back(self) -> bool:
+        """The curve ends here, on a symmetric solution: beyond, it is its own mirror image."""
+        return self.stop is not None and self.stop.reason == "pitchfork"
+
 
 class Segment:
     """The piece of a curve between the state of a run and the corrected point at the end of a step.

@@ -108,18 +108,23 @@ def test_period_doublings_of_two_wells():
     assert found.points[-1]["g"] == pytest.approx(second.labelled("PD")[0]["g"], abs=1e-9)
 
 
-def half_round_of_van_der_pol(unknowns):
-    """Return what vanishes where half a round, turned by -1, has the multipliers i and -i: by SciPy's solver."""
-    x, v, g, w = unknowns
+def half_a_round(rates, slopes, time, x, v):
+    """Return the state after half a round and the derivative by the first one: by SciPy's solver."""
 
     def field(t, y):
-        slopes = y[2:].reshape(2, 2)
-        jacobian = np.array([[0, 1], [-2 * y[0] * y[1] - 1, 1 - y[0] ** 2]])
-        return [y[1], (1 - y[0] ** 2) * y[1] - y[0] + g * math.cos(w * t), *(jacobian @ slopes).ravel()]
+        return [*rates(t, y[0], y[1]), *(np.array(slopes(y[0], y[1])) @ y[2:].reshape(2, 2)).ravel()]
 
-    done = solve_ivp(field, (0, math.pi / w), [x, v, 1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-13)
-    end = done.y[:, -1]
-    return [end[0] + x, end[1] + v, end[2] + end[5], end[2] * end[5] - end[3] * end[4] - 1]
+    end = solve_ivp(field, (0, time), [x, v, 1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    return end[:2], end[2:].reshape(2, 2)
+
+
+def symmetric(point, function, names):
+    """Return the values of two parameters at which ``function(x, v, a, b)`` vanishes, from a point that contin found."""
+    base = point.system.base
+    start = base.states(point.x[: base.size])[0]
+    known = root(function, [*start, *(point[name] for name in names)], options={"xtol": 1e-14})
+    assert np.abs(known.fun).max() < 1e-11
+    return known.x[2:]
 
 
 def test_a_resonance_that_a_symmetry_makes_touch():
@@ -134,8 +139,44 @@ def test_a_resonance_that_a_symmetry_makes_touch():
     curve = contin.curve(torus, "w", limits={"w": (1, 2.2)})
     assert labels(curve) == ["EP", "R2", "EP"] and curve.stop.reason == "limit"
     (point,) = curve.labelled("R2")
-    start = point.system.base.states(point.x[: point.system.base.size])[0]
-    known = root(half_round_of_van_der_pol, [*start, point["g"], point["w"]], options={"xtol": 1e-14})
-    assert np.abs(known.fun).max() < 1e-11
-    for name, value in zip(("g", "w"), known.x[2:]):
+
+    def half(unknowns):  # vanishes where half a round, turned by -1, has the multipliers i and -i
+        x, v, g, w = unknowns
+        end, turn = half_a_round(
+            lambda t, x, v: (v, (1 - x**2) * v - x + g * math.cos(w * t)),
+            lambda x, v: ((0, 1), (-2 * x * v - 1, 1 - x**2)), math.pi / w, x, v,
+        )  # fmt: skip
+        return [*(end + (x, v)), np.trace(turn), np.linalg.det(turn) - 1]
+
+    for name, value in zip(("g", "w"), symmetric(point, half, ("g", "w"))):
+        assert point[name] == pytest.approx(value, abs=1e-10) and point.errors[name] < 1e-10
+
+
+@pytest.mark.parametrize("m1", [0.01, 0.5])
+def test_torus_bifurcations_end_on_a_symmetric_cycle(m1):
+    """Cycles that have an image become their own: the curve would go back as its mirror image from a point where it is R1."""
+
+    def rates(x, v, m1, m2):
+        return v, m1 * x + m2 * v - x**3 - x**2 * v
+
+    def field(t, u, p):
+        x, v = rates(u.x, u.v, p.m1, p.m2)
+        return x, v + 0.2 * math.cos(3 * t)
+
+    problem = CycleProblem(field, ["x", "v"], {"m1": m1, "m2": -0.3}, period=2 * math.pi / 3)
+    branch = contin.trace(contin.solve(problem, [math.sqrt(m1), 0]), free=["m2"], limits={"m2": (-1, 2)})
+    curve = contin.curve(branch.labelled("TR")[0], "m1", direction=-1, limits={"m1": (-1, 1)}, max_points=60)
+    assert set(labels(curve)) == {"EP", "R1"} | ({"R4"} if m1 > 0.1 else set())
+    assert curve.stop.reason == "pitchfork" and not curve.notes
+    point = curve.points[-1]
+
+    def half(unknowns):  # vanishes where half a round, turned by -1, has the multiplier -1 twice
+        x, v, m1, m2 = unknowns
+        end, turn = half_a_round(
+            lambda t, x, v: (v, rates(x, v, m1, m2)[1] + 0.2 * math.cos(3 * t)),
+            lambda x, v: ((0, 1), (m1 - 3 * x**2 - 2 * x * v, m2 - x**2)), math.pi / 3, x, v,
+        )  # fmt: skip
+        return [*(end + (x, v)), np.trace(turn) - 2, np.linalg.det(turn) - 1]
+
+    for name, value in zip(("m1", "m2"), symmetric(point, half, ("m1", "m2"))):
         assert point[name] == pytest.approx(value, abs=1e-10) and point.errors[name] < 1e-10
