@@ -81,8 +81,8 @@ def test_gradient_of_the_energy_by_differences(law):
         rates.append([weight * (there - here) / step for there, here in zip(*ends)])
     rate, moment_rate = (sum(parts) for parts in zip(*rates))
     _, exactly, stiffness = strip.density
-    assert rate == pytest.approx(np.sum(exactly * direction, axis=1), abs=1e-9)
-    assert moment_rate == pytest.approx(np.einsum("kij,kj->ki", stiffness, direction), abs=1e-9)
+    assert rate == pytest.approx(np.sum(exactly * direction, axis=1), abs=1e-11)
+    assert moment_rate == pytest.approx(np.einsum("kij,kj->ki", stiffness, direction), abs=1e-11)
 
 
 @LAWS
@@ -162,7 +162,7 @@ def test_energy_falls_closed_and_in_its_class(metric):
     assert all(np.abs(strip.closure).max() < 1e-12 for strip in descent.strips)
     for strip in descent.strips[::8]:
         axes, x = strip.along(np.linspace(0, 2 * np.pi, 201))
-        assert quaternions(axes.transpose(0, 2, 1))[-1] == pytest.approx([-1, 0, 0, 0], abs=1e-9)
+        assert quaternions(axes.transpose(0, 2, 1))[-1] == pytest.approx([-1, 0, 0, 0], abs=1e-11)
         assert x[-1] == pytest.approx([0, 0, 0], abs=1e-12)
 
 
@@ -224,7 +224,7 @@ def test_the_same_end_wherever_the_kick_begins(law):
     start = perturbed(circle(law, 1, kappa_n), 0.02)
     rolled = replace(start, strains=np.roll(start.strains, 7, axis=0))
     ends = [descend(strip).end for strip in (start, rolled)]
-    assert ends[0].energy == pytest.approx(ends[1].energy, abs=1e-9)
+    assert ends[0].energy == pytest.approx(ends[1].energy, abs=1e-11)
 
 
 def test_what_is_refused():
