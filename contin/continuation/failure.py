@@ -88,6 +88,20 @@ def advice(state: State, settings: Settings) -> str:
     return _mesh_advice(finer.system, settings) if finer is not None and _goes_on(finer, settings, way) else ""
 
 
+def shorter_steps(state: State, settings: Settings) -> float | None:
+    """Return the ``min_step`` with which a run goes on from a state, below the default; None where another one was set.
+
+    So it is at corners of a smooth curve, as that of a canard where its cycles get their head.
+    """
+    if settings.min_step != Settings.min_step or _goes_on(state, settings, settings.min_step):
+        return None
+    for part in _SHORTER:
+        least = part * settings.min_step
+        if _goes_on(state, dataclasses.replace(settings, min_step=least), settings.min_step):
+            return least
+    return None
+
+
 def _as_it_is(state: State, settings: Settings) -> str:
     """Return what has been tried in vain, and what the last point looks like."""
     system = state.system

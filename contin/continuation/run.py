@@ -21,7 +21,7 @@ import numpy as np
 
 from contin import checks, threads
 from contin.arrays import Array
-from contin.continuation.failure import no_convergence
+from contin.continuation.failure import no_convergence, shorter_steps
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.detection.census import census_of, contradiction
@@ -47,7 +47,7 @@ from contin.detection.test_functions import (
 from contin.detection.trivial import crossed, jumped
 from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
-from contin.names import value_names
+from contin.names import exact_text, value_names
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.newton import correct
@@ -309,7 +309,10 @@ class Continuation:
         try:
             segment, inspection, distance, doubt = self._accurate_step()
         except ConvergenceError as error:
-            self.stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
+            stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
+            if stop.reason == "no convergence" and self._takes_shorter_steps():
+                return
+            self.stop = stop
             met = self.stop.reason == "event"
             label, name = ("EP", self.stop.message.removeprefix("met ")) if met else ("MX", "no convergence")
             yield self._point(SpecialPoint(0.0, label, name, self._state_trial()), self.state, accuracy=self._accuracy)
@@ -343,6 +346,18 @@ class Continuation:
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
         found_at_end = self._located(SpecialPoint(segment.step, label, name, segment.trial))
         yield self._point(found_at_end, segment.state, accuracy=self._accuracy)
+
+    def _takes_shorter_steps(self) -> bool:
+        """Take steps below the default ``min_step`` from here on, if the run goes on with them; say so."""
+        shorter = shorter_steps(self.state, self.settings)
+        if shorter is None:
+            return False
+        here, least = self._state_trial()[self.primary], exact_text(self.settings.min_step)
+        self.notes.append(
+            f"from {self.primary} = {here:.10g} on, steps below {least} are taken: the branch bends sharply there"
+        )
+        self.settings = dataclasses.replace(self.settings, min_step=shorter)
+        return True
 
     def _failure(self, error: ConvergenceError) -> Stop:
         """Return the reason why no step succeeds: the domain of the equations ends, or the last error."""
@@ -554,6 +569,7 @@ class Continuation:
         following = float(np.clip(longer, settings.min_step, max(longest, settings.min_step)))
         gone = trial.x - state.x
         way = self._sense(trial) if turned or self._has_moved(gone, trial) else 0.0
+        way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
             state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,

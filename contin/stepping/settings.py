@@ -26,7 +26,8 @@ class Settings:
     direction : int
         +1 or -1: the way to go from the first point, by the sign of the primary parameter's change.
     step, min_step, max_step : float
-        First, smallest and largest step of arclength.
+        First, smallest and largest step of arclength. Steps below the default ``min_step`` are taken, and noted, where a run
+        goes on with them only.
     max_points : int
         Regular points after which the run ends.
     limits : mapping of str to pair of float

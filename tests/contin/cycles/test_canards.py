@@ -133,3 +133,18 @@ def test_canards_of_the_oregonator(eps):
         assert branch.points[-1]["f"] == pytest.approx(other["f"], abs=1e-10)
         assert branch.points[-1]["period"] == pytest.approx(2 * np.pi / other.details["frequency"], rel=1e-9)
     assert runs[0].labelled("LP")[0]["f"] == pytest.approx(runs[1].labelled("LP")[0]["f"], abs=1e-7)
+
+
+def test_a_branch_that_bends_within_a_shorter_way_than_the_smallest_step():
+    """Where canards get their head, the branch turns within 1e-8 of arclength: the run goes on, and says so."""
+    problem = AlgebraicProblem(oregonator, ["x", "z"], {"f": 0.3, "eps": 0.04, "q": 8e-4})
+    rest = contin.trace(contin.solve(problem, [0.7, 0.7]), free=["f"], limits={"f": (0.2, 1)})
+    (hopf,) = rest.labelled("HB")
+    branch = contin.trace(hopf, branch=1, limits={"f": (0.2, 1)}, max_points=90)
+    assert branch.stop.reason == "max points"
+    (note,) = branch.notes
+    assert note.startswith("from f = 0.5125426") and "steps below 1e-06 are taken" in note
+    periods = branch.column("period")
+    assert 0 < periods.argmax() < len(periods) - 1 and np.all(np.diff(branch.column("max_x")[1:]) > 0)
+    held = contin.trace(hopf, branch=1, limits={"f": (0.2, 1)}, max_points=90, min_step=1e-5)
+    assert held.stop.reason == "no convergence" and not held.notes  # one that was set is kept
