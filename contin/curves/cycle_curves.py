@@ -83,7 +83,7 @@ class CycleCurve(CriticalCurve):
 
     def bordered(self, x: Array, b: Array, c: Array) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
         """Return functions that solve with the bordered matrix and with its transpose."""
-        solver = self.round(x).solver(self.coupling(x), b, c)
+        solver = self.round(x).solver(self.coupling(x), (b, c))
         return solver.solve, solver.solve_transposed
 
     def round(self, x: Array) -> Round:

@@ -58,7 +58,7 @@ class NormalForms:
     def __init__(self, system: PeriodicCollocation, x: Array) -> None:
         self.system, self.x = system, x
         self.plain = Round(system, x, phased=False)
-        self.phased = Round(system, x, phased=True) if system.autonomous else self.plain
+        self.phased = self.plain.with_period() if system.autonomous else self.plain
         self.points = system.at_gauss_points(x)
         self.jacobian = system.rates_by_states(x, self.points)
         self.h = np.repeat(np.diff(system.mesh), system.degree)[:, None]
@@ -115,7 +115,7 @@ class NormalForms:
         unit = np.zeros(matrix.size + 1, dtype=np.result_type(multiplier))
         unit[-1] = 1.0
         for _ in range(_ROUNDS):
-            solver = matrix.solver(multiplier, b, c)
+            solver = matrix.solver(multiplier, (b, c))
             v, w = solver.solve(unit)[:-1], solver.solve_transposed(unit)[:-1]
             b, c = w.conj() / np.linalg.norm(w), v.conj() / np.linalg.norm(v)
         return v, w

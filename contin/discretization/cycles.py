@@ -18,6 +18,9 @@ from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
+from contin.linalg.condensation import Factorization
+from contin.linalg.factors import Factors
+from contin.linalg.layout import Blocks
 from contin.linalg.periodic import log_eigenvalues, log_eigenvalues_along
 from contin.linalg.transitions import interval_matrices, transitions
 from contin.problems.cycle import PERIOD, CycleProblem, rounds_of
@@ -164,9 +167,15 @@ class PeriodicCollocation(Collocation):
         """Return the derivatives of T F by the states at the Gauss points, scaled, shape (N d, n, n)."""
         return self.rates_by_states(x, self.at_gauss_points(x))
 
-    def interval_matrices(self, x: Array) -> Array:
-        """Return the linearized collocation equations of each interval, shape (N, d n, (d + 1) n)."""
-        return interval_matrices(self.basis.value, self.basis.slope, self._h, self._jacobian_of_field(x))
+    def with_conditions(self, x: Array, rows: Array) -> Factors:
+        """Return the factored linearized collocation equations with n conditions on the states at both ends: rows (n, 2 n)."""
+        jacobian, n = self._jacobian_of_field(x), self._n
+        matrices = interval_matrices(self.basis.value, self.basis.slope, self._h, jacobian)
+        columns = np.concatenate([self._layout.inside, self._layout.ends])
+        border = np.empty((self.intervals, 0, len(columns)))
+        local = np.ascontiguousarray(matrices[:, self._layout.rows[:, None], columns])
+        first, last = np.ascontiguousarray(rows[:, :n]), np.ascontiguousarray(rows[:, n:])
+        return Factorization(self._layout, Blocks(local, border, np.empty((0, 0)), first, last))
 
     def eigenvalues(self, x: Array) -> ComplexArray:
         """Return the logarithms of the Floquet multipliers, shape (n,): those with a positive real part are unstable.

@@ -124,7 +124,7 @@ def log_eigenvalues_along(factors: Array, vectors: Array) -> ComplexArray:
     along = np.einsum("ja,jab,jb->j", units[1:], factors, units[:-1])
     with np.errstate(divide="ignore"):
         one = np.log(np.abs(along)).sum(keepdims=True)
-    rest = np.einsum("jab,jac,jcd->jbd", normal[1:], factors, normal[:-1])
+    rest = normal[1:].transpose(0, 2, 1) @ factors @ normal[:-1]
     values = np.concatenate([one, log_eigenvalues(rest)])
     return values[np.argsort(-values.real, kind="stable")]
 

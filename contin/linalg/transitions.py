@@ -16,7 +16,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector
+from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg.elimination import Step, eliminate
 from contin.linalg.vector import PANEL
 
@@ -32,49 +32,53 @@ def interval_matrices(value: Array, slope: Array, h: Array, jacobian: Array) -> 
     jacobian : ndarray, shape (N d, n, n)
         Derivatives of the right-hand side at the Gauss points.
     """
-    return _filled(value, slope, h, jacobian, 0)
+    d, n = len(value), jacobian.shape[1]
+    matrices = np.empty((len(h), d * n, (d + 1) * n))
+    fill(value, slope, h, jacobian, matrices)
+    return matrices
 
 
 def transitions(value: Array, slope: Array, h: Array, jacobian: Array) -> Array:
     """Return the transition matrix of each interval, shape (N, n, n); not finite where there is none."""
-    matrices, n = _filled(value, slope, h, jacobian, len(value)), jacobian.shape[1]
-    result = np.empty((len(h), n, n))
-    condense(matrices, np.empty(matrices.shape[2], np.int64), result)
+    d, n = len(value), jacobian.shape[1]
+    result, block = np.empty((len(h), n, n)), np.empty((d * n, (d + 1) * n))
+    condense(value, slope, h, jacobian, block, np.empty((d + 1) * n, np.int64), result)
     return result
 
 
-def _filled(value: Array, slope: Array, h: Array, jacobian: Array, turn: int) -> Array:
-    """Return the equations by the nodes in order, turned by so many places."""
-    d, n = len(value), jacobian.shape[1]
-    matrices = np.empty((len(h), d * n, (d + 1) * n))
-    fill(value, slope, h, jacobian, turn, matrices)
-    return matrices
-
-
 @kernel(reorder=False)
-def fill(value: Matrix, slope: Matrix, h: Vector, jacobian: Stack, turn: int, matrices: Stack) -> None:
+def fill(value: Matrix, slope: Matrix, h: Vector, jacobian: Stack, matrices: Stack) -> None:
     """Fill the equations of the intervals."""
+    for j in range(h.size):
+        _fill_block(value, slope, h[j], jacobian, j * value.shape[0], 0, matrices[j])
+
+
+@helper
+def _fill_block(value, slope, h, jacobian, first, turn, block):
+    """Fill the equations of one interval, with the Gauss points from ``first`` on, by its nodes turned by so many places."""
     d, n = value.shape[0], jacobian.shape[1]
-    for m in range(d + 1):
-        start = (m + turn) % (d + 1) * n
-        for j in range(h.size):
-            for q in range(d):
-                factor, point = -h[j] * value[q, m], jacobian[j * d + q]
-                for a in range(n):
-                    row = matrices[j, q * n + a]
-                    for b in range(n):
-                        row[start + b] = factor * point[a, b]
-                    row[start + a] += slope[q, m]
+    for q in range(d):
+        point = jacobian[first + q]
+        for a in range(n):
+            row = block[q * n + a]
+            for m in range(d + 1):
+                factor, start = -h * value[q, m], (m + turn) % (d + 1) * n
+                for b in range(n):
+                    row[start + b] = factor * point[a, b]
+                row[start + a] += slope[q, m]
 
 
 @kernel
-def condense(matrices: Stack, pivots: IndexVector, result: Stack) -> None:
-    """Fill the transition matrices from the equations by [interior | right | left], which are overwritten."""
-    rows, width = matrices.shape[1], matrices.shape[2]
+def condense(
+    value: Matrix, slope: Matrix, h: Vector, jacobian: Stack, block: Matrix, pivots: IndexVector, result: Stack
+) -> None:
+    """Fill the transition matrices; ``block`` (d n, (d + 1) n) is work space for equations by [interior | right | left]."""
+    rows, width = block.shape
     n = width - rows
     inner = rows - n
-    for j in range(result.shape[0]):
-        block, found = matrices[j], result[j]
+    for j in range(h.size):
+        found = result[j]
+        _fill_block(value, slope, h[j], jacobian, j * value.shape[0], value.shape[0], block)
         eliminate(block, Step(0, rows, 0, inner, inner, width), pivots)
         eliminate(block, Step(inner, rows, inner, rows, rows, width), pivots)
         for start in range((n - 1) // PANEL * PANEL, -1, -PANEL):  # of each panel the inverse triangle is kept
