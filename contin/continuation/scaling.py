@@ -195,12 +195,12 @@ class _FirstPoint:
             left = left & ~part
 
     def _apart(self, which: Pattern) -> Array:
-        """Return how far some states can change by themselves before F_x is singular; 0 where that never happens."""
+        """Return how far, up to one, some states can change by themselves before F_x is singular; 0 where that never happens."""
         found = np.zeros(which.size)
         for number in np.flatnonzero(which) if np.count_nonzero(which) <= _MOST else ():
             alone = self._kept(np.ones_like(self.x), np.arange(which.size) == number)
             mode = self._nearest(alone, np.ones_like(which))
-            found[number] = 0.0 if mode is None else mode.distance
+            found[number] = 0.0 if mode is None else min(mode.distance, 1.0)  # states that enter linearly go as far as 1e12
         return found
 
     def _nearest(self, direction: Array, kept: Pattern) -> _Mode | None:
