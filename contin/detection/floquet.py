@@ -24,6 +24,7 @@ from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.detection.significance import on_finer_mesh
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.maps import MapSystem
+from contin.discretization.rounding import changes
 from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton, correct
 from contin.stepping.trial import TestFunction, Trial, sign_changed
@@ -43,8 +44,6 @@ _DEEPER = 0.5
 #: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. In the tail of
 #: AUTO's demo ``tor`` the doublings to the period 49 are certain, those from 54 on are not.
 _MEANINGLESS = 1e-2
-#: Random roundings of a cycle of a map whose multipliers are compared. The largest of ten is at most twice that of three.
-_DRAWS = 3
 #: Part of a step before and behind a torus bifurcation where its pair must lie on different sides of the circle.
 _BESIDE = 1e-3
 
@@ -80,7 +79,7 @@ def floquet(system: PeriodicCollocation | MapSystem, x: Array, tangent: Array) -
     """Return the Floquet multipliers of a cycle with their errors; the tangent is NaN where it is not known."""
     values, trivial = system.eigenvalues(x), _trivial(system, x)
     if isinstance(system, MapSystem):
-        return Floquet(values, _round_off(system, x, values), unstable(system, x))
+        return Floquet(values, changes(system.eigenvalues, x, values), unstable(system, x))
     finer: Any
     finer, carry = system.refined()
     try:
@@ -91,15 +90,6 @@ def floquet(system: PeriodicCollocation | MapSystem, x: Array, tangent: Array) -
     if trivial is not None:
         errors[trivial] = abs(values[trivial])
     return Floquet(system.whole_round(values), system.order * errors, unstable(system, x))
-
-
-def _round_off(system: MapSystem, x: Array, values: ComplexArray) -> Array:
-    """Return the largest change of the logarithms of multipliers when the points of a cycle are rounded, up or down."""
-    random, errors = np.random.default_rng(13), np.zeros(values.shape)
-    for _ in range(_DRAWS):
-        rounded = x + np.finfo(float).eps * (1 + np.abs(x)) * random.choice((-1.0, 1.0), x.size)
-        errors = np.maximum(errors, _apart(values, system.eigenvalues(rounded)))
-    return errors
 
 
 def _corrected(system: PeriodicCollocation, x: Array, tangent: Array) -> Array:
@@ -128,8 +118,8 @@ def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
 
 
 def unstable(system: PeriodicCollocation | MapSystem, x: Array) -> int:
-    """Return the number of unstable multipliers, without the one that is 1."""
-    outside, trivial = system.eigenvalues(x).real > 0, _trivial(system, x)
+    """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off."""
+    outside, trivial = (system.eigenvalues(x).real > 0) & ~system.neutral(x), _trivial(system, x)
     if trivial is not None:
         outside[trivial] = False
     return int(np.count_nonzero(outside))

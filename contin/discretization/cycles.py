@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray, Indices
+from contin.arrays import Array, ComplexArray, Indices, Mask
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
 from contin.discretization.extremes import extremes
 from contin.discretization.mesh import MeshControl, adapted_mesh
 from contin.discretization.protocol import Carrier
+from contin.discretization.rounding import on_circle
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
 from contin.linalg.condensation import Factorization
@@ -32,9 +33,6 @@ _OPPOSITE = 1e-6
 _SPLIT = 100.0
 #: Logarithms of multipliers that differ by less are those of a pair; multipliers of so many orbits are kept.
 _EQUAL, _KEPT = 1e-9, 50
-#: A pair whose logarithm has a smaller real part lies on the unit circle: in a conservative system pairs stay there, up to
-#: round-off of their product. Ten times larger, a torus bifurcation is located as much worse.
-_ON_CIRCLE = 1e-12
 #: Where the logarithm of the multiplier 1 is larger, the direction of the flow is split off: others are hidden by as
 #: much. It is 1e-7 where both multipliers of a conservative system are 1. Ten times smaller, the same is done there.
 _DRIFTED = 1e-6
@@ -65,7 +63,7 @@ class PeriodicCollocation(Collocation):
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
-        self._known: dict[bytes, ComplexArray] = {}
+        self._known: dict[bytes, tuple[ComplexArray, Mask]] = {}
         self.order = problem.order
         sizes = np.ones(self._n) if scales is None else scales.states
         self._turn: Array = problem.symmetry * sizes / sizes[:, None]
@@ -183,25 +181,37 @@ class PeriodicCollocation(Collocation):
         That of a pair on the unit circle, to round-off, has the real part zero. With a symmetry of order n they are those of
         the map over one n-th of the period, S^-1 times its monodromy matrix; see `whole_round`.
         """
+        return self._multipliers(x)[0]
+
+    def neutral(self, x: Array) -> Mask:
+        """Return which multipliers lie on the unit circle up to round-off, shape (n,), but for the one that always is 1."""
+        return self._multipliers(x)[1]
+
+    def _multipliers(self, x: Array) -> tuple[ComplexArray, Mask]:
+        """Return the logarithms of the multipliers, and which of them lie on the unit circle; they are computed once."""
         key = x.tobytes()
         if key not in self._known:
             if len(self._known) > _KEPT:
                 self._known.clear()
-            jacobian = self._jacobian_of_field(x)
-            matrices = transitions(self.basis.value, self.basis.slope, self._h, jacobian)
-            if self.order > 1:
-                matrices = np.concatenate([matrices, np.linalg.inv(self.turn)[None]])
-            values = self._logarithms(x, matrices)
-            total = float(self._quadrature @ np.einsum("kaa->k", jacobian))
-            reals = values.real.tolist()
-            smallest = [place for place, value in enumerate(reals) if value <= min(reals) + _EQUAL]
-            if smallest and not self._is_own_error(values, smallest):
-                # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
-                values[smallest] += (total - sum(reals)) / len(smallest)
-            if self.autonomous and self._n == 2 and self.order == 1:
-                values = _in_the_plane(values, total)
-            self._known[key] = _on_circle(values)
+            values = self._computed(x)
+            neutral = on_circle(self._computed, x, values, expected=int(self.autonomous))
+            self._known[key] = np.where(neutral & is_pair(values), 1j * values.imag, values), neutral
         return self._known[key]
+
+    def _computed(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers as they are computed."""
+        jacobian = self._jacobian_of_field(x)
+        matrices = transitions(self.basis.value, self.basis.slope, self._h, jacobian)
+        if self.order > 1:
+            matrices = np.concatenate([matrices, np.linalg.inv(self.turn)[None]])
+        values = self._logarithms(x, matrices)
+        total = float(self._quadrature @ np.einsum("kaa->k", jacobian))
+        reals = values.real.tolist()
+        smallest = [place for place, value in enumerate(reals) if value <= min(reals) + _EQUAL]
+        if smallest and not self._is_own_error(values, smallest):
+            # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
+            values[smallest] += (total - sum(reals)) / len(smallest)
+        return _in_the_plane(values, total) if self.autonomous and self._n == 2 and self.order == 1 else values
 
     def _logarithms(self, x: Array, transitions: Array) -> ComplexArray:
         """Return the logarithms of the eigenvalues of the product of the transition matrices."""
@@ -435,9 +445,7 @@ def _in_the_plane(values: ComplexArray, total: float) -> ComplexArray:
     return np.array(sorted([complex(one.real if one.imag == 0 else abs(one)), complex(total)], key=lambda value: -value.real))
 
 
-def _on_circle(values: ComplexArray) -> ComplexArray:
-    """Return logarithms of multipliers, those of pairs on the unit circle with the real part zero."""
-    for place, value in enumerate(values.tolist()):
-        if abs(value.real) < _ON_CIRCLE and value.imag and abs(value.imag) != math.pi:
-            values[place] = 1j * value.imag
-    return values
+def is_pair(values: ComplexArray) -> Mask:
+    """Return which logarithms belong to multipliers that are not real."""
+    found: Mask = (values.imag != 0) & (np.abs(values.imag) != math.pi)
+    return found

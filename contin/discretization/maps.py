@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from contin.arrays import Array, ComplexArray
+from contin.arrays import Array, ComplexArray, Mask
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.cycles import is_opposite
+from contin.discretization.cycles import is_opposite, is_pair
+from contin.discretization.rounding import on_circle
 from contin.discretization.scales import Scales
 from contin.functions.batch import Batch
 from contin.linalg.periodic import log_eigenvalues
@@ -211,7 +212,19 @@ class MapSystem(Algebraic):
     # --- stability -----------------------------------------------------------------------------------------------
 
     def eigenvalues(self, x: Array) -> ComplexArray:
-        """Return the logarithms of the multipliers, shape (n,): those with a positive real part are unstable."""
+        """Return the logarithms of the multipliers, shape (n,): those with a positive real part are unstable.
+
+        That of a pair on the unit circle, to round-off, has the real part zero.
+        """
+        values = self._computed(x)
+        return np.where(self.neutral(x) & is_pair(values), 1j * values.imag, values)
+
+    def neutral(self, x: Array) -> Mask:
+        """Return which multipliers lie on the unit circle up to round-off, shape (n,)."""
+        return on_circle(self._computed, x, self._computed(x))
+
+    def _computed(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers as they are computed."""
         values = log_eigenvalues(self.transitions(x))
         values.real = np.maximum(values.real, np.log(_NO_MULTIPLIER))
         return values
