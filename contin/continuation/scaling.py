@@ -195,7 +195,7 @@ class _FirstPoint:
             left = left & ~part
 
     def _apart(self, which: Pattern) -> Array:
-        """Return how far, up to one, some states can change by themselves before F_x is singular; 0 where that never happens."""
+        """Return how far, up to one, states can change by themselves before F_x is singular; 0 where that never happens."""
         found = np.zeros(which.size)
         for number in np.flatnonzero(which) if np.count_nonzero(which) <= _MOST else ():
             alone = self._kept(np.ones_like(self.x), np.arange(which.size) == number)

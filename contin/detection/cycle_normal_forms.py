@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.detection.lyapunov import Coefficient, moved
+from contin.detection.lyapunov import Coefficient
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.multilinear import of_complex
 from contin.discretization.round import Round, Solver
@@ -66,45 +66,52 @@ class NormalForms:
 
     def fold(self) -> Coefficient:
         """Return the absolute value of b."""
+        found = self._coefficient(NormalForms._of_fold)
+        return Coefficient(abs(found.value), found.error, found.size)
+
+    def period_doubling(self) -> Coefficient:
+        """Return c."""
+        return self._coefficient(NormalForms._of_period_doubling)
+
+    def torus(self, angle: float) -> Coefficient:
+        """Return the real part of d."""
+        return self._coefficient(lambda forms: forms._of_torus(angle))
+
+    def _coefficient(self, terms: Callable[[NormalForms], Array]) -> Coefficient:
+        """Return a coefficient per unit of time from its terms in x."""
+        return Coefficient.of(lambda x: terms(self if x is self.x else NormalForms(self.system, x)), self.x, self.system)
+
+    # --- the terms of the coefficients ---------------------------------------------------------------------------
+
+    def _of_fold(self) -> Array:
         v, w = self._null_vectors(self.phased, 1.0)
         if isinstance(self.system, CycleCollocation):
             states = np.ascontiguousarray(self.x[: self.system.state_size].reshape(self.system.nodes.size, -1))
             along = self.system.rates(self.x, states).ravel()
             v[: along.size] -= self._mean(v, along) / self._mean(along, along) * along
         v = v / np.sqrt(self._mean(v, v))
-        here, alpha = self._at_points(v), (v[-1] / self.period if self.system.autonomous else 0.0)
-        w = w / self._product(w, here)
+        u, alpha = self._at_points(v), (v[-1] / self.period if self.system.autonomous else 0.0)
+        w = w / self._product(w, u)
+        return self._products(w, [self._along(u, u), 2 * alpha * self._apply(u)], 2)
 
-        def terms(u: Array) -> Sequence[Array]:
-            return self._along(u, u), 2 * alpha * self._apply(u)
+    def _of_period_doubling(self) -> Array:
+        u, w = self._critical(-1.0)
+        h, change = self._periodic(self._along(u, u))
+        a = -change / (2 * self.period)
+        return self._products(w, [self._along(u, u, u), 3 * self._along(u, h), -6 * a * self._apply(u)], 6)
 
-        found = self._coefficient(w, here, terms, 2)
-        return Coefficient(abs(found.value), found.error, found.size)
-
-    def period_doubling(self) -> Coefficient:
-        """Return c."""
-        v, here, w = self._critical(-1.0)
-
-        def terms(u: Array) -> Sequence[Array]:
-            h, change = self._periodic(self._along(u, u))
-            a = -change / (2 * self.period)
-            return self._along(u, u, u), 3 * self._along(u, h), -6 * a * self._apply(u)
-
-        return self._coefficient(w, here, terms, 6)
-
-    def torus(self, angle: float) -> Coefficient:
-        """Return the real part of d."""
-        v, here, w = self._critical(np.exp(1j * angle))
+    def _of_torus(self, angle: float) -> Array:
+        u, w = self._critical(np.exp(1j * angle))
+        h, change = self._periodic(self._along(u, u.conj()).real)
+        a = -change / self.period
         twice = self.plain.solver(np.exp(2j * angle))
+        k = self._at_points(twice.solve(self._right_side(self._along(u, u), self.plain)))
+        slope = -2 * a * (self._apply(u) - 1j * angle * u)
+        return self._products(w, [self._along(u, u, u.conj()), 2 * self._along(u, h), self._along(u.conj(), k), slope], 2)
 
-        def terms(u: Array) -> Sequence[Array]:
-            h, change = self._periodic(self._along(u, u.conj()).real)
-            a = -change / self.period
-            k = self._at_points(twice.solve(self._right_side(self._along(u, u), self.plain)))
-            slope = -2 * a * (self._apply(u) - 1j * angle * u)
-            return self._along(u, u, u.conj()), 2 * self._along(u, h), self._along(u.conj(), k), slope
-
-        return self._coefficient(w, here, terms, 2)
+    def _products(self, w: Array, terms: Sequence[Array], factor: float) -> Array:
+        """Return the real parts of the products of w with the terms, per unit of time, over a factor."""
+        return np.array([self._product(w, term).real for term in terms]) / (factor * self.system.unit_time(self.x))
 
     # --- solutions of the linear problems ------------------------------------------------------------------------
 
@@ -120,12 +127,12 @@ class NormalForms:
             b, c = w.conj() / np.linalg.norm(w), v.conj() / np.linalg.norm(v)
         return v, w
 
-    def _critical(self, multiplier: Any) -> tuple[Array, Array, Array]:
-        """Return v, v at the Gauss points, and w, of a multiplier that is not one."""
+    def _critical(self, multiplier: Any) -> tuple[Array, Array]:
+        """Return v at the Gauss points, and w, of a multiplier that is not one."""
         v, w = self._null_vectors(self.plain, multiplier)
         v = v / np.sqrt(self._mean(v, v.conj()).real)
         here = self._at_points(v)
-        return v, here, w / self._product(w, here)
+        return here, w / self._product(w, here)
 
     def _periodic(self, right_side: Array) -> tuple[Array, float]:
         """Return the periodic h with L h = right side + change * F, at the Gauss points, and this change of the period."""
@@ -169,12 +176,3 @@ class NormalForms:
         """Return J v."""
         result: Array = np.einsum("kij,kj->ki", self.jacobian, v)
         return result
-
-    def _coefficient(self, w: Array, here: Array, terms: Callable[[Array], Sequence[Array]], factor: float) -> Coefficient:
-        """Return the real part of a coefficient per unit of time: the products of w with its terms, over the factor."""
-        factor = factor * self.system.unit_time(self.x)
-
-        def products(s: float) -> Array:
-            return np.array([self._product(w, term).real for term in terms(moved(here, s))]) / factor
-
-        return Coefficient.of(products, self.system)
