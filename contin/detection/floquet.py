@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
-from contin.detection.hopf import hopf, hopf_points
+from contin.detection.hopf import hopf, hopf_points, passes
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.detection.significance import on_finer_mesh
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.maps import MapSystem
-from contin.discretization.rounding import changes
+from contin.discretization.rounding import changes_of_multipliers
 from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton, correct
 from contin.stepping.trial import TestFunction, Trial, sign_changed
@@ -44,8 +44,6 @@ _DEEPER = 0.5
 #: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. In the tail of
 #: AUTO's demo ``tor`` the doublings to the period 49 are certain, those from 54 on are not.
 _MEANINGLESS = 1e-2
-#: Part of a step before and behind a torus bifurcation where its pair must lie on different sides of the circle.
-_BESIDE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +77,7 @@ def floquet(system: PeriodicCollocation | MapSystem, x: Array, tangent: Array) -
     """Return the Floquet multipliers of a cycle with their errors; the tangent is NaN where it is not known."""
     values, trivial = system.eigenvalues(x), _trivial(system, x)
     if isinstance(system, MapSystem):
-        return Floquet(values, changes(system.eigenvalues, x, values), unstable(system, x))
+        return Floquet(values, changes_of_multipliers(system.eigenvalues, x, values), unstable(system, x))
     finer: Any
     finer, carry = system.refined()
     try:
@@ -307,6 +305,4 @@ def _passes(segment: Segment, point: SpecialPoint) -> bool:
     """Return whether the pair of a torus bifurcation lies inside the circle on one side of it, and outside on the other."""
     if not point.is_located or point.test is None:
         return True
-    sides = [segment.near(point.at + way * _BESIDE * segment.step) for way in (-1, 1)]
-    before, behind = (point.test.function(trial) for trial in sides)
-    return bool(before * behind < 0)
+    return passes(segment, point.at, point.test)

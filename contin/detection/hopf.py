@@ -30,6 +30,8 @@ _PARTS = 4
 _CUTS = 20
 #: Hopf points closer than this part of the step are one point with several pairs: round-off of eigenvalues of multiplicity two.
 _TOGETHER = 1e-7
+#: Part of a step before and behind a Hopf point where its pair must lie on different sides of the axis, where that is in doubt.
+_BESIDE = 1e-3
 #: A real part below this, relative to 1 + the eigenvalue's size, is zero at a Hopf point.
 _ON_AXIS = 1e-7
 
@@ -184,7 +186,15 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
         return None
     label, name = crossing
     test = _nearest(1j * frequency)
+    if not lost and 0.0 in (first.real, last.real) and not passes(segment, at, test):
+        return None  # the pair lies on the axis before
     return SpecialPoint(at, label, lost + name, there, None, {"frequency": frequency, "pairs": 1}, test)
+
+
+def passes(segment: Segment, at: float, test: TestFunction) -> bool:
+    """Return whether a test function has different signs before and behind a place."""
+    before, behind = (test.function(segment.near(at + way * _BESIDE * segment.step)) for way in (-1, 1))
+    return bool(before * behind < 0)
 
 
 def _pairs_at(point: SpecialPoint) -> int:

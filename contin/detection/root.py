@@ -47,8 +47,8 @@ def find_zero(
     1.414213562373
     """
     (a, fa), (b, fb) = left, right
-    if fb == 0:
-        return b
+    if fa == 0 or fb == 0:
+        return a if fa == 0 else b
     known = [left, right]
     best, idle, c, fc = (np.inf, b), 0, guess, np.nan
     small, least = _JUMP * max(abs(fa), abs(fb)), min(abs(fa), abs(fb))

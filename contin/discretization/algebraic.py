@@ -12,6 +12,7 @@ from contin.arrays import Array, ComplexArray
 from contin.discretization.given import check_given
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
+from contin.discretization.rounding import off_axis
 from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
 from contin.functions.batch import Batch
@@ -222,7 +223,8 @@ class Algebraic(System):
             if key not in self._found:  # the ends of a step and of its parts are asked for several times
                 self._found = {**dict(list(self._found.items())[-_KEPT:]), key: rightmost(self.as_field().field_jacobian(x))}
             return self._found[key]
-        return eigenvalues(self.jacobian(x))
+        matrix = self.jacobian(x)
+        return off_axis(eigenvalues, matrix, eigenvalues(matrix))
 
     def is_symmetric(self, x: Array) -> bool:
         """Return whether F_u is a large symmetric matrix, up to round-off: its eigenvalues are real."""
