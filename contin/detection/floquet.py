@@ -12,7 +12,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,7 @@ from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.detection.significance import on_finer_mesh
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.maps import MapSystem
+from contin.discretization.protocol import Discretization
 from contin.discretization.rounding import changes_of_multipliers
 from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton, correct
@@ -41,6 +42,12 @@ _CHANGES = 3.0
 #: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
 #: to this part. Ten times smaller, two period doublings that nearly meet are passed.
 _DEEPER = 0.5
+#: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
+#: larger, period doublings beside folds lose their coefficients.
+_ONE = 1e-5
+#: Step along the tangent over which multipliers are compared: their errors need one digit. In a canard explosion they change by
+#: a tenth of their value where the step is a thousand times longer.
+_ASIDE = 1e-5
 #: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. In the tail of
 #: AUTO's demo ``tor`` the doublings to the period 49 are certain, those from 54 on are not.
 _MEANINGLESS = 1e-2
@@ -73,24 +80,61 @@ class Floquet:
         return found
 
 
-def floquet(system: PeriodicCollocation | MapSystem, x: Array, tangent: Array) -> Floquet:
-    """Return the Floquet multipliers of a cycle with their errors; the tangent is NaN where it is not known."""
-    values, trivial = system.eigenvalues(x), _trivial(system, x)
-    if isinstance(system, MapSystem):
-        return Floquet(values, changes_of_multipliers(system.eigenvalues, x, values), unstable(system, x))
+def floquet(
+    system: Discretization, x: Array, tangent: Array, errors: Mapping[str, float] | None = None, fold: bool = False
+) -> Floquet:
+    """Return the Floquet multipliers of a cycle, or of one on a curve in two parameters, with their errors.
+
+    The tangent is NaN where it is not known. ``errors`` are those of the free parameters at a located point: how far it may lie
+    from its place, and how much the multipliers change over that distance. At a ``fold`` one of them is 1 besides.
+    """
+    cycles, x_of = _cycles(system), slice(0, _cycles(system).size)
+    values, trivial = cycles.eigenvalues(x[x_of]), _trivial(cycles, x[x_of])
+    if isinstance(cycles, MapSystem):
+        found = changes_of_multipliers(cycles.eigenvalues, x[x_of], values)
+        return Floquet(values, found, unstable(cycles, x[x_of]))
     finer: Any
-    finer, carry = system.refined()
+    finer, carry = system.refined()  # type: ignore[misc]  # there is a mesh
     try:
-        again = finer.eigenvalues(_corrected(finer, carry(x), carry(tangent)))
-        errors = _apart(values, again)
+        again = _corrected(finer, carry(x), carry(tangent))
+        found = _apart(values, _cycles(finer).eigenvalues(again[: _cycles(finer).size]))
     except ConvergenceError:
-        errors = np.full(values.shape, np.nan)
+        found = np.full(values.shape, np.nan)
+    found += _by_place(system, x, tangent, errors or {}, fold)
     if trivial is not None:
-        errors[trivial] = abs(values[trivial])
-    return Floquet(system.whole_round(values), system.order * errors, unstable(system, x))
+        found[trivial] = abs(values[trivial])
+    return Floquet(cycles.whole_round(values), cycles.order * found, unstable(cycles, x[x_of]))
 
 
-def _corrected(system: PeriodicCollocation, x: Array, tangent: Array) -> Array:
+def _cycles(system: Any) -> PeriodicCollocation | MapSystem:
+    """Return the system of cycles, of one that may be an extended system of theirs."""
+    while not isinstance(system, (PeriodicCollocation, MapSystem)):
+        system = system.base
+    return system
+
+
+def _by_place(system: Any, x: Array, tangent: Array, errors: Mapping[str, float], fold: bool) -> Array | float:
+    """Return by how much the multipliers change between a located point and where it may lie.
+
+    That is as far as free parameters take to change by their errors and, of a fold, to where a multiplier is 1: in a canard
+    explosion a fold is known to lie on a long piece of the branch only.
+    """
+    known = [(errors[name] / size, tangent[system.parameter_index(name)])
+             for name, size in zip(system.free, system.free_scales) if errors.get(name, 0.0) > 0]  # fmt: skip
+    if not known or not np.all(np.isfinite(known)):
+        return 0.0
+    error, rate = np.linalg.norm(known, axis=0)
+    cycles, beside = _cycles(system), x + _ASIDE * tangent
+    values, trivial = cycles.eigenvalues(x[: cycles.size]), _trivial(cycles, x[: cycles.size])
+    changes: Array = _apart(values, cycles.eigenvalues(beside[: cycles.size])) / _ASIDE
+    distance = error / rate if rate > 0 else 0.0
+    if fold:
+        place = min((i for i in range(len(values)) if i != trivial), key=lambda i: abs(values[i]))
+        distance = max(distance, abs(values[place]) / changes[place] if changes[place] > 0 else 0.0)
+    return changes * distance
+
+
+def _corrected(system: Discretization, x: Array, tangent: Array) -> Array:
     """Return a cycle corrected; as it is where F_x is singular there and no tangent is known."""
     if system.size == system.equations:
         return correct(system, x).x
@@ -121,6 +165,17 @@ def unstable(system: PeriodicCollocation | MapSystem, x: Array) -> int:
     if trivial is not None:
         outside[trivial] = False
     return int(np.count_nonzero(outside))
+
+
+def has_double_one(system: PeriodicCollocation, x: Array) -> bool:
+    """Return whether a multiplier is 1 beside the one that always is, as far as can be told: that of a Jordan block may be off.
+
+    In a conservative system it is along the whole family.
+    """
+    values, trivial = np.abs(system.eigenvalues(x)), _trivial(system, x)
+    if trivial is not None:
+        values[trivial] = np.inf
+    return bool(values.min() < _ONE)
 
 
 @functools.cache  # one for all steps: a point that two steps share has its value once

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contin.detection.cycle_normal_forms import NormalForms
-from contin.detection.floquet import doubling, torus
+from contin.detection.floquet import doubling, has_double_one, torus
 from contin.detection.homoclinic import homoclinic, limit_of_parameter, resting_place
 from contin.detection.homoclinic_points import homoclinic_points, own_names
 from contin.detection.hopf import hopf
@@ -154,15 +154,18 @@ def _of_hopf_points(system: Algebraic, point: SpecialPoint) -> Coefficient | Non
 
 @own_normal_form.register
 def _of_bifurcations_of_cycles(system: PeriodicCollocation, point: SpecialPoint) -> Coefficient | None:
-    """The coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
+    """The coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses.
+
+    These have none where a multiplier is 1, too: the cycle is not isolated, as in conservative systems.
+    """
     with np.errstate(all="ignore"):
         if point.label == "LP" and point.details is None and point.is_located:
             return NormalForms(system, point.trial.x).fold()
-        if point.label in ("PD", "BP") and _is_simple(point):
+        if point.label not in ("PD", "BP", "TR") or not _is_simple(point) or has_double_one(system, point.trial.x):
+            return None
+        if point.label in ("PD", "BP"):
             return NormalForms(system, point.trial.x).period_doubling()
-        if point.label == "TR" and _is_simple(point):
-            return NormalForms(system, point.trial.x).torus(point.details["frequency"])
-    return None
+        return NormalForms(system, point.trial.x).torus(point.details["frequency"])
 
 
 def _is_simple(point: SpecialPoint) -> bool:

@@ -20,6 +20,7 @@ from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.errors import ProblemError
+from contin.problems.cycle import PERIOD
 from contin.results import portrait
 from contin.results.profile import Profile
 from contin.stepping.trial import Trial
@@ -238,6 +239,8 @@ class Point:
     def floquet(self) -> Floquet:
         """Return the Floquet multipliers of a cycle, or of one of a map, with estimates of their errors.
 
+        On curves in two parameters they are those of the cycle at this point of the curve.
+
         Raises
         ------
         ProblemError
@@ -256,9 +259,10 @@ class Point:
         >>> np.abs(orbit.floquet().multipliers).round(8).tolist()  # 1 and exp(-2 mu period), the period is 2 pi
         [1.0, 0.04321392]
         """
-        if not isinstance(self.system, (PeriodicCollocation, MapSystem)):
+        if not isinstance(underlying(self).system, (PeriodicCollocation, MapSystem)):
             raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem or MapProblem")
-        return floquet(self.system, self.x, self.tangent)
+        fold = self.label == "LP" and self.column != PERIOD and not isinstance(self.system, Extended)
+        return floquet(self.system, self.x, self.tangent, self.errors, fold)
 
     def second_variation(self) -> SecondVariation:
         """Return the second variation of the energy there: its eigenvalues, and its modes as functions.

@@ -112,6 +112,9 @@ def test_canards_of_fitzhugh_and_nagumo(eps):
         assert max(end.errors.values()) < 1e-10
         assert str(branch.stop) == "the cycles shrink onto an equilibrium, a Hopf point"
         first, last = branch.labelled("LP")
+        for fold in (first, last):  # a multiplier is 1 there, but where on the plateau is not known
+            multipliers = fold.floquet()
+            assert (np.abs(multipliers.logarithms) <= multipliers.errors * 1.001).all()
         folds += [first["load"], last["load"]]
         assert first["load"] + last["load"] == pytest.approx(1.75, abs=1e-8)  # not all errors can be told on a plateau
     assert folds[:2] == pytest.approx(folds[:1:-1], abs=1e-8)

@@ -229,3 +229,26 @@ def test_a_curve_of_doublings_does_not_slide_onto_an_equilibrium():
     assert found.labelled("LP")[0]["be"] == pytest.approx(0.767089, abs=1e-6)
     for point in found:
         assert point["max_x"] - point["min_x"] > 0.03
+
+
+def test_multipliers_on_curves():
+    """On a curve of period doublings one is -1, of torus bifurcations a pair has the column's angle; at a given period none."""
+    problem = CycleProblem(
+        lambda u, p: (-u.y - u.z, u.x + p.a * u.y, 0.2 + u.z * (u.x - p.c)), ["x", "y", "z"], {"a": 0.2, "c": 2.0}
+    )
+    single = contin.trace(contin.cycle(problem, [1.0, 1.0, 0.0]), free=["c"], limits={"c": (1.5, 3)}, zeros={"period": [5.72]})
+    doublings = contin.curve(single.labelled("PD")[0], "a", limits={"a": (0.18, 0.22)})
+    for point in doublings:
+        found = point.floquet()
+        assert np.abs(np.exp(found.logarithms) + 1).min() < 1e-10 and found.unstable == 0
+        assert (found.errors < 1e-8).all()
+    (torus,) = contin.trace(driven(), free=["mu"], limits={"mu": (-0.1, 0.1)}).labelled("TR")
+    for point in contin.curve(torus, "k", limits={"k": (torus["k"] - 0.01, torus["k"] + 0.01)}):
+        found = point.floquet()
+        assert np.abs(found.logarithms - 1j * point["angle"]).min() < 1e-9
+    held = contin.curve(single.labelled("UZ")[0], "a", limits={"a": (0.19, 0.21)})
+    for point in held:
+        assert point["period"] == pytest.approx(5.72, abs=1e-11)
+        total = point.floquet().logarithms.sum().real  # by Liouville's formula, with the mean of x by the trapezoidal rule
+        x = point.system.base.evaluate(point.x, np.linspace(0, 1, 4001)[:-1])[:, 0]
+        assert total == pytest.approx(point["period"] * (point["a"] + x.mean() - point["c"]), abs=1e-8)
