@@ -21,11 +21,13 @@ from contin.curves.extended import Extended
 from contin.curves.extremum_curve import ExtremumCurve
 from contin.curves.fold_curve import FoldCurve
 from contin.curves.hopf_curve import HopfCurve
+from contin.curves.map_curves import MapDoublingCurve, MapTorusCurve
 from contin.detection.branch_point import BranchPoint
 from contin.detection.lyapunov import critical_pair
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
+from contin.discretization.maps import MapSystem
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.results.branch import Branch
@@ -178,17 +180,21 @@ def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
 
 
 def _doublings(start: Point, base: System, x: Array) -> _First | None:
-    return (DoublingCurve(base), x) if doubles(start) and isinstance(base, PeriodicCollocation) else None
+    if not doubles(start):
+        return None
+    if isinstance(base, MapSystem):
+        return MapDoublingCurve(base), x
+    return (DoublingCurve(base), x) if isinstance(base, PeriodicCollocation) else None
 
 
 def _tori(start: Point, base: System, x: Array) -> _First | None:
-    if start.label != "TR" or not isinstance(base, PeriodicCollocation):
+    if start.label != "TR" or not isinstance(base, (PeriodicCollocation, MapSystem)):
         return None
     angle = frequency_of(start)
     if angle is None:
         values = base.eigenvalues(x)
         angle = abs(values[np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))].imag)
-    return TorusCurve(base), np.append(x, np.cos(angle))
+    return (MapTorusCurve if isinstance(base, MapSystem) else TorusCurve)(base), np.append(x, np.cos(angle))
 
 
 def _extrema(start: Point, base: System, x: Array) -> _First | None:

@@ -40,12 +40,24 @@ from contin.stepping.trial import TestFunction, Trial
 #: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
 _DOUBLE = 1e-3
 #: Cosines of the angles at strong resonances.
-_RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
+RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
 #: With a smaller imaginary part of the multiplier the curve is at its end, with a smaller difference of kappa at a resonance:
 #: they are located more exactly than that.
 _REAL = 1e-6
 #: Where kappa has an extremum, a value this close to that of a resonance is worth a search.
 _NEAR = 0.05
+
+
+def pair_of(kappa: float) -> Array:
+    """Return the real matrix P with the eigenvalues exp(-+ i theta), for kappa = cos(theta)."""
+    return np.array([[kappa, kappa**2 - 1], [1.0, kappa]])
+
+
+def by_kappa(kappa: float, starts: Array, ends: Array) -> Array:
+    """Return -w.(dP/dkappa v(0)), shape (2,), of v(0) (2, n) and of the parts of two w for the ends (2, 2, n)."""
+    change = np.array([[1.0, 2 * kappa], [0.0, 1.0]])
+    result: Array = -np.einsum("ija,jk,ka->i", ends, change, starts)
+    return result
 
 
 class CycleCurve(CriticalCurve):
@@ -149,8 +161,7 @@ class TorusCurve(CycleCurve):
 
     def coupling(self, x: Array) -> Array:
         """Return the real matrix with the eigenvalues exp(-+ i theta)."""
-        kappa = self.kappa(x)
-        return np.array([[kappa, kappa**2 - 1], [1.0, kappa]])
+        return pair_of(self.kappa(x))
 
     def imaginary_part(self, x: Array) -> float:
         """Return sin(theta); 0 where the multipliers are real."""
@@ -158,9 +169,7 @@ class TorusCurve(CycleCurve):
 
     def by_kappa(self, x: Array, right: Array, left: Array) -> Array:
         """Return -w.(dP/dkappa v(0))."""
-        change = np.array([[1.0, 2 * self.kappa(x)], [0.0, 1.0]])
-        result: Array = -np.einsum("ija,jk,ka->i", self.ends(left), change, self.starts(right))
-        return result
+        return by_kappa(self.kappa(x), self.starts(right), self.ends(left))
 
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, and the angle."""
@@ -168,7 +177,7 @@ class TorusCurve(CycleCurve):
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
-        if self.imaginary_part(x) < _REAL or abs(self.kappa(x) - _RESONANCES["R3"]) < _REAL:
+        if self.imaginary_part(x) < _REAL or abs(self.kappa(x) - RESONANCES["R3"]) < _REAL:
             return Coefficient(math.nan, math.nan, math.nan)
         return NormalForms(self.cycles, x[: self.base.size]).torus(self.angle(x))
 
@@ -246,7 +255,7 @@ def _degenerate(label: str, name: str) -> TestFunction:
 @own_test_functions.register
 def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
     """Strong resonances, Chenciner points, and folds."""
-    resonances = [_resonance(label, kappa) for label, kappa in _RESONANCES.items()]
+    resonances = [_resonance(label, kappa) for label, kappa in RESONANCES.items()]
     return [*shrinking(system.cycles), *resonances, _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
 

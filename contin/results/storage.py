@@ -19,11 +19,13 @@ from contin.curves.cycle_curves import DoublingCurve, TorusCurve
 from contin.curves.extended import Extended
 from contin.curves.fold_curve import FoldCurve
 from contin.curves.hopf_curve import HopfCurve
+from contin.curves.map_curves import MapDoublingCurve, MapTorusCurve
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
 from contin.discretization.kinds import algebraic, discretized
+from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
@@ -43,6 +45,8 @@ _FORMAT, _OF_CURVE = "contin branch 1", "contin branch 2"
 _CURVES: dict[str, type[Extended]] = {
     kind.kind: kind for kind in (FoldCurve, BranchPointCurve, HopfCurve, DoublingCurve, TorusCurve)
 }
+#: Those of maps, likewise.
+_CURVES_OF_MAPS: dict[str, type[Extended]] = {kind.kind: kind for kind in (MapDoublingCurve, MapTorusCurve)}
 #: Arrays of a branch point that are stored besides its tangents.
 _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 
@@ -219,7 +223,7 @@ def _system(
     if not head.get("curves"):
         return base
     kind, size = head["curves"][i]
-    curve = _CURVES[kind]
+    curve = (_CURVES_OF_MAPS if isinstance(base, MapSystem) and kind in _CURVES_OF_MAPS else _CURVES)[kind]
     return curve(base, None, size) if issubclass(curve, CriticalCurve) else curve(base, None)
 
 

@@ -187,3 +187,44 @@ def test_a_diagram_finds_all_of_it():
 def test_what_is_refused(statement, words):
     with pytest.raises(ProblemError, match=words):
         statement()
+
+
+def test_curves_of_period_doublings_of_henon():
+    """Of the fixed point at a = 3 (1 - b)^2 / 4, of the cycle of two points at a = (1 - b)^2 + (1 + b)^2 / 4; det = -b.
+
+    At b = -1 both multipliers are -1.
+    """
+    henon = MapProblem(lambda u, p: (1 + u.y - p.a * u.x**2, p.b * u.x), ["x", "y"], {"a": 0.1, "b": 0.3})
+    (single,) = contin.trace(contin.solve(henon, [0.5, 0.5]), free=["a"], limits={"a": (0, 1)}).labelled("PD")
+    found = contin.curve(single, "b", direction=-1, limits={"b": (-1.5, 1)})
+    assert [point.label for point in found if point.label] == ["EP", "R2", "EP"]
+    assert (found.labelled("R2")[0]["a"], found.labelled("R2")[0]["b"]) == pytest.approx((3, -1), abs=1e-10)
+    for point in found:
+        assert point["a"] == pytest.approx(0.75 * (1 - point["b"]) ** 2, abs=1e-10)
+        multipliers = point.floquet().multipliers  # of a double one the root of round-off is known
+        assert np.abs(multipliers + 1).min() < (1e-6 if point.label == "R2" else 1e-8)
+    (double,) = contin.trace(single, branch=1, limits={"a": (0, 1)}).labelled("PD")
+    for point in contin.curve(double, "b", limits={"b": (-0.5, 0.5)}):
+        assert point["a"] == pytest.approx((1 - point["b"]) ** 2 + (1 + point["b"]) ** 2 / 4, abs=1e-10)
+
+
+def test_a_curve_of_tori_of_a_map_passes_strong_resonances(tmp_path):
+    """x' = r x (1 - (1 - e) y - e x), y' = x: at the fixed point det = (r - 1)(1 - e) and trace = 1 - (r - 1) e.
+
+    det = 1 at r = 1 + 1 / (1 - e), where the trace is 0 at e = 1/2 (R4), -1 at 2/3 (R3), -2 at 3/4 (R2).
+    """
+    problem = MapProblem(lambda u, p: (p.r * u.x * (1 - (1 - p.e) * u.y - p.e * u.x), u.x), ["x", "y"], {"r": 1.5, "e": 0.0})
+    (torus,) = contin.trace(contin.solve(problem, [1 / 3, 1 / 3]), free=["r"], limits={"r": (1.2, 2.5)}).labelled("TR")
+    found = contin.curve(torus, "e", limits={"e": (-1, 1)})
+    assert [point.label for point in found if point.label] == ["EP", "R4", "R3", "R2"]
+    for label, e in (("R4", 1 / 2), ("R3", 2 / 3), ("R2", 3 / 4)):
+        assert found.labelled(label)[0]["e"] == pytest.approx(e, abs=1e-9)
+    for point in found:
+        assert point["r"] == pytest.approx(1 + 1 / (1 - point["e"]), abs=1e-9)
+        trace = 1 - point["e"] / (1 - point["e"])
+        assert 2 * math.cos(point["angle"]) == pytest.approx(trace, abs=1e-8)
+    contin.save(found, tmp_path / "curve.npz")
+    again = contin.load(problem, tmp_path / "curve.npz")
+    assert again.column("angle").tolist() == found.column("angle").tolist()
+    onward = contin.trace(again.points[1], limits={"e": (-1, 0.6)})  # of the same kind of curve
+    assert [point.label for point in onward if point.label][-2:] == ["R4", "EP"]
