@@ -178,13 +178,11 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
     """Return a special point with the coefficient in its details and, but for folds, what it means in its name.
 
     The error is that of the derivatives, and what the coefficient differs from that on the mesh of the run. A coefficient that
-    is nothing but error is left out: at a period doubling in a conservative system there is none.
+    is nothing but error is left out, and its error is stated.
     """
     found = found._replace(error=found.error + abs(found.value - coarse.value))
-    if found.is_meaningless:
-        return point
-    error = found.error
-    details = {**(point.details or {}), "normal_form": found.value, "normal_form_error": error}
+    value, error = ({} if found.is_meaningless else {"normal_form": found.value}), found.error
+    details = {**(point.details or {}), **value, "normal_form_error": error}
     kind = ", supercritical" if found.value < -error else ", subcritical" if found.value > error else ""
     return dataclasses.replace(point, name=point.name + kind * (point.label != "LP"), details=details)
 
