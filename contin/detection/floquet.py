@@ -30,8 +30,9 @@ from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton, correct
 from contin.stepping.trial import TestFunction, Trial, sign_changed
 
-#: Into how many parts a step is divided to look inside it, on the cubic.
-_PARTS = 4
+#: Where a step is looked at inside, on the cubic, as parts of it: also beside its ends, where a dip towards zero would show at
+#: no other place. Without those two of Mathieu's doublings, a part of .03 and .04 behind the beginning of a step, are passed.
+_LOOKS = (1 / 64, 1 / 4, 1 / 2, 3 / 4, 63 / 64)
 #: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens: a
 #: little less than the distance pi of 1 from -1. A pair can reach -1 and come back, and be at the ends where it was nearly:
 #: with 0.5, and 1.5 changes, two period doublings of Mathieu's equation in one step are passed. With both ten times larger
@@ -208,7 +209,7 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     known = [trial.value(test) for _, trial in knots]
     if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, _from_doubling):
         return []
-    inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
+    inside = [segment.step * part for part in _LOOKS]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
     values = [trial.value(test) for _, trial in looked]
     if not np.all(np.isfinite(values)) or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
