@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -109,14 +109,39 @@ def solved(
     ------
     ConvergenceError, ProblemError
     """
+
+    def corrected(system: System, x: Array) -> Corrected:
+        return _corrected(system, x, others, newton) if held is None else _holding(system, x, held, newton)
+
     for _ in range(_ROUNDS):
-        done = _corrected(system, x, others, newton) if held is None else _holding(system, x, held, newton)
+        done = corrected(system, x)
+        if control.every:
+            system, done = _on_switches(system, done, corrected)
         adapted = system.adapted(done.x, control)
         if adapted is None:
             break
         system, carry = adapted
         x = carry(done.x)
+    else:
+        done = corrected(system, x)
     return point_of(system, done.x, done.iterations, done.error)
+
+
+def _on_switches(
+    system: System, done: Corrected, corrected: Callable[[System, Array], Corrected]
+) -> tuple[System, Corrected]:
+    """Return a solution on a mesh with points where conditions on states switch; the last one that Newton's method finds."""
+    for _ in range(_ROUNDS):
+        moved = system.on_switches(done.x)
+        if moved is None:
+            break
+        other, carry = moved
+        try:
+            done = corrected(other, carry(done.x))
+        except ConvergenceError:
+            break
+        system = other
+    return system, done
 
 
 def _holding(system: System, x: Array, name: str, newton: Newton) -> Corrected:

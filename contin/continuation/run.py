@@ -96,6 +96,9 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
+#: Times that mesh points are moved to where conditions switch, at one point. The distance left is squared each time at a corner:
+#: 1e-2, 1e-4, 1e-8 of the domain. At a jump it falls by a factor.
+_SETTLINGS = 5
 #: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
 #: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
 _MARGIN = 0.1
@@ -217,14 +220,14 @@ class Continuation:
             state = dataclasses.replace(standing_at(system, x, unit, settings.step), singular=singular)
             return state if singular else dataclasses.replace(state, sign=system.linearize(x, (state.row,))[1].sign)
         for _ in range(_ROUNDS):
-            x, row = self._first_correction(system, x)
+            system, x, row = self._first_on_switches(system, x)
             adapted = system.adapted(x, settings.mesh)
             if adapted is None:
                 break
             system, carry = adapted
             x = carry(x)
         else:
-            x, row = self._first_correction(system, x)
+            system, x, row = self._first_on_switches(system, x)
         linear = linearization(system, x, row)
         rescaled, z = scaled(system, x, linear, self.primary, settings)
         if rescaled is not system:
@@ -245,9 +248,20 @@ class Continuation:
             if finer is None:
                 break
             system, carry = finer
-            x, row = self._first_correction(system, carry(x))
+            system, x, row = self._first_on_switches(system, carry(x))
             linear = linearization(system, x, row)
         return system, x, linear
+
+    def _first_on_switches(self, system: Discretization, x: Array) -> tuple[Discretization, Array, Array]:
+        """Correct x, on a mesh with points where conditions that the solution decides switch; return the row held, too."""
+        x, row = self._first_correction(system, x)
+        for _ in range(_SETTLINGS if self.settings.mesh.every else 0):
+            moved = system.on_switches(x)
+            if moved is None:
+                break
+            system, carry = moved
+            x, row = self._first_correction(system, carry(x))
+        return system, x, row
 
     def _first_correction(self, system: Discretization, x: Array) -> tuple[Array, Array]:
         """Correct x at fixed primary parameter or, where that is singular (at a fold), across a random direction.
@@ -307,7 +321,7 @@ class Continuation:
         """Make one step: yield the labelled points inside it, then the point at its end."""
         self._adapt_mesh()
         try:
-            segment, inspection, distance, doubt = self._accurate_step()
+            (segment, inspection, distance, doubt), reached = self._accurate_step()
         except ConvergenceError as error:
             stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
             if stop.reason == "no convergence" and self._takes_shorter_steps():
@@ -333,7 +347,7 @@ class Continuation:
             if self.stop is not None:
                 return
         self.state = self._accept(segment, distance, inspection.turns)
-        self._end = segment.trial
+        self._stand_at(reached)
         if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
             self._is_noisy = True
             self._note(
@@ -344,7 +358,7 @@ class Continuation:
         elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
-        found_at_end = self._located(SpecialPoint(segment.step, label, name, segment.trial))
+        found_at_end = self._located(SpecialPoint(segment.step, label, name, reached))
         yield self._point(found_at_end, segment.state, accuracy=self._accuracy)
 
     def _takes_shorter_steps(self) -> bool:
@@ -369,27 +383,64 @@ class Continuation:
 
     # --- one step ------------------------------------------------------------------------------------------------
 
-    def _accurate_step(self) -> tuple[Segment, Inspection, float, str]:
+    def _accurate_step(self) -> tuple[tuple[Segment, Inspection, float, str], Trial]:
         """Make a step whose end has an error within the tolerance of the mesh, as far as a finer mesh makes it smaller.
 
-        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point.
+        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point. Returns
+        the step, and its end on a mesh with points where conditions that the solution decides switch.
         """
         step = self._step(self.state)
-        self._accuracy = self._accuracy_of(step[0].trial)
+        end = self._settled(step[0].trial)
+        self._accuracy = self._accuracy_of(end)
         for _ in range(_ATTEMPTS):
-            trial, known = step[0].trial, (self.state, self._end)
-            if not self._is_poor(self._accuracy) or self._ends_inside(step[0]):
+            known = self.state, self._end
+            if not self._is_poor(self._accuracy) or self._ends_inside(step[0]) or not end.system.switching(end.x).settled.all():
                 break
-            finer = self._finer_mesh(trial.system, trial.x, self._accuracy.error)
+            finer = self._finer_mesh(end.system, end.x, self._accuracy.error)
             if finer is None or not self._move_to(finer):
                 break
             again = self._step(self.state)
-            accuracy = self._accuracy_of(again[0].trial)
+            reached = self._settled(again[0].trial)
+            accuracy = self._accuracy_of(reached)
             if not accuracy.error < _HELPS * self._accuracy.error:
                 self.state, self._end = known
                 break
-            step, self._accuracy = again, accuracy
-        return step
+            step, end, self._accuracy = again, reached, accuracy
+        return step, end
+
+    def _settled(self, trial: Trial) -> Trial:
+        """Return a point on a mesh with points where conditions that the solution decides switch.
+
+        It stays as it is where Newton's method fails on such a mesh, or where a special point would fall between the meshes.
+        """
+        found = trial
+        for _ in range(_SETTLINGS if self.settings.mesh.every else 0):
+            moved = found.system.on_switches(found.x)
+            if moved is None:
+                return found
+            system, carry = moved
+            x, tangent = carry(found.x), carry(found.tangent)
+            row = system.weights * tangent / np.sqrt(inner(system, tangent, tangent))
+            try:
+                done = correct(system, x, row, row @ x, self.settings.newton)
+            except ConvergenceError:
+                break
+            found = trial_of(system, dataclasses.replace(done, iterations=trial.iterations, error=trial.newton_error))
+        same = found.sign == trial.sign and self._sense(found) * self._sense(trial) >= 0
+        same = same and all(np.sign(trial.value(test)) == np.sign(found.value(test)) for test in self._comparable)
+        return found if same else trial
+
+    def _stand_at(self, trial: Trial) -> None:
+        """Let the run go on from the accepted point as it is on another mesh."""
+        state, self._end = self.state, trial
+        if trial.system is state.system:
+            return
+        carry = state.system.carrier(trial.system)
+        previous = None if state.previous_tangent is None else carry(state.previous_tangent)
+        self.state = dataclasses.replace(
+            state, system=trial.system, x=trial.x, tangent=trial.tangent, previous_tangent=previous, sign=trial.sign,
+            discretization_error=trial.discretization_error,
+        )  # fmt: skip
 
     def _lost_end(self, segment: Segment, inspection: Inspection) -> str:
         """Return a clause if the run ends inside a step, at a place that was not located; "" otherwise."""

@@ -26,6 +26,8 @@ _FAR = 0.05
 _SAME_KERNEL = 0.9
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
+#: Times that mesh points are moved to where conditions switch.
+_PLACINGS = 12
 #: An error is given as no less than so many units in the last place of the largest parameter.
 _UNITS = 16
 #: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
@@ -64,12 +66,22 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     errors = dict.fromkeys(trial.system.free, np.nan)
     if isinstance(details, MultiplePoint) and details.x is None:
         return Refined(trial, errors, details)
+    moves = settings.mesh.every > 0
+    if moves:
+        try:
+            trial, details, left = _on_switches(point, trial, details, settings.newton)
+        except ConvergenceError:
+            return Refined(trial, errors, details)
     for _ in range(_HALVINGS):
         coarse = trial.system
         finer = coarse.refined()
         system, carry = finer or (coarse, np.array)
         try:
             better, found = _again(point, trial, details, (system, carry), settings.newton)
+            left = 0.0
+            if moves:
+                better, found, left = _on_switches(point, better, found, settings.newton)
+                system = better.system
         except ConvergenceError:
             break
         steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
@@ -77,6 +89,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
         if np.any(steps > _FAR * size) or np.max(steps / size) > last:
             break
+        steps = steps + left
         known = steps + _split(found, system)  # a curve of branch points has one unknown more
         sizes = known[: len(system.free)] * system.free_scales
         errors, last = dict(zip(system.free, map(float, sizes))), np.max(steps / size)
@@ -86,6 +99,27 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         if np.all(steps <= settings.mesh.tolerance * size):
             break
     return Refined(trial, errors, details)
+
+
+def _on_switches(point: SpecialPoint, trial: Trial, details: Any, newton: Newton) -> tuple[Trial, Any, Any]:
+    """Return a special point on a mesh with points where conditions that the solution decides switch.
+
+    Returned last is by how much its free parameters changed when mesh points were moved there the last time.
+
+    Raises
+    ------
+    ConvergenceError
+        It was not found on such a mesh, or the places do not settle.
+    """
+    left: Any = 0.0
+    for _ in range(_PLACINGS):
+        moved = trial.system.on_switches(trial.x, closely=True)
+        if moved is None:
+            break
+        before = trial.x[trial.system.state_size :]
+        trial, details = _again(point, trial, details, moved, newton)
+        left = np.abs(trial.x[trial.system.state_size :] - before)
+    return trial, details, left
 
 
 def _split(details: Any, system: Discretization) -> Any:

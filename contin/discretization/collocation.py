@@ -17,12 +17,13 @@ from contin.arrays import Array, Indices
 from contin.discretization.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.defect import Defect
-from contin.discretization.mesh import MeshControl, adapted_mesh, with_breaks
+from contin.discretization.mesh import MeshControl, adapted_mesh, moved_to_breaks, near, with_breaks
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
+from contin.discretization.switching import NOWHERE, Switching, joined, switching
 from contin.discretization.system import System
 from contin.errors import ProblemError
-from contin.functions.batch import Batch, Columns
+from contin.functions.batch import Batch, Columns, Selections
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks, Layout, layout
@@ -176,6 +177,13 @@ class Collocation(System):
         j = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, self.intervals - 1)
         matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
         states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self._scaled_states(x))[j])
+        return states
+
+    def evaluate_scaled_in(self, x: Array, interval: int, places: Array) -> Array:
+        """Return the states divided by their sizes at ``places`` (K,) of an interval, between 0 and 1, shape (K, n)."""
+        first = interval * self._d
+        matrix = interpolation(self.basis.nodes, self.basis.barycentric, places)
+        states: Array = matrix @ self._scaled_states(x)[first : first + self._d + 1]
         return states
 
     # --- the discretization error --------------------------------------------------------------------------------
@@ -444,9 +452,13 @@ class Collocation(System):
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
         """Return the same problem on a better mesh for x, and the carrier; None where this mesh is good enough."""
-        states = self._scaled_states(x)
-        mesh = adapted_mesh(self.basis, self.mesh, states, control, self.breaks) if control.every else None
+        mesh = self._better_mesh(x, control)
         return None if mesh is None else self.on_mesh(mesh)
+
+    def _better_mesh(self, x: Array, control: MeshControl) -> Array | None:
+        if not control.every:
+            return None
+        return adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control, self._all_breaks(x, closely=False))
 
     @functools.cached_property
     def breaks(self) -> Array:
@@ -454,6 +466,51 @@ class Collocation(System):
         names = ["field", *(["functionals"] if self._integrated else [])]
         found = [self.problem.batch(name).switches(*self.problem.domain, self.parameters, self._free) for name in names]
         return np.unique(np.concatenate(found))
+
+    def switching(self, x: Array) -> Switching:
+        """Return where conditions on states or free parameters switch along a solution, and the equations are not smooth."""
+        return joined([switching(self, *each, x) for each in self._with_sizes(x)]) if self._selections else NOWHERE
+
+    def on_switches(self, x: Array, closely: bool = False) -> tuple[Collocation, Carrier] | None:
+        """Return the same on a mesh with the places of `switching` among its points; None where they are already.
+
+        ``closely``: up to round-off, as what depends on the place itself needs. A solution depends on its square only.
+        """
+        breaks = self._all_breaks(x, closely)
+        if near(breaks, self.mesh, self.mesh[-1] - self.mesh[0]).all():
+            return None
+        return self.on_mesh(moved_to_breaks(self.mesh, breaks))
+
+    def _all_breaks(self, x: Array, closely: bool) -> Array:
+        """Return the places where the equations are not smooth; those on mesh points, as far as it matters, are these."""
+        moving = self.switching(x)
+        if not moving.places.size:
+            return self.breaks
+        nearest = self.mesh[np.abs(self.mesh - moving.places[:, None]).argmin(axis=1)]
+        off = np.abs(nearest - moving.places) > _CLOSE * (self.mesh[-1] - self.mesh[0])
+        places = np.where(off if closely else ~moving.settled, moving.places, nearest)
+        return np.unique(np.concatenate([self.breaks, places]))
+
+    @functools.cached_property
+    def _selections(self) -> list[tuple[str, Selections]]:
+        """Conditions of the functions that the mesh matters for, by the name of these."""
+        names = ["field", *(["functionals"] if self._integrated else [])]
+        found = [(name, self.problem.batch(name).selections(self._free)) for name in names]
+        return [(name, each) for name, each in found if each is not None]
+
+    def _with_sizes(self, x: Array) -> list[tuple[Selections, Array]]:
+        """Return the conditions with the sizes of what the values of the functions are integrated to."""
+        sizes = self.largest(x)[: self._n] + 1
+        length, found = self.mesh[-1] - self.mesh[0], []
+        for name, each in self._selections:
+            with np.errstate(all="ignore"):
+                given = self._times, self.states_at_gauss_points(x), _NONE(self._n), self.all_parameters(x)
+                largest = length * np.nan_to_num(np.abs(self.problem.batch(name).values(*given)).max(axis=0))
+            largest[largest == 0] = 1.0
+            if name == "field":
+                largest[: self._n] = sizes if self.scales is None else sizes * self.scales.states
+            found.append((each, largest))
+        return found
 
     def on_breaks(self) -> Collocation:
         """Return the same problem on a mesh of as many intervals, with the breaks among its points."""
@@ -471,6 +528,9 @@ class Collocation(System):
         return other, other.pack(self.states(x), values)
 
 
+#: Distance of a switch from a mesh point, as a part of the domain, up to which it lies there. Special points are off by about
+#: that: ten times smaller is round-off of the place itself.
+_CLOSE = 1e-12
 #: The t of boundary conditions, which do not take it.
 _TIME = np.zeros(1)
 

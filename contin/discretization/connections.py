@@ -10,7 +10,7 @@ import numpy as np
 from contin.arrays import Array, Indices
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
-from contin.discretization.mesh import MeshControl, adapted_mesh
+from contin.discretization.mesh import MeshControl
 from contin.discretization.multilinear import Numbers, shares, subsets
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
@@ -253,7 +253,7 @@ class ConnectionCollocation(Conditioned):
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
-        mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control) if control.every else None
+        mesh = self._better_mesh(x, control)
         if mesh is None and np.abs(x - self.reference).max() <= _MOVED * np.abs(x).max():
             return None
         renewed = self.with_reference(x)

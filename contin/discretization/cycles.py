@@ -14,7 +14,7 @@ from contin.arrays import Array, ComplexArray, Indices, Mask
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
 from contin.discretization.extremes import extremes
-from contin.discretization.mesh import MeshControl, adapted_mesh
+from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier
 from contin.discretization.rounding import on_circle
 from contin.discretization.scales import Scales
@@ -423,7 +423,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
-        mesh = adapted_mesh(self.basis, self.mesh, self._scaled_states(x), control) if control.every else None
+        mesh = self._better_mesh(x, control)
         if mesh is None:
             states = self.states(x)
             if np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():

@@ -12,6 +12,9 @@ smooth functions; P is orthogonal to polynomials of lower degree, and so they ar
 4. [F_x; row] e = [g; 0]: the errors e at the mesh points, and of the free parameters. What g leaves out of the defect of w is
    smaller by h.
 
+Where a condition that the solution decides switches inside an interval (`contin.discretization.switching`), c is zero and the
+projection is taken by a quadrature on either side of that place: the defect has a corner or a jump there.
+
 The estimate takes values of the functions at d + 2 points an interval, and one substitution. It holds where the error is small;
 where the mesh is much too coarse it is large, and no more than that.
 """
@@ -77,6 +80,24 @@ def finer(degree: int) -> Finer:
     return Finer(points, weights, value, bubble, projection, tables.slope, end_slopes)
 
 
+def split(degree: int, ends: Array) -> tuple[Array, Array]:
+    """Return points of Gauss quadratures between ``ends`` on the unit interval, and the projection from values there.
+
+    Examples
+    --------
+    >>> points, projection = split(2, np.array([0.0, 0.4, 1.0]))
+    >>> corner = projection @ np.maximum(0, points - 0.4)  # its mean is .18
+    >>> round(float(basis(2).weights @ corner), 12)
+    0.18
+    """
+    tables, legendre = finer(degree), np.polynomial.legendre
+    lengths = np.diff(ends)[:, None]
+    points = (ends[:-1, None] + lengths * tables.points).ravel()
+    weights = (lengths * tables.weights).ravel()
+    wanted = legendre.legvander(2 * basis(degree).points - 1, degree - 1) * (2 * np.arange(degree) + 1)
+    return points, wanted @ (legendre.legvander(2 * points - 1, degree - 1) * weights[:, None]).T
+
+
 class Defect:
     """What the estimates of all solutions on one mesh share.
 
@@ -125,6 +146,7 @@ class Defect:
             fill_points(n, tables, h, x, *self._rates_of_intervals(rates, at_mesh, p), points)
             rates[self.broken] = np.nan
             fill_left(n, tables, h, x, system.field_values(self.times, points, p), left, self.conditions)
+            self._fill_split(x, p, left)
             error = factors.solve(left)
             better = x - error
             largest = move(n, tables, x, error, points, at_mesh)
@@ -134,6 +156,19 @@ class Defect:
                 integrands = system.integrands(better, self.times, points)
                 largest = largest_miss(self.weights, integrands, known, self.least_sizes, largest)
         return float(largest)
+
+    def _fill_split(self, x: Array, p: Array, left: Array) -> None:
+        """Fill g, step 3, anew in the intervals inside which a condition switches."""
+        system, found = self.system, self.system.switching(x)
+        inside = found.places[~found.settled]
+        intervals = np.clip(np.searchsorted(system.mesh, inside, side="right") - 1, 0, self.h.size - 1)
+        for j in np.unique(intervals).tolist():
+            h, rows = self.h[j], system.degree * self.n
+            ends = np.concatenate([[0.0], (inside[intervals == j] - system.mesh[j]) / h, [1.0]])
+            points, projection = split(system.degree, ends)
+            field = system.field_values(system.mesh[j] + h * points, system.evaluate_scaled_in(x, j, points), p)[:, : self.n]
+            local = x[j * rows : (j + 1) * rows + self.n].reshape(-1, self.n)
+            left[j * rows : (j + 1) * rows] = (self.tables.slope @ local - h * (projection @ field)).ravel()
 
     def _rates_of_intervals(self, rates: Array, at_mesh: Array, p: Array) -> tuple[Array, Array]:
         """Return the rates at the first and at the last ends of the intervals, from those at the mesh points.

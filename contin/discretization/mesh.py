@@ -127,6 +127,17 @@ def with_breaks(mesh: Array, breaks: Array) -> Array:
     return mesh
 
 
+def moved_to_breaks(mesh: Array, breaks: Array) -> Array:
+    """Return a mesh with the breaks among its points whose intervals are those of a mesh, stretched between the breaks.
+
+    Examples
+    --------
+    >>> moved_to_breaks(np.array([0.0, 0.25, 0.5, 0.75, 1.0]), np.array([0.6])).round(3).tolist()
+    [0.0, 0.3, 0.6, 0.8, 1.0]
+    """
+    return _equidistributed(mesh, 1 / np.diff(mesh), max(mesh.size - 1, len(breaks) + 1), breaks)
+
+
 def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl, breaks: Array = _NOWHERE) -> Array | None:
     """Return a better mesh for a solution, given by its states at the nodes, or None where the present one is good enough.
 

@@ -15,6 +15,7 @@ from contin.arrays import Array
 from contin.discretization.differences import derivative
 from contin.discretization.mesh import MeshControl
 from contin.discretization.multilinear import of_lines
+from contin.discretization.switching import NOWHERE, Switching
 from contin.linalg.factors import Factors
 from contin.problems.statement import Statement
 
@@ -142,6 +143,14 @@ class Discretization(Equations, Protocol):
     @abstractmethod
     def adapted(self, x: Array, control: MeshControl) -> tuple[Discretization, Carrier] | None:
         """Return the same on a better mesh for x, and the carrier; None where there is no need."""
+
+    def switching(self, x: Array) -> Switching:
+        """Return where conditions that the solution decides switch, and the equations are not smooth."""
+        return NOWHERE
+
+    def on_switches(self, x: Array, closely: bool = False) -> tuple[Discretization, Carrier] | None:
+        """Return the same on a mesh with those places among its points, and the carrier; None where there is no need."""
+        return None
 
 
 def inner(system: Discretization, a: Array, b: Array) -> float:

@@ -206,6 +206,10 @@ class System(Discretization):
     def adapted(self, x: Array, control: MeshControl) -> tuple[System, Carrier] | None:
         """Return the same problem on a better mesh for x, and the carrier; None where there is no need."""
 
+    def on_switches(self, x: Array, closely: bool = False) -> tuple[System, Carrier] | None:
+        """Return the same problem on a mesh with the places of `switching` among its points; None where there is no need."""
+        return None
+
     @abstractmethod
     def transposed_product(self, x: Array, w: Array) -> Array:
         """Return F_x^T w, shape (size,)."""

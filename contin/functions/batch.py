@@ -23,8 +23,8 @@ from contin.functions.interpreter import LANES, run
 from contin.functions.program import Inputs, Program, Slope, program
 from contin.functions.recording import Recording, checked, record
 from contin.functions.signature import Signature, named_values, takes_arrays
-from contin.functions.switches import switches, zeros
-from contin.functions.tape import Number, Unrecordable
+from contin.functions.switches import Selection, selections, switches, zeros
+from contin.functions.tape import Number, Tape, Unrecordable
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,51 @@ class Columns:
     def key(self) -> tuple[int, ...]:
         """The inputs as whole numbers of Python."""
         return tuple(self.inputs.tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class Selections:
+    """Conditions of functions that states or free parameters decide.
+
+    Attributes
+    ----------
+    found : tuple of Selection
+    names : tuple of str
+        The number whose sign decides, as text.
+    values_program, gaps_program : Program
+    of_gaps : ndarray of int, shape (gaps, 2)
+        Number of the selection, and of the value of the functions, of each gap.
+    """
+
+    found: tuple[Selection, ...]
+    names: tuple[str, ...]
+    values_program: Program
+    gaps_program: Program
+    of_gaps: Indices
+
+    def sides(self, t: Array, u: Array, p: Array) -> Array:
+        """Return on which side of each switch points are, shape (points, selections): whole numbers, of other sides others."""
+        out = np.empty((len(u), len(self.found)))
+        run(self.values_program, (t, u, u[:0]), p, out, _NO_JACOBIAN)
+        out -= np.array([each.switch.level for each in self.found])
+        whole = np.array([each.switch.whole for each in self.found])
+        return np.asarray(np.where(whole, np.floor(out), np.sign(out)))
+
+    def gaps(self, t: Array, u: Array, p: Array) -> Array:
+        """Return the values with one outcome less those with the other, shape (points, gaps)."""
+        out = np.empty((len(u), len(self.of_gaps)))
+        if out.size:
+            run(self.gaps_program, (t, u, u[:0]), p, out, _NO_JACOBIAN)
+        return out
+
+
+def _switch_text(tape: Tape, selection: Selection, labels: Mapping[int, str]) -> str:
+    """Return the number that decides, as text."""
+    place, level = selection.switch.place, selection.switch.level
+    operation = tape.operations[place]
+    lines = tape.lines([operation.operands[0] if operation.name == "neg" else place], labels)
+    text = lines[-1] + (f" - {level:g}" if level else "")
+    return f"{text} with {', '.join(lines[:-1])}" if lines[:-1] else text
 
 
 class Batch:
@@ -228,6 +273,28 @@ class Batch:
             return out
 
         return zeros(found, values, low, high)
+
+    def selections(self, free: Sequence[int] | Indices = ()) -> Selections | None:
+        """Return the conditions that states or ``free`` parameters decide; None without any, and for functions in Python."""
+        if self.recording is None:
+            return None
+        found: Selections | None = self._kept(("selections", *map(int, free)), lambda: self._selections(list(map(int, free))))
+        return found
+
+    def _selections(self, free: Sequence[int]) -> Selections | None:
+        recording, states = self._known(), len(self.signature.states)
+        tape, inputs = recording.tape, recording.inputs
+        moved = [inputs[states + slot] for slot in free]
+        found = selections(tape, recording.results, recording.time, inputs[:states], moved)
+        if not found:
+            return None
+        gaps = [(number, row, place) for number, each in enumerate(found) for row, place in (each.gaps or {}).items()]
+        labels = {recording.time: "t", **dict(zip(inputs, (*self.signature.states, *self.signature.parameters)))}
+        names = tuple(_switch_text(tape, each, labels) for each in found)
+        values = program(tape, [(each.switch.place, column) for column, each in enumerate(found)], self._inputs())
+        differences = program(tape, [(place, column) for column, (_, _, place) in enumerate(gaps)], self._inputs())
+        of_gaps = np.array([(number, row) for number, row, _ in gaps], dtype=np.int64).reshape(-1, 2)
+        return Selections(found, names, values, differences, of_gaps)
 
     # --- higher derivatives ------------------------------------------------------------------------------------------
 

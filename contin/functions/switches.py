@@ -1,7 +1,9 @@
-"""Where recorded functions have jumps and corners in time: places that belong to the mesh.
+"""Where recorded functions have jumps and corners: places that belong to the mesh.
 
 A condition on time alone (``t < 0.4``, ``max(0, t - 1)``, a table of time) switches at the zeros of a function of time and of
-parameters that stand still. Conditions on states switch where the solution goes; nothing is known of them before.
+parameters that stand still: `switches`. A condition on states (``u.x > 0.3``, ``abs(u.x)``) switches where the solution goes:
+`selections` are looked at along each solution, by `contin.discretization.switching`. Whether the equations are smooth there
+is told by the values that they would have with the other outcome of the condition.
 """
 
 from __future__ import annotations
@@ -60,6 +62,56 @@ def switches(tape: Tape, results: Sequence[int], time: int, moving: Sequence[int
         elif name == "table":
             found += [Switch(operands[0], knot) for knot in data.breaks]
     return list(dict.fromkeys(found)) if len(found) <= _MOST else []
+
+
+class Selection(NamedTuple):
+    """A switch that a solution decides.
+
+    ``gaps`` are the values of the functions with one outcome less those with the other one, by the number of the value, and
+    places on the tape; None where the other outcome has no value to compare with.
+    """
+
+    switch: Switch
+    gaps: dict[int, int] | None
+
+
+def selections(
+    tape: Tape, results: Sequence[int], time: int, states: Sequence[int], free: Sequence[int]
+) -> tuple[Selection, ...]:
+    """Return the switches along a solution, in time, that states or free parameters move.
+
+    Parameters
+    ----------
+    states, free : sequence of int
+        Places of the states, and of parameters that may change.
+    """
+    every = [*results, time, *states, *free]
+    varies, moves = tape.reading(every, [time, *states]), tape.reading(every, [*states, *free])
+    found: dict[Switch, Selection] = {}
+
+    def append(switch: Switch, place: int, one: int, other: int) -> None:
+        sides = [tape.substitute(results, {place: side}) for side in (one, other)]
+        gaps = {row: tape.at("sub", pair) for row, pair in enumerate(zip(*sides)) if pair[0] != pair[1]}
+        found.setdefault(switch, Selection(switch, gaps))
+
+    for place in tape.needed(results):
+        name, operands, data = tape.operations[place]
+        if not any(varies[each] for each in operands) or not any(moves[each] for each in operands):
+            continue
+        if name in ("lt", "le"):
+            append(Switch(tape.at("sub", (operands[0], operands[1]))), place, tape.constant(1.0), tape.constant(0.0))
+        elif name == "abs":
+            append(Switch(operands[0]), place, operands[0], tape.at("neg", operands))
+        elif name == "sign":
+            append(Switch(operands[0]), place, tape.constant(1.0), tape.constant(-1.0))
+        elif name in _AT_WHOLE:
+            append(Switch(operands[0], whole=True), place, tape.at("add", (place, tape.constant(1.0))), place)
+        elif name == "mod":
+            quotient = tape.at("div", (operands[0], operands[1]))
+            append(Switch(quotient, whole=True), place, tape.at("add", (place, operands[1])), place)
+        elif name == "table":
+            found |= {Switch(operands[0], knot): Selection(Switch(operands[0], knot), None) for knot in data.breaks}
+    return tuple(found.values())
 
 
 def zeros(found: Sequence[Switch], values: Callable[[Array], Array], low: float, high: float) -> Array:

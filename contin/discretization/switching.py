@@ -1,0 +1,166 @@
+"""Corners and jumps that a solution decides, as ``max(0, u.x)`` does: where they are on it, and what they cost on its mesh.
+
+A condition switches at a time tau in an interval [a, b] of the mesh. The equations with either outcome are smooth; the gap is
+the difference of the two. A polynomial that follows one outcome over the whole interval misses the integral of the gap over the
+part on the other side of tau. So the cost of a switch is the smaller one of these two integrals:
+
+    a ------- tau --- b
+      gap dt     gap dt
+
+It is zero where tau is a mesh point, and it is zero for selections that are smooth, as a series near 0 that is joined to a
+closed form.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array, Indices
+from contin.functions.batch import Selections
+
+#: Halvings of the part of an interval in which a switch happens: down to the last digit of its ends.
+_HALVINGS = 50
+#: Places on each side of a switch where the gap is looked at, as parts of the distance to the end.
+_PARTS = np.array([0.1, 0.4, 0.7, 1.0])
+#: Half an interval's cost, relative to the size of the state, below which a selection is smooth. It is round-off of the usual
+#: equations; ten times larger, corners in the fourth derivative on 100 intervals are left inside intervals.
+_SMOOTH = 1e-13
+#: Cost of a switch, relative to the size of the state, below which it lies on a mesh point. Ten times larger is seen in the
+#: estimated discretization error; ten times smaller would be round-off on solutions of slope 10.
+_SETTLED = 1e-13
+#: Distance from a switch, as a part of half an interval, at which a gap that does not vanish there is told from one that does,
+#: and the part of the largest gap nearby that it has there at least. At a corner it has 1e-5 of that.
+_AT_ONCE, _JUMP = 1e-5, 1e-2
+#: More switches than this part of the intervals are noise, as where a state is zero all along.
+_MOST = 0.5
+
+
+class Switching(NamedTuple):
+    """Places of a solution where its equations have corners or jumps, increasing.
+
+    Attributes
+    ----------
+    places : ndarray, shape (K,)
+    costs : ndarray, shape (K,)
+        The error that a switch inside an interval makes, relative to the sizes of the states.
+    jumps : ndarray of bool, shape (K,)
+        The equations jump: the derivatives do not tell how the solution moves with the place.
+    names : tuple of str
+        The numbers whose sign decides.
+    """
+
+    places: Array
+    costs: Array
+    jumps: Any
+    names: tuple[str, ...]
+
+    @property
+    def settled(self) -> Any:
+        """Which places are mesh points, as far as that matters."""
+        return self.costs <= _SETTLED
+
+
+#: No places.
+NOWHERE = Switching(np.empty(0), np.empty(0), np.empty(0, dtype=bool), ())
+
+
+def switching(system: Any, selections: Selections, sizes: Array, x: Array) -> Switching:
+    """Return the places of a solution where conditions switch, without those of smooth selections.
+
+    Parameters
+    ----------
+    system : Collocation
+    selections : Selections
+    sizes : ndarray, shape (values,)
+        Sizes of what the values of the functions are integrated to.
+    x : ndarray
+        A solution.
+    """
+    p = system.all_parameters(x)
+
+    def sides(t: Array) -> Array:
+        return selections.sides(t, system.evaluate(x, t), p)
+
+    with np.errstate(all="ignore"):
+        places, which = _zeros(sides, _sampled(system, selections, x, p))
+        if not places.size:
+            return NOWHERE
+        mesh = system.mesh
+        at = np.clip(np.searchsorted(mesh, places, side="right") - 1, 0, mesh.size - 2)
+        half = (mesh[at + 1] - mesh[at]) / 2
+
+        def largest(times: Array) -> Array:
+            """Return the largest gap of each switch at its times (K, parts), shape (K, parts)."""
+            gaps = selections.gaps(times.ravel(), system.evaluate(x, times.ravel()), p)
+            away = np.abs(times - places[:, None]) / (mesh[-1] - mesh[0])
+            return _of_selection(selections, gaps / sizes[selections.of_gaps[:, 1]], which, away)
+
+        ends = np.array([np.maximum(places - half, mesh[0]), np.minimum(places + half, mesh[-1])])
+        inside = np.array([mesh[at], mesh[at + 1]])
+        worst = [largest(places[:, None] + (end - places)[:, None] * _PARTS).max(axis=1) for end in ends]
+        missed = [largest(places[:, None] + (end - places)[:, None] * _PARTS).max(axis=1) for end in inside]
+        beside = [largest((places + (end - places) * _AT_ONCE)[:, None])[:, 0] for end in ends]
+        kept = np.fmin(worst[0], worst[1]) * half > _SMOOTH
+        costs = np.fmin(missed[0] * (places - inside[0]), missed[1] * (inside[1] - places))
+        jumps = np.fmin(*beside) > _JUMP * np.fmin(*worst)
+    return _merged(Switching(places[kept], costs[kept], jumps[kept], tuple(selections.names[k] for k in which[kept])), system)
+
+
+def _sampled(system: Any, selections: Selections, x: Array, p: Array) -> tuple[Array, Array]:
+    """Return the times of the nodes and of the middles between them, and the sides there."""
+    nodes = system.nodes
+    times = np.empty(2 * nodes.size - 1)
+    times[::2], times[1::2] = nodes, (nodes[1:] + nodes[:-1]) / 2
+    return times, selections.sides(times, system.evaluate(x, times), p)
+
+
+def _zeros(sides: Any, sampled: tuple[Array, Array]) -> tuple[Array, Indices]:
+    """Return the times at which conditions switch, and the numbers of the conditions."""
+    times, there = sampled
+    at, which = np.nonzero(there[1:] != there[:-1])
+    a, b, first = times[at], times[at + 1], there[at, which]
+    for _ in range(_HALVINGS if at.size else 0):
+        middle = (a + b) / 2
+        same = sides(middle)[np.arange(at.size), which] == first
+        a, b = np.where(same, middle, a), np.where(same, b, middle)
+    return b, which
+
+
+def _of_selection(selections: Selections, gaps: Array, which: Indices, away: Array) -> Array:
+    """Return the largest gap of each switch at its own times, shape (K, parts); gaps (K parts, gaps) are those of all.
+
+    Where it is not known, as at the knots of a table, it is that of a corner: the distance ``away``, as a part of the domain.
+    """
+    sizes, number, parts = np.abs(gaps), selections.of_gaps[:, 0], away.shape[1]
+    found = away.copy()
+    for k, selection in enumerate(which.tolist()):
+        if selections.found[selection].gaps is not None:
+            found[k] = sizes[k * parts : (k + 1) * parts, number == selection].max(axis=1, initial=0.0)
+    return found
+
+
+def _merged(found: Switching, system: Any) -> Switching:
+    """Return the places in order, those closer than round-off made one."""
+    if not found.places.size or found.places.size > _MOST * system.intervals:
+        return NOWHERE
+    order = np.argsort(found.places, kind="stable")
+    places, costs, jumps = found.places[order], found.costs[order], found.jumps[order].astype(bool)
+    names = [found.names[k] for k in order]
+    apart = 1e-11 * (system.mesh[-1] - system.mesh[0])
+    group = np.cumsum(np.append(0, np.diff(places) > apart))
+    first = np.searchsorted(group, np.arange(group[-1] + 1))
+    largest, any_jump = np.maximum.reduceat(costs, first), np.logical_or.reduceat(jumps, first)
+    merged = tuple(" and ".join(dict.fromkeys(np.array(names, dtype=object)[group == k])) for k in range(first.size))
+    return Switching(places[first], largest, any_jump, merged)
+
+
+def joined(several: list[Switching]) -> Switching:
+    """Return the places of several functions."""
+    if len(several) == 1:
+        return several[0]
+    names = sum((each.names for each in several), ())
+    places, costs, jumps = (np.concatenate([each[column] for each in several]) for column in range(3))
+    order = np.argsort(places, kind="stable")
+    return Switching(places[order], costs[order], jumps[order].astype(bool), tuple(names[k] for k in order))
