@@ -16,6 +16,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,6 +53,7 @@ from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.newton import correct
 from contin.stepping.settings import Settings
+from contin.stepping.settling import ROUNDS, settled
 from contin.stepping.state import State, Stop, standing_at
 from contin.stepping.step import (
     corrected,
@@ -96,9 +98,6 @@ _ROUNDS = 3
 _NEARLY = 1e-2
 #: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
 _STANDING = 6
-#: Times that mesh points are moved to where conditions switch, at one point. The distance left is squared each time at a corner:
-#: 1e-2, 1e-4, 1e-8 of the domain. At a jump it falls by a factor.
-_SETTLINGS = 5
 #: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
 #: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
 _MARGIN = 0.1
@@ -122,6 +121,30 @@ IndexChange = tuple[int | None, int | None]
 #: Distance from a first point that is exactly a branch point to where Newton's method begins. Ten times larger, the corrected
 #: point is a thousandth of a usual first step away.
 _BESIDE = 1e-6
+
+
+class Step(NamedTuple):
+    """A step that was made.
+
+    Attributes
+    ----------
+    segment : Segment
+    inspection : Inspection
+    distance : float
+        From prediction to corrected point.
+    doubt : str
+        What is left of it where the step cannot be halved any more.
+    """
+
+    segment: Segment
+    inspection: Inspection
+    distance: float
+    doubt: str
+
+    @property
+    def end(self) -> Trial:
+        """The end of the segment on a mesh with points where conditions that the solution decides switch."""
+        return self.segment.trial.settled
 
 
 class Continuation:
@@ -255,7 +278,7 @@ class Continuation:
     def _first_on_switches(self, system: Discretization, x: Array) -> tuple[Discretization, Array, Array]:
         """Correct x, on a mesh with points where conditions that the solution decides switch; return the row held, too."""
         x, row = self._first_correction(system, x)
-        for _ in range(_SETTLINGS if self.settings.mesh.every else 0):
+        for _ in range(ROUNDS if self.settings.mesh.every else 0):
             moved = system.on_switches(x)
             if moved is None:
                 break
@@ -321,7 +344,7 @@ class Continuation:
         """Make one step: yield the labelled points inside it, then the point at its end."""
         self._adapt_mesh()
         try:
-            (segment, inspection, distance, doubt), reached = self._accurate_step()
+            step = self._accurate_step()
         except ConvergenceError as error:
             stop = own_stop(self.state.system, self._state_trial(), self._failure(error))
             if stop.reason == "no convergence" and self._takes_shorter_steps():
@@ -331,6 +354,7 @@ class Continuation:
             label, name = ("EP", self.stop.message.removeprefix("met ")) if met else ("MX", "no convergence")
             yield self._point(SpecialPoint(0.0, label, name, self._state_trial()), self.state, accuracy=self._accuracy)
             return
+        segment, inspection = step.segment, step.inspection
         special = [own_end(segment.trial.system, point) for point in inspection.special_points(self._tests)]
         special = within_limits(segment, special, self._limits)
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
@@ -338,7 +362,7 @@ class Continuation:
         found = [point for point in found if self._is_confirmed(point, segment)]
         changes = self._index_changes(segment, found)
         if end == len(special):
-            self._note_doubts(segment, found, doubt if len(found) == len(special) else "")
+            self._note_doubts(segment, found, step.doubt if len(found) == len(special) else "")
         for point, change in zip(found, changes):
             if point.stop is not None:
                 self.stop = own_stop(point.trial.system, point.trial, point.stop)
@@ -346,8 +370,8 @@ class Continuation:
             yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return
-        self.state = self._accept(segment, distance, inspection.turns)
-        self._stand_at(reached)
+        self.state = self._accept(segment, step.distance, inspection.turns)
+        self._stand_at(step.end)
         if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
             self._is_noisy = True
             self._note(
@@ -358,7 +382,7 @@ class Continuation:
         elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
-        found_at_end = self._located(SpecialPoint(segment.step, label, name, reached))
+        found_at_end = self._located(SpecialPoint(segment.step, label, name, step.end))
         yield self._point(found_at_end, segment.state, accuracy=self._accuracy)
 
     def _takes_shorter_steps(self) -> bool:
@@ -383,52 +407,38 @@ class Continuation:
 
     # --- one step ------------------------------------------------------------------------------------------------
 
-    def _accurate_step(self) -> tuple[tuple[Segment, Inspection, float, str], Trial]:
+    def _accurate_step(self) -> Step:
         """Make a step whose end has an error within the tolerance of the mesh, as far as a finer mesh makes it smaller.
 
-        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point. Returns
-        the step, and its end on a mesh with points where conditions that the solution decides switch.
+        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point.
         """
         step = self._step(self.state)
-        end = self._settled(step[0].trial)
-        self._accuracy = self._accuracy_of(end)
+        self._accuracy = self._accuracy_of(step.end)
         for _ in range(_ATTEMPTS):
-            known = self.state, self._end
-            if not self._is_poor(self._accuracy) or self._ends_inside(step[0]) or not end.system.switching(end.x).settled.all():
+            end, known = step.end, (self.state, self._end)
+            if not self._is_poor(self._accuracy) or self._ends_inside(step.segment):
                 break
+            if not end.system.switching(end.x).settled.all():
+                break  # finer meshes are no help there
             finer = self._finer_mesh(end.system, end.x, self._accuracy.error)
             if finer is None or not self._move_to(finer):
                 break
             again = self._step(self.state)
-            reached = self._settled(again[0].trial)
-            accuracy = self._accuracy_of(reached)
+            accuracy = self._accuracy_of(again.end)
             if not accuracy.error < _HELPS * self._accuracy.error:
                 self.state, self._end = known
                 break
-            step, end, self._accuracy = again, reached, accuracy
-        return step, end
+            step, self._accuracy = again, accuracy
+        return step
 
-    def _settled(self, trial: Trial) -> Trial:
-        """Return a point on a mesh with points where conditions that the solution decides switch.
-
-        It stays as it is where Newton's method fails on such a mesh, or where a special point would fall between the meshes.
-        """
-        found = trial
-        for _ in range(_SETTLINGS if self.settings.mesh.every else 0):
-            moved = found.system.on_switches(found.x)
-            if moved is None:
-                return found
-            system, carry = moved
-            x, tangent = carry(found.x), carry(found.tangent)
-            row = system.weights * tangent / np.sqrt(inner(system, tangent, tangent))
-            try:
-                done = correct(system, x, row, row @ x, self.settings.newton)
-            except ConvergenceError:
-                break
-            found = trial_of(system, dataclasses.replace(done, iterations=trial.iterations, error=trial.newton_error))
-        same = found.sign == trial.sign and self._sense(found) * self._sense(trial) >= 0
-        same = same and all(np.sign(trial.value(test)) == np.sign(found.value(test)) for test in self._comparable)
-        return found if same else trial
+    def _moved_past(self, trial: Trial) -> str:
+        """Return a clause if special points lie between a point and the same one with other mesh points; "" otherwise."""
+        end = trial.settled
+        if end is trial:
+            return ""
+        same = end.sign == trial.sign and self._sense(end) * self._sense(trial) >= 0
+        same = same and all(np.sign(trial.value(test)) == np.sign(end.value(test)) for test in self._comparable)
+        return "" if same else "a special point moves out of the step with the places where conditions on states switch"
 
     def _stand_at(self, trial: Trial) -> None:
         """Let the run go on from the accepted point as it is on another mesh."""
@@ -473,11 +483,10 @@ class Continuation:
             return None
         return system.adapted(x, dataclasses.replace(control, min_intervals=count, max_intervals=count))
 
-    def _step(self, state: State) -> tuple[Segment, Inspection, float, str]:
+    def _step(self, state: State) -> Step:
         """Predict and correct, halving the step until the corrected point can be believed.
 
-        Returns the step, the distance from prediction to corrected point, and the doubt that is left where the step cannot be
-        halved any more. At the first failure the state's tangent is taken anew, right at its point.
+        At the first failure the state's tangent is taken anew, right at its point.
         """
         step, settings, exact = up_to_limits(state, self.settings.limits, self.settings.min_step), self.settings, False
         finest = max(settings.min_step, _FINEST * step)
@@ -486,9 +495,10 @@ class Continuation:
                 segment, distance = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
                 doubt = inspection.doubt() or self._contradiction(segment, inspection) or self._lost_end(segment, inspection)
+                doubt = doubt or self._moved_past(segment.trial)
                 if step < 2 * finest or not doubt:
                     inspection.special_points(self._tests)  # where points inside cannot be found the step is halved
-                    return segment, inspection, distance, doubt
+                    return Step(segment, inspection, distance, doubt)
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
@@ -527,7 +537,9 @@ class Continuation:
             raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
         low, before = self._before(state, step)
         self._stay_off_trivial(state, before, trial)
-        return Segment(state, (low, before), trial, step, settings.newton), distance
+        if settings.mesh.every:
+            trial = settled(trial, state.tangent, settings.newton)
+        return Segment(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), distance
 
     def _stay_off_trivial(self, state: State, before: Trial, trial: Trial) -> None:
         """Raise ConvergenceError where the corrected point lies on the trivial branch, or where the first step passes it."""

@@ -66,24 +66,20 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     errors = dict.fromkeys(trial.system.free, np.nan)
     if isinstance(details, MultiplePoint) and details.x is None:
         return Refined(trial, errors, details)
-    moves = settings.mesh.every > 0
-    if moves:
-        try:
-            trial, details, left = _on_switches(point, trial, details, settings.newton)
-        except ConvergenceError:
-            return Refined(trial, errors, details)
+    try:
+        trial, details, left = _on_switches(point, trial, details, settings.newton)
+    except ConvergenceError:
+        return Refined(trial, errors, details)
     for _ in range(_HALVINGS):
         coarse = trial.system
         finer = coarse.refined()
         system, carry = finer or (coarse, np.array)
         try:
             better, found = _again(point, trial, details, (system, carry), settings.newton)
-            left = 0.0
-            if moves:
-                better, found, left = _on_switches(point, better, found, settings.newton)
-                system = better.system
+            better, found, left = _on_switches(point, better, found, settings.newton)
         except ConvergenceError:
             break
+        system = better.system
         steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
         size = 1 + np.abs(better.x[system.state_size :])
         steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
@@ -173,7 +169,16 @@ def _zero_again(system: Discretization, x: Array, tangent: Array, test: TestFunc
     state = standing_at(system, x, tangent / np.sqrt(inner(system, tangent, tangent)), 1.0)
 
     def at(s: float) -> Trial:
-        return located(state, x + s * state.tangent, s, newton)
+        trial = located(state, x + s * state.tangent, s, newton)
+        for _ in range(_PLACINGS):
+            moved = trial.system.on_switches(trial.x, closely=True)
+            if moved is None:
+                break
+            carry = system.carrier(moved[0])
+            base, along = carry(x), carry(state.tangent)
+            there = standing_at(moved[0], base, along / np.sqrt(inner(moved[0], along, along)), 1.0)
+            trial = located(there, moved[1](trial.x), s, newton)
+        return trial
 
     trial = at(0.0)
     if test is None:

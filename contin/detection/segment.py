@@ -13,6 +13,7 @@ from contin.detection.root import find_zero
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton
+from contin.stepping.settling import settled
 from contin.stepping.state import State, Stop
 from contin.stepping.step import located
 from contin.stepping.trial import Linearization, TestFunction, Trial
@@ -84,9 +85,14 @@ class Segment:
         The end, at ``step`` along the state's tangent.
     step : float
     newton : Newton
+    settles : bool
+        Points are settled (`contin.stepping.settling`).
     """
 
-    def __init__(self, state: State, before: Place, trial: Trial, step: float, newton: Newton) -> None:
+    def __init__(
+        self, state: State, before: Place, trial: Trial, step: float, newton: Newton, settles: bool = False
+    ) -> None:
+        self.settles = settles
         self.state, self.trial, self.step, self.newton = state, trial, step, newton
         self.low, self.before = before
         self._last: Place | None = None
@@ -109,6 +115,8 @@ class Segment:
             guess = guess + last.x - self.guess(place)
             factors = last.factors if last.is_linearized else factors
         there = located(self.state, guess, distance, self.newton, factors)
+        if self.settles:
+            there = settled(there, self.state.tangent, self.newton)
         self._last = distance, there
         return there
 

@@ -186,7 +186,7 @@ def _equidistributed(mesh: Array, phi: Array, intervals: int, breaks: Array = _N
     places = np.linspace(0, 1, intervals + 1)
     if len(breaks):
         ends = np.concatenate([[0.0], np.interp(breaks, mesh, share), [1.0]])
-        counts = np.maximum(np.rint(np.diff(ends) * intervals).astype(int), 1)
+        counts = _shared_out(np.diff(ends), max(intervals, len(breaks) + 1))
         pieces = [np.linspace(a, b, count, endpoint=False) for a, b, count in zip(ends, ends[1:], counts)]
         places = np.append(np.concatenate(pieces), 1.0)
     new: Array = np.interp(places, share, mesh)
@@ -194,3 +194,22 @@ def _equidistributed(mesh: Array, phi: Array, intervals: int, breaks: Array = _N
         new[np.cumsum(counts)[:-1]] = breaks
     new[0], new[-1] = mesh[0], mesh[-1]
     return new
+
+
+def _shared_out(parts: Array, total: int) -> Any:
+    """Return whole numbers, one at least for each part, that sum up to a total and are near the parts of it.
+
+    Examples
+    --------
+    >>> _shared_out(np.array([0.01, 0.44, 0.55]), 5).tolist()
+    [1, 2, 2]
+    """
+    wanted = parts / parts.sum() * total
+    counts = np.maximum(np.floor(wanted).astype(int), 1)
+    while counts.sum() != total:
+        missing = np.where(counts > 1, wanted - counts, np.inf) if counts.sum() > total else wanted - counts
+        if counts.sum() > total:
+            counts[np.argmin(missing)] -= 1
+        else:
+            counts[np.argmax(missing)] += 1
+    return counts

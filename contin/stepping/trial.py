@@ -81,6 +81,8 @@ class Trial:
         newton_error: float = 0.0,
     ) -> None:
         self.system, self.x = system, x
+        #: The same point on a mesh with points where conditions on states switch (`contin.stepping.settling`).
+        self.settled = self
         self.iterations, self.newton_error = iterations, newton_error
         self._linear = linear
         self._functionals: dict[str, float] | None = None
