@@ -111,6 +111,8 @@ _ATTEMPTS, _GROWTH = 4, 4
 _HELPS = 0.5
 #: Labels of points that must be found again on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
 _CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
+#: Labels of points that no derivative by the solution tells.
+_BY_VALUES = ("EP", "UZ", "MX")
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
@@ -193,6 +195,7 @@ class Continuation:
     ) -> None:
         self.settings = settings
         self.stop: Stop | None = None
+        self._is_jumping = self._is_unsettled = False  # some point has jumps that the solution decides; not on mesh points
         self._is_noisy = False  # some point is not known to the tolerance
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         self._check(system)
@@ -311,6 +314,7 @@ class Continuation:
             trial = self._state_trial()
             first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
             located = self._located(dataclasses.replace(first, label=own_end(trial.system, first).label))
+            self._note_jumps(trial)
             yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
             if (stop := self._out_of_limits(trial) or self._out_of_domain(trial)) is not None:
                 self.stop = stop
@@ -372,6 +376,7 @@ class Continuation:
                 return
         self.state = self._accept(segment, step.distance, inspection.turns)
         self._stand_at(step.end)
+        self._note_jumps(step.end)
         if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
             self._is_noisy = True
             self._note(
@@ -660,6 +665,25 @@ class Continuation:
         ends = (trial[self.primary] for trial in (segment.before, segment.trial))
         self.notes.append(f"{text} (between {self.primary} = {' and '.join(f'{end:.10g}' for end in ends)})")
 
+    def _note_jumps(self, trial: Trial) -> None:
+        """Note once that conditions that the solution decides make the equations jump, and once that they do not settle."""
+        found = trial.system.switching(trial.x)
+        place = f"{self.primary} = {trial[self.primary]:.10g}"
+        for at in np.flatnonzero(found.jumps)[: not self._is_jumping].tolist():
+            self._is_jumping = True
+            self.notes.append(
+                f"the equations jump where {found.names[at]} changes its sign (t = {found.places[at]:.6g} at {place}): derivatives "
+                "leave this out, so special points and stability are not told from there on; a SegmentedProblem with one segment "
+                "on each side of the jump tells them"
+            )
+        if not found.settled.all() and not self._is_unsettled and self.settings.mesh.every:
+            self._is_unsettled = True
+            at = int(np.argmax(found.costs))
+            self.notes.append(
+                f"no mesh has a point where {found.names[at]} changes its sign (t = {found.places[at]:.6g} at {place}): from there "
+                "on the points are as exact as discretization_error says"
+            )
+
     def _is_confirmed(self, point: SpecialPoint, segment: Segment) -> bool:
         """Return whether a special point was located and, where that was asked for, found again on a finer mesh.
 
@@ -766,8 +790,10 @@ class Continuation:
         coarse = own_normal_form(found.trial.system, found)
         if found.errors is None and labelled and self.settings.errors:
             again = refined(found.same_as or found, self.settings)
-            details = found.details if found.same_as else again.details
-            found = dataclasses.replace(found, trial=again.trial, details=details, errors=again.errors)
+            details, errors = found.details if found.same_as else again.details, again.errors
+            if found.label not in _BY_VALUES and again.trial.system.switching(again.trial.x).jumps.any():
+                errors = dict.fromkeys(errors, np.nan)
+            found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors)
         if coarse is not None:
             better = own_normal_form(found.trial.system, found) if found.errors else coarse
             found = with_normal_form(found, better or coarse, coarse)
