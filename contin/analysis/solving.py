@@ -25,6 +25,7 @@ from contin.problems.statement import forget_changed, with_multipliers
 from contin.problems.variational import VariationalProblem
 from contin.results.point import Point, point_of, system_of, underlying
 from contin.stepping.newton import Corrected, Newton, approached, correct
+from contin.stepping.settling import ROUNDS
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 4
@@ -131,7 +132,7 @@ def _on_switches(
     system: System, done: Corrected, corrected: Callable[[System, Array], Corrected]
 ) -> tuple[System, Corrected]:
     """Return a solution on a mesh with points where conditions on states switch; the last one that Newton's method finds."""
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS):
         moved = system.on_switches(done.x)
         if moved is None:
             break

@@ -17,6 +17,7 @@ from contin.detection.hopf_end import collapsed
 from contin.detection.phase import in_phase
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
+from contin.discretization.switching import Switching
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
@@ -155,6 +156,14 @@ class Extended(Discretization):
     def refined(self) -> tuple[Extended, Carrier] | None:
         """Return the extended system on every interval halved, and the carrier."""
         return self._moved(self.base.refined())
+
+    def switching(self, x: Array) -> Switching:
+        """Return where conditions switch along the solution of the underlying system."""
+        return self.base.switching(x[: self.base.size])
+
+    def on_switches(self, x: Array, closely: bool = False) -> tuple[Extended, Carrier] | None:
+        """Return the extended system on a mesh with those places among its points, and the carrier."""
+        return self._moved(self.base.on_switches(x[: self.base.size], closely))
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Extended, Carrier] | None:
         """Return the extended system on a better mesh, or with new borders where the old ones do not fit; its carrier."""

@@ -16,6 +16,7 @@ from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton
 from contin.stepping.settings import Settings
+from contin.stepping.settling import ROUNDS
 from contin.stepping.state import standing_at
 from contin.stepping.step import located
 from contin.stepping.trial import Linearization, TestFunction, Trial
@@ -26,8 +27,6 @@ _FAR = 0.05
 _SAME_KERNEL = 0.9
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
-#: Times that mesh points are moved to where conditions switch.
-_PLACINGS = 12
 #: An error is given as no less than so many units in the last place of the largest parameter.
 _UNITS = 16
 #: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
@@ -108,7 +107,7 @@ def _on_switches(point: SpecialPoint, trial: Trial, details: Any, newton: Newton
         It was not found on such a mesh, or the places do not settle.
     """
     left: Any = 0.0
-    for _ in range(_PLACINGS):
+    for _ in range(ROUNDS):
         moved = trial.system.on_switches(trial.x, closely=True)
         if moved is None:
             break
@@ -170,7 +169,7 @@ def _zero_again(system: Discretization, x: Array, tangent: Array, test: TestFunc
 
     def at(s: float) -> Trial:
         trial = located(state, x + s * state.tangent, s, newton)
-        for _ in range(_PLACINGS):
+        for _ in range(ROUNDS):
             moved = trial.system.on_switches(trial.x, closely=True)
             if moved is None:
                 break

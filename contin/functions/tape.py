@@ -484,7 +484,7 @@ class _Printer:
     def _text(self, operation: Operation) -> tuple[str, int]:
         name, operands = operation.name, [self.texts[operand] for operand in operation.operands]
         if name == "constant":
-            return f"{operation.data:.17g}".rstrip(), _NAME if operation.data >= 0 else _NEGATIVE
+            return _shortest(operation.data), _NAME if operation.data >= 0 else _NEGATIVE
         if name in _SIGNS:
             sign, binds = _SIGNS[name]
             right = binds + (name in ("sub", "div"))
@@ -505,6 +505,11 @@ class _Printer:
             return f"{'argmin' if search.minimum else 'root'}{min(search.unknowns)}[{index}]", _NAME
         inside = ", ".join(text for text, _ in operands)
         return f"{name}({inside})", _NAME
+
+
+def _shortest(value: float) -> str:
+    """Return a number with as few digits as tell it from others."""
+    return next(text for text in (f"{value:.15g}", f"{value:.16g}", f"{value:.17g}") if float(text) == value or text[-1] == "n")
 
 
 def _within(text: tuple[str, int], binds: int) -> str:
