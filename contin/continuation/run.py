@@ -29,7 +29,7 @@ from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
 from contin.detection.hopf_end import collapsed
 from contin.detection.inspection import Inspection, Start
-from contin.detection.refinement import refined
+from contin.detection.refinement import BENT, refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint, with_details
 from contin.detection.significance import STANDS, free_values, growing, sense
@@ -195,7 +195,7 @@ class Continuation:
     ) -> None:
         self.settings = settings
         self.stop: Stop | None = None
-        self._is_jumping = self._is_unsettled = False  # some point has jumps that the solution decides; not on mesh points
+        self._is_jumping = self._noted_unsettled = False  # some point has jumps that the solution decides; not on mesh points
         self._is_noisy = False  # some point is not known to the tolerance
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         self._check(system)
@@ -423,8 +423,8 @@ class Continuation:
             end, known = step.end, (self.state, self._end)
             if not self._is_poor(self._accuracy) or self._ends_inside(step.segment):
                 break
-            if not end.system.switching(end.x).settled.all():
-                break  # finer meshes are no help there
+            if self._is_unsettled(end):
+                break  # finer meshes are no help
             finer = self._finer_mesh(end.system, end.x, self._accuracy.error)
             if finer is None or not self._move_to(finer):
                 break
@@ -435,6 +435,10 @@ class Continuation:
                 break
             step, self._accuracy = again, accuracy
         return step
+
+    def _is_unsettled(self, trial: Trial) -> bool:
+        """Return whether conditions on states switch inside intervals, and that matters."""
+        return bool((trial.system.switching(trial.x).costs > self.settings.mesh.tolerance).any())
 
     def _moved_past(self, trial: Trial) -> str:
         """Return a clause if special points lie between a point and the same one with other mesh points; "" otherwise."""
@@ -676,8 +680,8 @@ class Continuation:
                 "leave this out, so special points and stability are not told from there on; a SegmentedProblem with one segment "
                 "on each side of the jump tells them"
             )
-        if not found.settled.all() and not self._is_unsettled and self.settings.mesh.every:
-            self._is_unsettled = True
+        if self._is_unsettled(trial) and not self._noted_unsettled:
+            self._noted_unsettled = True
             at = int(np.argmax(found.costs))
             self.notes.append(
                 f"no mesh has a point where {found.names[at]} changes its sign (t = {found.places[at]:.6g} at {place}): from there "
@@ -692,7 +696,13 @@ class Continuation:
         lost = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
         if point.stop is not None or (point.is_located and not lost):
             return True
+        bends = point.trial.system.bends(point.trial.x)
         why = "was not found again on a finer mesh" if point.is_located else "was bracketed, and not located"
+        if point.trial.system.switching(point.trial.x).jumps.any():
+            why = "lies where the equations jump"
+        elif bends is not None and bends.max() > BENT:
+            at = point.trial.system.mesh[1:-1][bends.argmax()]
+            why += f" (the functions are evaluated in Python, and may have a corner or jump near t = {at:.4g})"
         what = f"{point.label} {point.name.removeprefix('possible').strip()}".strip()
         self._note(f"a possible {what} {why}", segment)
         return False

@@ -471,6 +471,20 @@ class Collocation(System):
         """Return where conditions on states or free parameters switch along a solution, and the equations are not smooth."""
         return joined([switching(self, *each, x) for each in self._with_sizes(x)]) if self._selections else NOWHERE
 
+    def bends(self, x: Array) -> Array | None:
+        """Return by how much the second derivatives of the states jump at the inner mesh points, relative to the largest ones.
+
+        Where a solution is smooth these errors fall with the intervals; at a corner or jump of the equations they do not. None
+        where all conditions are known (`switching`): such errors tell of those in functions that are evaluated in Python only.
+        """
+        if self.problem.batch("field").interpreted is None or self.intervals < 2:
+            return None
+        matrix, local = self.basis.bends / self._h[:, None, None] ** 2, self._local(self._scaled_states(x))
+        first, last = (np.einsum("jl,jla->ja", matrix[:, end], local) for end in (0, 1))
+        sizes = np.maximum(np.abs(first).max(axis=0), np.abs(last).max(axis=0))
+        found: Array = (np.abs(first[1:] - last[:-1]) / np.where(sizes > 0, sizes, 1.0)).max(axis=1)
+        return found
+
     def on_switches(self, x: Array, closely: bool = False) -> tuple[Collocation, Carrier] | None:
         """Return the same on a mesh with the places of `switching` among its points; None where they are already.
 

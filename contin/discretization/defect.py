@@ -30,6 +30,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.mesh import near
+from contin.discretization.switching import Switching
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector
 
@@ -142,11 +143,14 @@ class Defect:
         at_mesh = x[: system.state_size].reshape(-1, n)[:: system.degree].copy()
         with np.errstate(all="ignore"):
             p = system.scaled_parameters(x)
-            rates = system.field_values(system.mesh, at_mesh, p)
+            rates, moving = system.field_values(system.mesh, at_mesh, p), system.switching(x)
+            jumps = moving.places[moving.jumps & moving.settled]
+            if jumps.size:  # a rate has no value there
+                rates[np.abs(system.mesh[:, None] - jumps).argmin(axis=0)] = np.nan
             fill_points(n, tables, h, x, *self._rates_of_intervals(rates, at_mesh, p), points)
             rates[self.broken] = np.nan
             fill_left(n, tables, h, x, system.field_values(self.times, points, p), left, self.conditions)
-            self._fill_split(x, p, left)
+            self._fill_split(x, p, moving, left)
             error = factors.solve(left)
             better = x - error
             largest = move(n, tables, x, error, points, at_mesh)
@@ -157,10 +161,9 @@ class Defect:
                 largest = largest_miss(self.weights, integrands, known, self.least_sizes, largest)
         return float(largest)
 
-    def _fill_split(self, x: Array, p: Array, left: Array) -> None:
+    def _fill_split(self, x: Array, p: Array, found: Switching, left: Array) -> None:
         """Fill g, step 3, anew in the intervals inside which a condition switches."""
-        system, found = self.system, self.system.switching(x)
-        inside = found.places[~found.settled]
+        system, inside = self.system, found.places[~found.settled]
         intervals = np.clip(np.searchsorted(system.mesh, inside, side="right") - 1, 0, self.h.size - 1)
         for j in np.unique(intervals).tolist():
             h, rows = self.h[j], system.degree * self.n

@@ -152,6 +152,10 @@ class Discretization(Equations, Protocol):
         """Return the same on a mesh with those places among its points, and the carrier; None where there is no need."""
         return None
 
+    def bends(self, x: Array) -> Array | None:
+        """Return errors of second derivatives at the mesh points that show corners of functions in Python; None if not looked at."""
+        return None
+
 
 def inner(system: Discretization, a: Array, b: Array) -> float:
     """Return the weighted inner product of two vectors of unknowns."""
