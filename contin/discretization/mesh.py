@@ -20,6 +20,8 @@ MOST_INTERVALS = 1_000_000
 _BETWEEN = 0.03
 #: Part of its mean that the density is raised to: an interval grows to ten times the mean at most.
 _LEAST_DENSITY = 0.1
+#: Intervals between two breaks, on average: some are left for breaks that the solution meets on its way.
+_A_PIECE = 2
 #: A mesh stays with up to so many times the intervals that it needs, ...
 _TOO_MANY = 1.6
 #: ... and with an interval that has up to so many times its share of the error.
@@ -148,7 +150,8 @@ def adapted_mesh(basis: Basis, mesh: Array, states: Array, control: MeshControl,
     phi = _raised(density(basis, mesh, states, breaks), h)
     total = float(phi @ h)
     allowed = share(basis, control.tolerance)
-    wanted = int(min(max(np.ceil(total / allowed), control.min_intervals), control.max_intervals))
+    fewest = max(control.min_intervals, _A_PIECE * (len(breaks) + 1) if len(breaks) else 0)
+    wanted = int(min(max(np.ceil(total / allowed), fewest), control.max_intervals))
     enough = wanted <= h.size <= max(_TOO_MANY * wanted, control.min_intervals)
     there = breaks[near(breaks, mesh, mesh[-1] - mesh[0])] if len(breaks) else breaks
     enough = enough and len(there) == len(breaks)

@@ -35,8 +35,8 @@ _SETTLED = 1e-13
 _AT_ONCE, _JUMP = 1e-5, 1e-2
 #: Two places closer than this part of the domain are one; so are one and an end, or a break that does not move.
 _APART = 1e-11
-#: More switches than this part of the intervals are noise, as where a state is zero all along.
-_MOST = 0.5
+#: More places than this are no corners but a curve: a table of a hundred knots that a state passes on its way up and down.
+_MOST = 200
 
 
 class Switching(NamedTuple):
@@ -148,7 +148,7 @@ def _of_selection(selections: Selections, gaps: Array, which: Indices, away: Arr
 
 def _merged(found: Switching, system: Any) -> Switching:
     """Return the places in order, those closer than round-off made one."""
-    if not found.places.size or found.places.size > _MOST * system.intervals:
+    if not found.places.size or found.places.size > _MOST:
         return NOWHERE
     order = np.argsort(found.places, kind="stable")
     places, costs, jumps = found.places[order], found.costs[order], found.jumps[order].astype(bool)

@@ -36,7 +36,7 @@ def settled(trial: Trial, along: Array, newton: Newton) -> Trial:
     found = trial
     for _ in range(ROUNDS):
         moved = found.system.on_switches(found.x)
-        if moved is None:
+        if moved is None or moved[0].intervals != trial.system.intervals:  # more places than the mesh has points
             break
         system, carry = moved
         x, tangent = carry(found.x), trial.system.carrier(system)(along)
