@@ -128,9 +128,7 @@ def solved(
     return point_of(system, done.x, done.iterations, done.error)
 
 
-def _on_switches(
-    system: System, done: Corrected, corrected: Callable[[System, Array], Corrected]
-) -> tuple[System, Corrected]:
+def _on_switches(system: System, done: Corrected, corrected: Callable[[System, Array], Corrected]) -> tuple[System, Corrected]:
     """Return a solution on a mesh with points where conditions on states switch; the last one that Newton's method finds."""
     for _ in range(ROUNDS):
         moved = system.on_switches(done.x)

@@ -22,6 +22,7 @@ import numpy as np
 
 from contin import checks, threads
 from contin.arrays import Array
+from contin.continuation.corners import jump, unsettled, why_lost
 from contin.continuation.failure import no_convergence, shorter_steps
 from contin.continuation.scaling import outgrown, scaled
 from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
@@ -29,7 +30,7 @@ from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
 from contin.detection.hopf_end import collapsed
 from contin.detection.inspection import Inspection, Start
-from contin.detection.refinement import BENT, refined
+from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint, with_details
 from contin.detection.significance import STANDS, free_values, growing, sense
@@ -195,7 +196,7 @@ class Continuation:
     ) -> None:
         self.settings = settings
         self.stop: Stop | None = None
-        self._is_jumping = self._noted_unsettled = False  # some point has jumps that the solution decides; not on mesh points
+        self._noted: set[str] = set()  # what is said of conditions on states once
         self._is_noisy = False  # some point is not known to the tolerance
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         self._check(system)
@@ -314,7 +315,7 @@ class Continuation:
             trial = self._state_trial()
             first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
             located = self._located(dataclasses.replace(first, label=own_end(trial.system, first).label))
-            self._note_jumps(trial)
+            self._note_corners(trial)
             yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
             if (stop := self._out_of_limits(trial) or self._out_of_domain(trial)) is not None:
                 self.stop = stop
@@ -376,7 +377,7 @@ class Continuation:
                 return
         self.state = self._accept(segment, step.distance, inspection.turns)
         self._stand_at(step.end)
-        self._note_jumps(step.end)
+        self._note_corners(step.end)
         if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
             self._is_noisy = True
             self._note(
@@ -423,7 +424,7 @@ class Continuation:
             end, known = step.end, (self.state, self._end)
             if not self._is_poor(self._accuracy) or self._ends_inside(step.segment):
                 break
-            if self._is_unsettled(end):
+            if unsettled(end, self.settings.mesh.tolerance, self.primary):
                 break  # finer meshes are no help
             finer = self._finer_mesh(end.system, end.x, self._accuracy.error)
             if finer is None or not self._move_to(finer):
@@ -435,10 +436,6 @@ class Continuation:
                 break
             step, self._accuracy = again, accuracy
         return step
-
-    def _is_unsettled(self, trial: Trial) -> bool:
-        """Return whether conditions on states switch inside intervals, and that matters."""
-        return bool((trial.system.switching(trial.x).costs > self.settings.mesh.tolerance).any())
 
     def _moved_past(self, trial: Trial) -> str:
         """Return a clause if special points lie between a point and the same one with other mesh points; "" otherwise."""
@@ -669,24 +666,13 @@ class Continuation:
         ends = (trial[self.primary] for trial in (segment.before, segment.trial))
         self.notes.append(f"{text} (between {self.primary} = {' and '.join(f'{end:.10g}' for end in ends)})")
 
-    def _note_jumps(self, trial: Trial) -> None:
-        """Note once that conditions that the solution decides make the equations jump, and once that they do not settle."""
-        found = trial.system.switching(trial.x)
-        place = f"{self.primary} = {trial[self.primary]:.10g}"
-        for at in np.flatnonzero(found.jumps)[: not self._is_jumping].tolist():
-            self._is_jumping = True
-            self.notes.append(
-                f"the equations jump where {found.names[at]} changes its sign (t = {found.places[at]:.6g} at {place}): derivatives "
-                "leave this out, so special points and stability are not told from there on; a SegmentedProblem with one segment "
-                "on each side of the jump tells them"
-            )
-        if self._is_unsettled(trial) and not self._noted_unsettled:
-            self._noted_unsettled = True
-            at = int(np.argmax(found.costs))
-            self.notes.append(
-                f"no mesh has a point where {found.names[at]} changes its sign (t = {found.places[at]:.6g} at {place}): from there "
-                "on the points are as exact as discretization_error says"
-            )
+    def _note_corners(self, trial: Trial) -> None:
+        """Note once that conditions on states make the equations jump, and once that mesh points do not follow them."""
+        tolerance = self.settings.mesh.tolerance if self.settings.mesh.every else np.inf
+        for kind, note in (("jump", jump(trial, self.primary)), ("unsettled", unsettled(trial, tolerance, self.primary))):
+            if note and kind not in self._noted:
+                self._noted.add(kind)
+                self.notes.append(note)
 
     def _is_confirmed(self, point: SpecialPoint, segment: Segment) -> bool:
         """Return whether a special point was located and, where that was asked for, found again on a finer mesh.
@@ -696,13 +682,7 @@ class Continuation:
         lost = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
         if point.stop is not None or (point.is_located and not lost):
             return True
-        bends = point.trial.system.bends(point.trial.x)
-        why = "was not found again on a finer mesh" if point.is_located else "was bracketed, and not located"
-        if point.trial.system.switching(point.trial.x).jumps.any():
-            why = "lies where the equations jump"
-        elif bends is not None and bends.max() > BENT:
-            at = point.trial.system.mesh[1:-1][bends.argmax()]
-            why += f" (the functions are evaluated in Python, and may have a corner or jump near t = {at:.4g})"
+        why = why_lost(point.trial, point.is_located)
         what = f"{point.label} {point.name.removeprefix('possible').strip()}".strip()
         self._note(f"a possible {what} {why}", segment)
         return False

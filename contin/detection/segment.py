@@ -89,9 +89,7 @@ class Segment:
         Points are settled (`contin.stepping.settling`).
     """
 
-    def __init__(
-        self, state: State, before: Place, trial: Trial, step: float, newton: Newton, settles: bool = False
-    ) -> None:
+    def __init__(self, state: State, before: Place, trial: Trial, step: float, newton: Newton, settles: bool = False) -> None:
         self.settles = settles
         self.state, self.trial, self.step, self.newton = state, trial, step, newton
         self.low, self.before = before

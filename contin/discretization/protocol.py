@@ -153,7 +153,7 @@ class Discretization(Equations, Protocol):
         return None
 
     def bends(self, x: Array) -> Array | None:
-        """Return errors of second derivatives at the mesh points that show corners of functions in Python; None if not looked at."""
+        """Return errors of second derivatives at mesh points that show corners of functions in Python; None if not known."""
         return None
 
 

@@ -1,8 +1,8 @@
 """A point of a curve on a mesh with points where conditions that the solution decides switch.
 
-Where such a condition switches inside an interval, the discrete equations have errors of their own that jump from place to place.
-So each point of a curve is corrected again on a mesh with points there. As mesh points move with the solution, two points of a
-step are on two meshes; what is searched between them sees each as carried back to the mesh of the step.
+Where such a condition switches inside an interval, the discrete equations have errors of their own that jump from place to
+place. So each point of a curve is corrected again on a mesh with points there. As mesh points move with the solution, two
+points of a step are on two meshes; what is searched between them sees each as carried back to the mesh of the step.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from contin.stepping.newton import Newton, correct
 from contin.stepping.step import trial_of
 from contin.stepping.trial import Linearization, Trial
 
-#: Times that mesh points are moved to where conditions switch, at one point. The distance left is squared each time at a corner,
-#: 1e-2, 1e-4, 1e-8 of the domain, so that three do. At a jump it falls by a factor of 10 to 30; more rounds are seldom a help.
+#: Times that mesh points are moved to where conditions switch, at one point. At a corner the distance left is squared each
+#: time, 1e-2, 1e-4, 1e-8 of the domain, so that three do. At a jump it falls by a factor of 10 to 30: twelve reach round-off.
 ROUNDS = 12
 
 

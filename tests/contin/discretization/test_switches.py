@@ -3,8 +3,6 @@
 Known values: integration from switch to switch with DOP853 at 1e-13 (SciPy), and closed forms.
 """
 
-import functools
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -19,7 +17,7 @@ from contin.errors import InterpretedWarning
 
 
 def flow(field, jacobian, level, y, end):
-    """The state at the end, and its derivative by the first one; ``field(t, y, above)`` is smooth on both sides of y[0] = level.
+    """The state at the end, and its derivative by the first one; ``field(t, y, above)`` is smooth with ``above`` as given.
 
     The field is continuous, so that the derivative has no jump where y[0] passes the level.
     """
@@ -55,9 +53,7 @@ LAWS = {
 
 def loaded(law):
     """u'' + q law(u) = 0, u(0) = u(1) = 0."""
-    return BoundaryValueProblem(
-        lambda t, u, p: (u.v, -p.q * law(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 2.0}
-    )
+    return BoundaryValueProblem(lambda t, u, p: (u.v, -p.q * law(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 2.0})
 
 
 def slope_at_start(law, levels, near, q=2.0):
@@ -101,7 +97,10 @@ def test_conditions_on_a_state(name, degree):
 def corner(max_of=max):
     """u'' + q (exp(u) + 8 max(0, u - 1/2)) = 0, u(0) = u(1) = 0: the fold comes right after u reaches 1/2."""
     return BoundaryValueProblem(
-        lambda t, u, p: (u.v, -p.q * (np.exp(u.u) + 8 * max_of(0, u.u - 0.5))), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 0.3}
+        lambda t, u, p: (u.v, -p.q * (np.exp(u.u) + 8 * max_of(0, u.u - 0.5))),
+        lambda a, b, p: (a.u, b.u),
+        ["u", "v"],
+        {"q": 0.3},
     )
 
 
@@ -246,7 +245,10 @@ def test_dry_friction():
 def test_a_fold_on_a_jump_has_no_label():
     """u'' + q exp(u) (1 or .97): derivatives leave the jump out."""
     problem = BoundaryValueProblem(
-        lambda t, u, p: (u.v, -p.q * np.exp(u.u) * (0.97 if u.u > 0.5 else 1.0)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 0.3}
+        lambda t, u, p: (u.v, -p.q * np.exp(u.u) * (0.97 if u.u > 0.5 else 1.0)),
+        lambda a, b, p: (a.u, b.u),
+        ["u", "v"],
+        {"q": 0.3},
     )
     start = contin.solve(problem, lambda t: (12 * t * (1 - t), 12 - 24 * t), {"q": 2.5})
     branch = contin.trace(start, free=["q"], limits={"q": (0.5, 5)}, max_points=40)
@@ -292,7 +294,9 @@ def test_a_corner_in_python():
         ["u", "v"], {"q": 0.3},
     )  # fmt: skip
     with pytest.warns(InterpretedWarning):
-        branch = contin.trace(contin.solve(problem, [0, 0], degree=3, mesh=control), free=["q"], limits={"q": (0.2, 5)}, mesh=control)
+        branch = contin.trace(
+            contin.solve(problem, [0, 0], degree=3, mesh=control), free=["q"], limits={"q": (0.2, 5)}, mesh=control
+        )
     assert not branch.labelled("LP")
     assert any("evaluated in Python, and may have a corner" in note for note in branch.notes)
 
@@ -306,7 +310,7 @@ def test_parts():
 
 
 def test_jumps_of_second_derivatives():
-    """Of a function in Python they fall where it is smooth, by 2^3 at degree 4. Where functions are recorded nothing is looked at."""
+    """Of a smooth function in Python they fall by 2^3 at degree 4. Nothing is looked at where functions are recorded."""
     found = []
     for intervals in (10, 20):
         with pytest.warns(InterpretedWarning):
