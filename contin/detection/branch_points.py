@@ -65,7 +65,33 @@ class BranchPointSearch:
         if len(shares):
             self._share, self._spread = float(np.mean(shares)), float(np.ptp(shares))
         count, clear = crossings(values)
+        if (count > 1 or not clear) and self._without_smallest():
+            return int(self.sign_changes), True
         return count, clear and (count % 2 == 1) == self.sign_changes
+
+    def _without_smallest(self) -> bool:
+        """Return whether one singular value explains the sign of the determinant, and no other one comes near zero.
+
+        Where one is smaller than the others by far, as of a layer that is held in its place by exp(-1 / width) only, inverse
+        matrices consist of its singular vectors, and their quotients have negative eigenvalues as soon as these turn. Bordered
+        by the vectors at the end of the step, the matrices are regular::
+
+            M = [ A    u ]       M [x; g] = [0; 1],    det A = g det M
+                [ v^T  0 ]
+
+        So the sign of A is that of g, as long as no singular value of M passes zero.
+        """
+        segment, system = self.segment, self.segment.state.system
+        size, unit = system.size, np.zeros(system.size + 1)
+        right, left, _ = smallest_directions(segment.trial.factors, size, 1)
+        rows, unit[-1] = np.zeros((2, size + 1)), 1.0
+        rows[0, :-1], rows[1, :-1] = segment.state.row, right[0]
+        column = left[:, : system.equations]
+        first, last = (system.linearize(end.x, rows, column)[1] for end in (segment.before, segment.trial))
+        g = [factors.solve(unit)[-1] for factors in (first, last)]
+        if not np.all(np.isfinite(g)) or (g[0] * g[1] < 0) != self.sign_changes:
+            return False
+        return crossings(quotients(first, last, size + 1)) == (0, True)
 
     @property
     def _gap(self) -> float:
