@@ -35,6 +35,9 @@ _GAP = 1e-2
 _GAP_WITHOUT_MESH = 1e-5
 #: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is "possible".
 _HALVINGS = 12
+#: The smallest singular value is smaller by far than the next one if their quotient is above this. In layers whose steps were
+#: divided it is 77 and more; three times larger, the first of these are divided again.
+_BY_FAR = 30.0
 #: Singular values that vanish together are expected at places no further apart than this part of the step.
 _TOGETHER = 0.1
 
@@ -83,10 +86,13 @@ class BranchPointSearch:
         """
         segment, system = self.segment, self.segment.state.system
         size, unit = system.size, np.zeros(system.size + 1)
-        right, left, _ = smallest_directions(segment.trial.factors, size, 1)
+        right, left, response = smallest_directions(segment.trial.factors, size, 2)
+        inverses = np.sort(np.linalg.svd(response, compute_uv=False)) if np.all(np.isfinite(response)) else np.ones(2)
+        if inverses[1] < _BY_FAR * inverses[0]:
+            return False
         rows, unit[-1] = np.zeros((2, size + 1)), 1.0
         rows[0, :-1], rows[1, :-1] = segment.state.row, right[0]
-        column = left[:, : system.equations]
+        column = left[:1, : system.equations]
         first, last = (system.linearize(end.x, rows, column)[1] for end in (segment.before, segment.trial))
         g = [factors.solve(unit)[-1] for factors in (first, last)]
         if not np.all(np.isfinite(g)) or (g[0] * g[1] < 0) != self.sign_changes:
