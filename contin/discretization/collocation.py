@@ -481,8 +481,9 @@ class Collocation(System):
             return None
         matrix, local = self.basis.bends / self._h[:, None, None] ** 2, self._local(self._scaled_states(x))
         first, last = (np.einsum("jl,jla->ja", matrix[:, end], local) for end in (0, 1))
-        sizes = np.maximum(np.abs(first).max(axis=0), np.abs(last).max(axis=0))
-        found: Array = (np.abs(first[1:] - last[:-1]) / np.where(sizes > 0, sizes, 1.0)).max(axis=1)
+        least = (1 + self.largest(x)[: self._n]) / (self.mesh[-1] - self.mesh[0]) ** 2  # a trivial branch is round-off
+        sizes = np.maximum(np.maximum(np.abs(first).max(axis=0), np.abs(last).max(axis=0)), least)
+        found: Array = (np.abs(first[1:] - last[:-1]) / sizes).max(axis=1)
         return found
 
     def on_switches(self, x: Array, closely: bool = False) -> tuple[Collocation, Carrier] | None:
