@@ -80,6 +80,8 @@ def selections(
 ) -> tuple[Selection, ...]:
     """Return the switches along a solution, in time, that states or free parameters move.
 
+    Those that unknowns found by iteration depend on are left out.
+
     Parameters
     ----------
     states, free : sequence of int
@@ -89,12 +91,18 @@ def selections(
     varies, moves = tape.reading(every, [time, *states]), tape.reading(every, [*states, *free])
     found: dict[Switch, Selection] = {}
 
+    needed = tape.needed(results)
+    searches = [place for place in needed if tape.operations[place].name in ("root", "least")]
+
     def append(switch: Switch, place: int, one: int, other: int) -> None:
+        reads = tape.reading(results, [place])
+        if any(reads[search] for search in searches):
+            return  # unknowns that are found by iteration depend on it: there is no other outcome to compare with
         sides = [tape.substitute(results, {place: side}) for side in (one, other)]
         gaps = {row: tape.at("sub", pair) for row, pair in enumerate(zip(*sides)) if pair[0] != pair[1]}
         found.setdefault(switch, Selection(switch, gaps))
 
-    for place in tape.needed(results):
+    for place in needed:
         name, operands, data = tape.operations[place]
         if not any(varies[each] for each in operands) or not any(moves[each] for each in operands):
             continue
