@@ -24,17 +24,18 @@ from contin.functions.signature import Signature, named_values
 _PACKAGE = __name__.partition(".")[0] + "."
 #: The complex step: small enough that its square is nothing.
 _STEP = 1e-30
-#: First length of differences, relative to the size of an input. Errors of fourth order and of round-off are below 1e-11
-#: where a function changes over lengths of its input's size.
-_DIFFERENCE = 2e-4
-#: Least size of an input that counts: at a zero of an input its size is not known.
+#: First length of differences, relative to the size of an input, of first and of higher derivatives, which are differences of
+#: differences. Errors of fourth order and of round-off are below 1e-11, or 1e-8, where a function changes over such a size.
+_DIFFERENCE, _NESTED = 2e-4, 2e-3
+#: Least size of an input that counts for first derivatives: nearer to zero its size is not known, and one is tried. For higher
+#: derivatives it is one at least: a shorter length may hide them behind the round-off of the lower ones, and all is zero.
 _LEAST = 1e-4
 #: Differences of second and of fourth order that differ by a larger part of the derivative are taken again over a shorter
 #: length. Ten times larger, the error of fourth order may be 1e-8.
 _ROUGH = 1e-5
-#: Factor of that length, and how often. Five times an eighth reach features 1e-5 times as wide as their input.
+#: Factor of that length, and how often. Nine times an eighth reach features 1e-9 times as wide as their input.
 _SHORTER = 1 / 8
-_TIMES = 5
+_TIMES = 9
 #: Weights of f(x + k h), k = 1, 2, less those of f(x - k h), in the derivative of fourth order.
 _WEIGHTS = (8 / 12, -1 / 12)
 #: Places beside the first one where the ways to evaluate a function are compared.
@@ -171,7 +172,7 @@ class Interpreted:
         def inner(t: Array, x: Array, places: Indices) -> Array:
             return self._along(t, x, [direction[places] for direction in others])
 
-        return self._difference(inner, t, x, last)
+        return self._difference(inner, t, x, last, nested=bool(others))
 
     def _complex_step(self, t: Array, x: Array, direction: Array) -> Array:
         """Return the derivative along a direction from one evaluation with complex numbers."""
@@ -179,15 +180,17 @@ class Interpreted:
         found: Array = self._values(t, moved).imag / _STEP
         return found
 
-    def _difference(self, function: Callable[[Array, Array, Indices], Array], t: Array, x: Array, direction: Array) -> Array:
+    def _difference(
+        self, function: Callable[[Array, Array, Indices], Array], t: Array, x: Array, direction: Array, nested: bool = False
+    ) -> Array:
         """Return the derivative of a function along a direction, by differences as long as its error estimate allows.
 
         ``function`` takes times and inputs of some places, and the numbers of these places.
         """
-        moving = direction != 0
-        sizes = np.maximum(np.abs(np.where(np.isfinite(x), x, 0.0)), _LEAST) / np.where(moving, np.abs(direction), 1.0)
-        length = _DIFFERENCE * np.where(moving, sizes, np.inf).min(axis=1)
-        length = np.where(np.isfinite(length), length, _DIFFERENCE)
+        moving, at, first = direction != 0, np.abs(np.where(np.isfinite(x), x, 0.0)), _NESTED if nested else _DIFFERENCE
+        sizes = np.maximum(at, 1.0) if nested else np.where(at < _LEAST, 1.0, at)
+        length = first * np.where(moving, sizes / np.where(moving, np.abs(direction), 1.0), np.inf).min(axis=1)
+        length = np.where(np.isfinite(length), length, first)
         best, least = np.zeros((len(x), self._count)), np.full(len(x), np.inf)
         left = np.arange(len(x))
         for _ in range(_TIMES + 1):

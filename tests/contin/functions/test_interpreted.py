@@ -1,5 +1,7 @@
 """Functions that cannot be compiled: the same solutions, and one sentence that says so."""
 
+import ctypes
+import ctypes.util
 import functools
 import math
 import warnings
@@ -16,6 +18,8 @@ from contin.errors import InterpretedWarning
 pytestmark = pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
 TABLE = np.linspace(0.0, 1.0, 11)
 MATRIX = np.array([[2.0, 1.0], [0.0, 1.0]])
+REAL_SINE = ctypes.CDLL(ctypes.util.find_library("m")).sin
+REAL_SINE.restype, REAL_SINE.argtypes = ctypes.c_double, [ctypes.c_double]
 
 
 class Model:
@@ -145,3 +149,21 @@ def test_what_needs_finite_numbers_is_called_with_them():
 
     assert solve(AlgebraicProblem(search, ["x"], {"a": 0.5}), [2.0]).x[0] == 0.5
     assert solve(AlgebraicProblem(lambda u, p: (u.x - math.floor(u.x) - p.a,), ["x"], {"a": 0.5}), [2.3]).x[0] == 2.5
+
+
+def real_sine(x):
+    """The sine of a real number, by a function that cannot be recorded."""
+    return REAL_SINE(x)
+
+
+def test_the_normal_form_of_a_hopf_point_at_zero():
+    """Third derivatives where all states are zero: sizes of states tell nothing. l1 = -2 by hand: the sine adds no term."""
+
+    def field(u, p):
+        square = u.x**2 + u.y**2
+        return p.m * u.x - u.y - u.x * square + 0.1 * real_sine(u.x) * u.y, u.x + p.m * u.y - u.y * square
+
+    problem = AlgebraicProblem(field, ["x", "y"], {"m": -1.0})
+    (hopf,) = trace(solve(problem, [0.0, 0.0]), free=["m"], limits={"m": (-1, 1)}).labelled("HB")
+    assert abs(hopf.normal_form + 2) < hopf.details["normal_form_error"] < 1e-4
+    assert abs(hopf.normal_form + 2) < 1e-8
