@@ -1,0 +1,149 @@
+"""AUTO-07p's demos, run by AUTO's own front end from their own scripts and constants.
+
+AUTO's front end starts each run of a demo as the command ``PREFIX ./demo.exe`` and writes the constants and the first solution
+to its standard input. The prefix here is this file: it runs the executable, measures its processor time, and notes the labelled
+points that AUTO writes to ``fort.7``. With ``--fine`` it first asks for tighter tolerances and a finer mesh; nothing else of the
+demo is changed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+AUTO = Path(os.environ.get("AUTO_DIR", "/usr/lib/auto-07p"))
+#: Width in characters of a column of AUTO's files of branches; the first holds branch, point, type and label.
+WIDTH = 19
+#: Most processor seconds of one run of a demo.
+LONGEST = 60
+LABELS = {
+    0: "", 1: "BP", 2: "LP", 3: "HB", 4: "RG", 5: "LP", 6: "BP", 7: "PD", 8: "TR", 9: "EP",
+    -1: "BT", -2: "CP", -3: "ZH", -4: "UZ", -5: "R1", -6: "R2", -7: "R3", -8: "R4", -9: "MX", -32: "GH",
+    23: "LTR", 77: "PTR", 28: "LPD", 88: "TTR",
+}  # fmt: skip
+#: Constants of a finer run: values that replace the demo's own. Intervals are multiplied by the last number.
+FINE, INTERVALS = {"EPSL": "1e-11", "EPSU": "1e-11", "EPSS": "1e-09", "ITMX": "20", "ITNW": "9"}, 4
+
+
+def missing() -> str | None:
+    """Return the reason why AUTO-07p cannot be run, or None."""
+    if shutil.which("gfortran") is None:
+        return "gfortran is not on the path"
+    if not (AUTO / "lib" / "main.o").exists():
+        return f"no AUTO-07p in {AUTO} (apt-get install auto-07p gfortran, or set AUTO_DIR)"
+    return None
+
+
+def run(demos: Path, name: str, script: str, fine: bool = False, timeout: float = 600) -> list[dict]:
+    """Run one script of a demo; return its runs: constants, seconds of the processor, columns and labelled points.
+
+    Parameters
+    ----------
+    demos : Path
+        The folder ``demos`` of AUTO's distribution. It is not changed: the demo runs in a copy.
+    name, script : str
+        The demo's folder, and the script in it.
+    fine : bool
+        With tighter tolerances and a finer mesh.
+    """
+    with tempfile.TemporaryDirectory(prefix="demo-") as temporary:
+        folder = Path(temporary) / name
+        shutil.copytree(demos / name, folder)
+        log = Path(temporary) / "runs.jsonl"
+        words = [sys.executable, str(Path(__file__).resolve()), str(log), *(["--fine"] if fine else []), "--"]
+        environment = os.environ | {
+            "AUTO_DIR": str(AUTO), "AUTO_COMMAND_PREFIX": " ".join(words), "PYTHONPATH": str(AUTO / "python"),
+            "OMP_NUM_THREADS": "1", "MPLBACKEND": "agg",
+        }  # fmt: skip
+        command = [sys.executable, "-m", "auto", script]
+        done = subprocess.run(
+            command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=timeout
+        )
+        text = log.read_text() if log.exists() else ""
+        runs = [json.loads(line) for line in text.splitlines()]
+        if not runs:
+            raise RuntimeError(f"AUTO ran nothing of {name}:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+        return runs
+
+
+# --- the prefix -------------------------------------------------------------------------------------------------------
+
+
+def finer(constants: str) -> str:
+    """Return AUTO's constants with tighter tolerances and more intervals."""
+    for key, value in FINE.items():
+        constants = re.sub(rf"\b{key}\s*=\s*[-+.\deEdD]+", f"{key}={value}", constants)
+    return re.sub(r"\bNTST\s*=\s*(\d+)", lambda found: f"NTST={INTERVALS * int(found[1])}", constants)
+
+
+def constant(constants: str, key: str) -> str:
+    """Return the text of one of AUTO's constants, empty if it is not stated."""
+    found = re.search(rf"(?<![A-Za-z]){key}\s*=\s*(\[[^\]]*\]|[^\s,]+)", constants)
+    return found[1] if found else ""
+
+
+def parse(text: str) -> tuple[list[str], list[dict]]:
+    """Return the columns of AUTO's file of branches, and its labelled points."""
+    columns: list[str] = []
+    points = []
+    for line in text.splitlines():
+        cells = [line[place : place + WIDTH].strip() for place in range(WIDTH, len(line), WIDTH)]
+        first = line[:WIDTH]
+        if first.split()[:1] == ["0"]:
+            if "TY" in first:
+                columns = cells
+            continue
+        branch, point, kind, label = (int(first[a:b]) for a, b in ((0, 4), (4, 10), (10, 14), (14, 19)))
+        if label:
+            values = dict(zip(columns, map(number, cells)))
+            points.append({"branch": branch, "point": point, "label": name_of(kind), "values": values})
+    return columns, points
+
+
+def number(text: str) -> float:
+    """Return a number that Fortran wrote; exponents of three digits lack their letter."""
+    return float(re.sub(r"(?<=\d)([-+]\d{3})$", r"E\1", text.replace("D", "E")))
+
+
+def name_of(kind: int) -> str:
+    """Return the letters of one of AUTO's codes of points."""
+    if kind in (-32, 23, 28, 77, 88):
+        return LABELS[kind]
+    return LABELS.get(kind % 10 if kind >= 0 else -(-kind % 10), "?")
+
+
+def execute(log: Path, fine: bool, command: list[str]) -> int:
+    """Run AUTO's executable on the constants and the solution from standard input; note what it found."""
+    given = sys.stdin.buffer.read()
+    end = given.index(b"s='/'")
+    constants = given[:end].decode()
+    if fine:
+        constants = finer(constants)
+    done = subprocess.run(
+        command, input=constants.encode() + given[end:], stdout=subprocess.PIPE,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST)),
+    )  # fmt: skip
+    sys.stdout.buffer.write(done.stdout)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    branch_file = Path("fort.7")
+    columns, points = parse(branch_file.read_text()) if branch_file.exists() else ([], [])
+    keys = "NDIM", "IPS", "ISW", "ISP", "ILP", "NTST", "NCOL", "ICP", "IRS", "EPSL", "EPSS"
+    note = {
+        "constants": {key: constant(constants, key) for key in keys}, "seconds": used.ru_utime + used.ru_stime,
+        "failed": done.returncode, "columns": columns, "points": points,
+    }  # fmt: skip
+    with log.open("a") as file:
+        file.write(json.dumps(note) + "\n")
+    return done.returncode
+
+
+if __name__ == "__main__":
+    split = sys.argv.index("--")
+    sys.exit(execute(Path(sys.argv[1]), "--fine" in sys.argv[2:split], sys.argv[split + 1 :]))

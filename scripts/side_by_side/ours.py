@@ -1,0 +1,44 @@
+"""contin's side of one demo: its labelled points, and processor times of a first run and of further ones."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+
+from side_by_side.all_demos import DEMOS
+from side_by_side.compare import of_contin
+from side_by_side.record import Demo
+
+#: Modules whose results are kept between runs: those of the bank and of this package.
+KEEPERS = "bank", "side_by_side", "cycles"
+
+
+def forget() -> None:
+    """Drop all results that are kept, so that a second run computes everything again, recordings included."""
+    for name, module in list(sys.modules.items()):
+        if name.split(".")[0] in KEEPERS:
+            for member in list(vars(module).values()):
+                clear = getattr(member, "cache_clear", None)
+                if clear is not None:
+                    clear()
+
+
+def points(demo: Demo) -> list[list[dict]]:
+    """Return contin's labelled points of each part of a demo."""
+    return [of_contin(part.branches(), part) for part in demo.parts]
+
+
+def run(name: str, repeats: int) -> dict:
+    """Return the points of a demo, and processor seconds: of this process up to the end of its first run, and of a further run."""
+    (demo,) = [demo for demo in DEMOS if demo.name == name]
+    forget()
+    found = points(demo)
+    first = time.process_time()
+    further = []
+    for _ in range(repeats):
+        forget()
+        began = time.process_time()
+        points(demo)
+        further.append(time.process_time() - began)
+    return {"points": found, "first": first, "again": statistics.median(further)}
