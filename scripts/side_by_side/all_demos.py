@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
-from side_by_side import statics
+from side_by_side import connections, cycles, driven, maps, statics
 
-DEMOS = sorted(statics.demos(), key=lambda demo: demo.name)
+DEMOS = sorted(
+    [*statics.demos(), *cycles.demos(), *driven.demos(), *maps.demos(), *connections.demos()], key=lambda demo: demo.name
+)

@@ -16,11 +16,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 AUTO = Path(os.environ.get("AUTO_DIR", "/usr/lib/auto-07p"))
 #: Width in characters of a column of AUTO's files of branches; the first holds branch, point, type and label.
 WIDTH = 19
+#: Seconds by which the clock of the file system may lie behind.
+CLOCK = 0.1
 #: Most processor seconds of one run of a demo.
 LONGEST = 60
 LABELS = {
@@ -79,7 +82,10 @@ def run(demos: Path, name: str, script: str, fine: bool = False, timeout: float 
 def finer(constants: str) -> str:
     """Return AUTO's constants with tighter tolerances and more intervals."""
     for key, value in FINE.items():
-        constants = re.sub(rf"\b{key}\s*=\s*[-+.\deEdD]+", f"{key}={value}", constants)
+        if constant(constants, key):
+            constants = re.sub(rf"\b{key}\s*=\s*[-+.\deEdD]+", f"{key}={value}", constants)
+        else:
+            constants += f"{key}={value}\n"
     return re.sub(r"\bNTST\s*=\s*(\d+)", lambda found: f"NTST={INTERVALS * int(found[1])}", constants)
 
 
@@ -119,6 +125,14 @@ def name_of(kind: int) -> str:
     return LABELS.get(kind % 10 if kind >= 0 else -(-kind % 10), "?")
 
 
+def branches_written(constants: str, began: float) -> str:
+    """Return the file of branches that a run wrote: ``fort.7``, or the one that its constants name; empty if there is none."""
+    name = constant(constants, "sv").strip("'\"")
+    files = [Path(file) for file in ("fort.7", f"b.{name}") if Path(file).exists()]
+    files = [file for file in files if file.stat().st_mtime >= began - CLOCK]
+    return max(files, key=lambda file: file.stat().st_mtime).read_text() if files else ""
+
+
 def execute(log: Path, fine: bool, command: list[str]) -> int:
     """Run AUTO's executable on the constants and the solution from standard input; note what it found."""
     given = sys.stdin.buffer.read()
@@ -126,14 +140,14 @@ def execute(log: Path, fine: bool, command: list[str]) -> int:
     constants = given[:end].decode()
     if fine:
         constants = finer(constants)
+    began = time.time()
     done = subprocess.run(
         command, input=constants.encode() + given[end:], stdout=subprocess.PIPE,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST)),
     )  # fmt: skip
     sys.stdout.buffer.write(done.stdout)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    branch_file = Path("fort.7")
-    columns, points = parse(branch_file.read_text()) if branch_file.exists() else ([], [])
+    columns, points = parse(branches_written(constants, began))
     keys = "NDIM", "IPS", "ISW", "ISP", "ILP", "NTST", "NCOL", "ICP", "IRS", "EPSL", "EPSS"
     note = {
         "constants": {key: constant(constants, key) for key in keys}, "seconds": used.ru_utime + used.ru_stime,

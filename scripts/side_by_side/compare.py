@@ -49,13 +49,14 @@ def of_contin(branches: Sequence[Branch], part: Part) -> list[dict]:
     found = []
     for branch in branches:
         for point in branch.points[1:]:
-            label = "UZ" if point.label == "EP" and point is branch.points[-1] else point.label
+            last = point is branch.points[-1]
+            label = "UZ" if point.label == "EP" and last else part.also.get(point.label, point.label)
             if not label:
                 continue
             first = next(iter(part.columns.values()))
             error = point.errors.get(first) if isinstance(first, str) else None
             values = [value(point, column) for column in part.columns.values()]
-            found.append({"label": label, "values": values, "error": error, "end": point.label == "EP"})
+            found.append({"label": label, "values": values, "error": error, "end": last})
     return found
 
 
@@ -68,7 +69,7 @@ def of_auto(runs: Sequence[dict], part: Part) -> list[dict]:
         for point in runs[number]["points"]:
             if point["label"] in part.labels:
                 values = [point["values"].get(column, math.nan) for column in part.columns]
-                found.append({"label": part.also.get(point["label"], point["label"]), "values": values})
+                found.append({"label": point["label"], "values": values})
     return found
 
 
@@ -151,7 +152,7 @@ def verdict(row: Row) -> str:
     if row.third is not None:
         ours, theirs = gap(row.contin, row.third), gap(row.auto, row.third)
         return "equal" if ours == theirs else "contin: known" if ours < theirs else "AUTO: known"
-    if row.fine is not None:
+    if row.fine is not None and gap(row.auto, row.fine) > 0:
         ours, theirs = gap(row.contin, row.fine), gap(row.auto, row.fine)
         if CLEARLY * ours < theirs:
             return "contin: so AUTO, finer"

@@ -41,9 +41,15 @@ def seconds_of(demo: Demo, auto: dict | None) -> float:
 
 
 def shown(row: Row) -> int:
-    """Return which column of a row is shown: the first, or the second of a point with a given value."""
-    values = row.contin or row.auto
-    return 1 if row.label == "UZ" and len(values) > 1 and not math.isnan(values[1]) else 0
+    """Return which column of a row is shown: the first; of a point with a given value the first that was not given."""
+    values = row.contin or row.fine or row.auto
+    found = [which for which, each in enumerate(values) if not math.isnan(each) and not is_given(each)]
+    return found[0] if row.label == "UZ" and found else 0
+
+
+def is_given(value: float) -> bool:
+    """Return whether a value has few digits, as those have that a run is told to stop at."""
+    return abs(value - float(f"{value:.4g}")) < 1e-7 * max(1.0, abs(value))
 
 
 def number(values: Sequence[float] | None, which: int, digits: int = 10) -> str:

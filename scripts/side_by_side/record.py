@@ -31,7 +31,7 @@ class Part:
     known : sequence
         Values by a third method: labels, and values by AUTO's columns.
     also : mapping
-        AUTO's label to contin's, where one event has two names.
+        contin's label to AUTO's, where one event has two names.
     """
 
     runs: Sequence[int]
