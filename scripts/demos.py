@@ -20,7 +20,6 @@ SCRIPTS = Path(__file__).resolve().parent
 sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent), str(SCRIPTS.parent / "tests" / "contin")]
 #: AUTO's recorded runs of all demos.
 RECORDED = SCRIPTS / "side_by_side" / "auto_07p.json"
-#: What contin computed, kept beside so that one demo can be run again alone.
 #: Most seconds of one demo in contin.
 LONGEST = 900
 
@@ -46,12 +45,8 @@ def auto_of(folder: Path, demo, repeats: int) -> dict:
     from side_by_side import auto_07p
 
     found = [auto_07p.run(folder, demo.name, demo.file) for _ in range(1 if demo.slow else repeats)]
-    try:
-        fine = auto_07p.run(folder, demo.name, demo.file, fine=True)
-    except (RuntimeError, subprocess.TimeoutExpired) as error:
-        print(f"{demo.name}: no finer run: {type(error).__name__}", file=sys.stderr)
-        fine = []
     runs = found[0]
+    fine = auto_07p.run_finer(folder, demo.name, demo.file, runs)
     for number, each in enumerate(runs):
         seconds = sorted(other[number]["seconds"] for other in found if number < len(other))
         each["seconds"] = seconds[len(seconds) // 2]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from side_by_side import connections, cycles, driven, maps, statics
+from side_by_side import connections, cycles, driven, maps, others, statics
 
-DEMOS = sorted(
-    [*statics.demos(), *cycles.demos(), *driven.demos(), *maps.demos(), *connections.demos()], key=lambda demo: demo.name
-)
+MODULES = statics, cycles, driven, maps, connections, others
+DEMOS = sorted((demo for module in MODULES for demo in module.demos()), key=lambda demo: demo.name)

@@ -2,8 +2,8 @@
 
 AUTO's front end starts each run of a demo as the command ``PREFIX ./demo.exe`` and writes the constants and the first solution
 to its standard input. The prefix here is this file: it runs the executable, measures its processor time, and notes the labelled
-points that AUTO writes to ``fort.7``. With ``--fine`` it first asks for tighter tolerances and a finer mesh; nothing else of the
-demo is changed.
+points that AUTO writes to ``fort.7``. On request it first asks for tighter tolerances and a finer mesh; nothing else of the demo is
+changed.
 """
 
 from __future__ import annotations
@@ -31,8 +31,13 @@ LABELS = {
     -1: "BT", -2: "CP", -3: "ZH", -4: "UZ", -5: "R1", -6: "R2", -7: "R3", -8: "R4", -9: "MX", -32: "GH",
     23: "LTR", 77: "PTR", 28: "LPD", 88: "TTR",
 }  # fmt: skip
-#: Constants of a finer run: values that replace the demo's own. Intervals are multiplied by the last number.
-FINE, INTERVALS = {"EPSL": "1e-11", "EPSU": "1e-11", "EPSS": "1e-09", "ITMX": "20", "ITNW": "9"}, 4
+#: Constants of finer runs, which replace the demo's own, and the number by which intervals are multiplied. At the tightest
+#: tolerances AUTO does not find all points, in silence; the second and the third are for these.
+FINER = (
+    ({"EPSL": "1e-11", "EPSU": "1e-11", "EPSS": "1e-09", "ITMX": "20", "ITNW": "9"}, 4),
+    ({"EPSL": "1e-09", "EPSU": "1e-09", "EPSS": "1e-07", "ITMX": "20", "ITNW": "9"}, 3),
+    ({}, 4),
+)
 
 
 def missing() -> str | None:
@@ -44,7 +49,7 @@ def missing() -> str | None:
     return None
 
 
-def run(demos: Path, name: str, script: str, fine: bool = False, timeout: float = 600) -> list[dict]:
+def run(demos: Path, name: str, script: str, level: int = -1, timeout: float = 600) -> list[dict]:
     """Run one script of a demo; return its runs: constants, seconds of the processor, columns and labelled points.
 
     Parameters
@@ -53,14 +58,14 @@ def run(demos: Path, name: str, script: str, fine: bool = False, timeout: float 
         The folder ``demos`` of AUTO's distribution. It is not changed: the demo runs in a copy.
     name, script : str
         The demo's folder, and the script in it.
-    fine : bool
-        With tighter tolerances and a finer mesh.
+    level : int
+        Which of ``FINER``: tighter tolerances and a finer mesh; none for -1.
     """
     with tempfile.TemporaryDirectory(prefix="demo-") as temporary:
         folder = Path(temporary) / name
         shutil.copytree(demos / name, folder)
         log = Path(temporary) / "runs.jsonl"
-        words = [sys.executable, str(Path(__file__).resolve()), str(log), *(["--fine"] if fine else []), "--"]
+        words = [sys.executable, str(Path(__file__).resolve()), str(log), str(level), "--"]
         environment = os.environ | {
             "AUTO_DIR": str(AUTO), "AUTO_COMMAND_PREFIX": " ".join(words), "PYTHONPATH": str(AUTO / "python"),
             "OMP_NUM_THREADS": "1", "MPLBACKEND": "agg",
@@ -76,17 +81,42 @@ def run(demos: Path, name: str, script: str, fine: bool = False, timeout: float 
         return runs
 
 
+def run_finer(demos: Path, name: str, script: str, runs: list[dict]) -> list[dict]:
+    """Run a demo with finer constants: each of its runs at the finest level at which AUTO finds as many points, or most."""
+    found = []
+    for level in range(len(FINER)):
+        try:
+            found.append(run(demos, name, script, level))
+        except (RuntimeError, subprocess.TimeoutExpired) as error:
+            print(f"{name}: no finer run {level}: {type(error).__name__}", file=sys.stderr)
+    best = []
+    for number, own in enumerate(runs):
+        tries = [each[number] for each in found if number < len(each)]
+        alike = [each for each in tries if each["constants"]["ICP"] == own["constants"]["ICP"]]
+        wanted = count(own)
+        enough = [each for each in alike if count(each) >= wanted]
+        empty = {"constants": own["constants"], "seconds": 0.0, "points": []}
+        best.append(enough[0] if enough else max(alike, key=count, default=empty))
+    return best
+
+
+def count(run: dict) -> int:
+    """Return the number of special points of a run."""
+    return sum(point["label"] not in ("", "RG", "EP", "MX") for point in run["points"])
+
+
 # --- the prefix -------------------------------------------------------------------------------------------------------
 
 
-def finer(constants: str) -> str:
+def finer(constants: str, level: int) -> str:
     """Return AUTO's constants with tighter tolerances and more intervals."""
-    for key, value in FINE.items():
+    changes, times = FINER[level]
+    for key, value in changes.items():
         if constant(constants, key):
             constants = re.sub(rf"\b{key}\s*=\s*[-+.\deEdD]+", f"{key}={value}", constants)
         else:
             constants += f"{key}={value}\n"
-    return re.sub(r"\bNTST\s*=\s*(\d+)", lambda found: f"NTST={INTERVALS * int(found[1])}", constants)
+    return re.sub(r"\bNTST\s*=\s*(\d+)", lambda found: f"NTST={times * int(found[1])}", constants)
 
 
 def constant(constants: str, key: str) -> str:
@@ -133,13 +163,13 @@ def branches_written(constants: str, began: float) -> str:
     return max(files, key=lambda file: file.stat().st_mtime).read_text() if files else ""
 
 
-def execute(log: Path, fine: bool, command: list[str]) -> int:
+def execute(log: Path, level: int, command: list[str]) -> int:
     """Run AUTO's executable on the constants and the solution from standard input; note what it found."""
     given = sys.stdin.buffer.read()
     end = given.index(b"s='/'")
     constants = given[:end].decode()
-    if fine:
-        constants = finer(constants)
+    if level >= 0:
+        constants = finer(constants, level)
     began = time.time()
     done = subprocess.run(
         command, input=constants.encode() + given[end:], stdout=subprocess.PIPE,
@@ -160,4 +190,4 @@ def execute(log: Path, fine: bool, command: list[str]) -> int:
 
 if __name__ == "__main__":
     split = sys.argv.index("--")
-    sys.exit(execute(Path(sys.argv[1]), "--fine" in sys.argv[2:split], sys.argv[split + 1 :]))
+    sys.exit(execute(Path(sys.argv[1]), int(sys.argv[2]), sys.argv[split + 1 :]))

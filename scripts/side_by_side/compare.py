@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
+from side_by_side.multipliers import distance
 from side_by_side.record import Column, Part
 
 from contin import Branch, Point
 
-#: Points of one label that differ less, relative to max(1, |value|), in all columns are the same point.
-NEAR = 2e-3
 #: Values that differ less, relative to max(1, |value|), are equal: below it AUTO's files have no digits (eleven are written).
 EQUAL = 1e-9
 #: A finer run of AUTO decides if it lies this many times closer to one of the values than to the other.
@@ -29,6 +28,24 @@ class Row:
     error: float | None = None
     third: list[float] | None = None
     asked: bool = True
+    check: float | None = None
+
+    @property
+    def shown(self) -> int:
+        """Which column is shown: the first; of a point with a given value the first that was not given."""
+        values = self.contin or self.fine or self.auto
+        found = [which for which, each in enumerate(values) if not math.isnan(each) and not is_given(each)]
+        return found[0] if self.label == "UZ" and found else 0
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the third method has the column that is shown."""
+        return self.third is not None and not math.isnan(self.third[self.shown])
+
+
+def is_given(value: float) -> bool:
+    """Return whether a value has few digits, as those have that a run is told to stop at."""
+    return abs(value - float(f"{value:.4g}")) < 1e-7 * max(1.0, abs(value))
 
 
 def gap(a: Sequence[float], b: Sequence[float]) -> float:
@@ -56,7 +73,7 @@ def of_contin(branches: Sequence[Branch], part: Part) -> list[dict]:
             first = next(iter(part.columns.values()))
             error = point.errors.get(first) if isinstance(first, str) else None
             values = [value(point, column) for column in part.columns.values()]
-            found.append({"label": label, "values": values, "error": error, "end": last})
+            found.append({"label": label, "values": values, "error": error, "end": last, "check": distance(point)})
     return found
 
 
@@ -73,7 +90,7 @@ def of_auto(runs: Sequence[dict], part: Part) -> list[dict]:
     return found
 
 
-def nearest(points: Sequence[dict], label: str, values: Sequence[float], near: float = NEAR) -> dict | None:
+def nearest(points: Sequence[dict], label: str, values: Sequence[float], near: float) -> dict | None:
     """Return the nearest point with a label, None if none is near."""
     ones = [point for point in points if point["label"] == label and gap(values, point["values"]) < near]
     return min(ones, key=lambda point: gap(values, point["values"]), default=None)
@@ -99,28 +116,28 @@ def rows(runs: Sequence[dict], fine: Sequence[dict], ours: Sequence[dict], part:
     known = [{"label": label, "values": [values.get(c, math.nan) for c in part.columns]} for label, values in part.known]
     found = []
     for point in theirs:
-        pair = nearest(left, point["label"], point["values"])
+        pair = nearest(left, point["label"], point["values"], part.near)
         if pair is None:  # a point that two of AUTO's runs meet
-            pair = nearest(ours, point["label"], point["values"])
+            pair = nearest(ours, point["label"], point["values"], part.near)
             if pair is not None:
                 continue
         else:
             left = [other for other in left if other is not pair]
         best = pair["values"] if pair else point["values"]
-        other = nearest(finer, point["label"], best)
-        third = nearest(known, point["label"], best)
+        other = nearest(finer, point["label"], best, part.near)
+        third = nearest(known, point["label"], best, part.near)
         found.append(Row(
             point["label"], point["values"], other and other["values"], pair and pair["values"],
-            pair and pair["error"], third and third["values"],
+            pair and pair["error"], third and third["values"], True, pair and pair.get("check"),
         ))  # fmt: skip
     for point in left:
         inside = [run for number in part.runs if number < len(runs) for run in [runs[number]] if covers(run, point, part)]
         if point["end"] or point["label"] not in part.labels or point["label"] == "UZ" or not inside:
             continue
-        other, third = nearest(finer, point["label"], point["values"]), nearest(known, point["label"], point["values"])
+        other, third = nearest(finer, point["label"], point["values"], part.near), nearest(known, point["label"], point["values"], part.near)
         found.append(Row(
             point["label"], None, other and other["values"], point["values"], point["error"], third and third["values"],
-            any(was_asked(run, point["label"]) for run in inside),
+            any(was_asked(run, point["label"]) for run in inside), point.get("check"),
         ))  # fmt: skip
     return found
 
@@ -130,9 +147,14 @@ def covers(run: dict, point: dict, part: Part) -> bool:
     for column, value_ in zip(part.columns, point["values"]):
         values = [each["values"].get(column, math.nan) for each in run["points"]]
         values = [each for each in values if not math.isnan(each)]
-        if values and not min(values) - NEAR <= value_ <= max(values) + NEAR:
+        if values and not min(values) - part.near <= value_ <= max(values) + part.near:
             return False
     return True
+
+
+#: A multiplier this close to its critical value, by SciPy at a point of contin, confirms that point: the integration's error times
+#: the size of the multipliers is below it for periods up to 30.
+CRITICAL = 1e-4
 
 
 def verdict(row: Row) -> str:
@@ -144,12 +166,14 @@ def verdict(row: Row) -> str:
     if row.auto is None:
         if not row.asked:
             return "not asked for in AUTO's run"
-        if row.third is not None:
+        if row.is_known:
             return "contin: known"
-        return "contin only" if row.fine is None else "contin: so AUTO, finer"
+        if row.fine is not None:
+            return "contin: so AUTO, finer"
+        return "contin only" if row.check is None or row.check > CRITICAL else "contin: multipliers by SciPy"
     if gap(row.auto, row.contin) <= EQUAL:
         return "equal"
-    if row.third is not None:
+    if row.is_known:
         ours, theirs = gap(row.contin, row.third), gap(row.auto, row.third)
         return "equal" if ours == theirs else "contin: known" if ours < theirs else "AUTO: known"
     if row.fine is not None and gap(row.auto, row.fine) > 0:

@@ -39,7 +39,7 @@ def ab_rest(p2: float):
 
 def ab_cycles():
     """Cycles from all Hopf points, to p1 = .25 or the period 1000."""
-    rests = [ab_rest(p2) for p2 in (15.0, 16.0, 17.0)]
+    rests = [ab_rest(p2) for p2 in (14.0, 15.0, 16.0, 17.0, 18.0)]
     limits = {"p1": (0, 0.25), "period": (0, 1000)}
     return [leave(rest, number, limits) for rest in rests for number in range(len(rest.labelled("HB")))]
 
@@ -274,13 +274,13 @@ def tor_rest():
 
 @functools.cache
 def tor_cycles():
-    """Symmetric cycles, to the period 30."""
-    return contin.trace(tor_rest()[0].labelled("HB")[0], branch=1, limits={"rn": (-0.91, -0.4), "period": (0, 30)})
+    """Symmetric cycles, as far as AUTO's run."""
+    return contin.trace(tor_rest()[0].labelled("HB")[0], branch=1, limits={"rn": (-0.91, -0.4), "period": (0, 42.664943)})
 
 
 def tor_beside():
     """Cycles where the symmetry is broken."""
-    return [contin.trace(tor_cycles().labelled("BP")[0], branch=1, limits={"rn": (-0.91, -0.4), "period": (0, 30)})]
+    return [contin.trace(tor_cycles().labelled("BP")[0], branch=1, limits={"rn": (-0.91, -0.4), "period": (0, 43.600853)})]
 
 
 MEMBRANE = {"k": single(3.4), "i": single(0.023), "b": single(0.2)}
@@ -369,10 +369,11 @@ def demos() -> list[Demo]:
     """Return the demos."""
     return [
         Demo("ab", "a reaction A → B in a stirred tank", [
-            Part([1], lambda: [ab_rest(14.0)], columns("p1", period=False)),
+            Part([1], lambda: [ab_rest(8.0)], columns("p1", period=False)),
             *(Part([n], functools.partial(lambda p2: [ab_rest(p2)], p2), columns("p1", period=False))
               for n, p2 in ((2, 14.0), (3, 15.0), (4, 16.0), (5, 17.0), (6, 18.0))),
-        ]),
+            Part(range(7, 14), ab_cycles, columns("p1")),
+        ], note="At p2 = 16 both folds lie at the same place: there x (1 - x) = 1/4, which is the hysteresis point; p1 = exp(-2)."),
         Demo("abc", "reactions A → B → C in a stirred tank", [
             Part([0], lambda: [abc_rest()], columns("d", period=False)),
             Part([1, 2, 3, 4], abc_cycles, columns("d")),
@@ -419,5 +420,14 @@ def demos() -> list[Demo]:
             Part([1], lambda: [ops_cycles()], columns("p3", "PAR(3)")),
             Part([4], ops_extrema, {"PAR(3)": "p3", "PAR(2)": "p2", "PERIOD": "period"}, also={"EX": "UZ"}),
         ]),
-        Demo("chu", "Chua's circuit", [Part([1], chu_cycles, columns("alpha"))]),
+        Demo("chu", "Chua's circuit", [Part([1], chu_cycles, columns("alpha"))],
+             note="Cycles only: the demo's first run follows the line of equilibria α = 0, too."),
+        *(
+            Demo(name, "a vertical family of cycles", [
+                Part([0], functools.partial(lambda field: [vertical_rest(field)], field), {"PAR(1)": "lam"},
+                     known=[("HB", {"PAR(1)": 0.0})]),
+            ], note="The family at λ = 0 has no labelled point but its ends; contin follows it with "
+                    "`trace(hopf, branch=1, primary=\"period\")`.")
+            for name, field in (("phs", vertical), ("vhb", upright))
+        ),
     ]  # fmt: skip

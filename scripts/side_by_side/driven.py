@@ -163,7 +163,7 @@ def abcb_folds():
     fold = abcb_cycles()[0].labelled("LP")[0]
     limits = {"alpha": (0.97, 1.3), "d": (0.19, 0.25)}
     return [
-        contin.curve(fold, free=["alpha", "d"], direction=way, limits=limits, max_points=60) for way in (1, -1)
+        contin.curve(fold, free=["alpha", "d"], primary="alpha", direction=way, limits=limits, max_points=60) for way in (1, -1)
     ]  # fmt: skip
 
 
@@ -229,7 +229,7 @@ def demos() -> list[Demo]:
                 Part([0], functools.partial(lambda n: [brusselator_rest(n)], name), line),
                 Part([1], functools.partial(lambda n: [brusselator_cycles(n)], name), line | {"PERIOD": "period"}),
                 Part([2], functools.partial(brusselator_beside, name), line | {"PERIOD": "period"}),
-            ])
+            ], slow=True)
             for name, words in (("brf", "differences"), ("brc", "collocation"))
         ),
         Demo("tfc", "branch points of cycles in a food chain", [

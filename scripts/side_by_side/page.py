@@ -40,18 +40,6 @@ def seconds_of(demo: Demo, auto: dict | None) -> float:
     return sum(run["seconds"] for run in auto["runs"][: last + 1])
 
 
-def shown(row: Row) -> int:
-    """Return which column of a row is shown: the first; of a point with a given value the first that was not given."""
-    values = row.contin or row.fine or row.auto
-    found = [which for which, each in enumerate(values) if not math.isnan(each) and not is_given(each)]
-    return found[0] if row.label == "UZ" and found else 0
-
-
-def is_given(value: float) -> bool:
-    """Return whether a value has few digits, as those have that a run is told to stop at."""
-    return abs(value - float(f"{value:.4g}")) < 1e-7 * max(1.0, abs(value))
-
-
 def number(values: Sequence[float] | None, which: int, digits: int = 10) -> str:
     """Return a number as text, a dash for none."""
     if values is None or math.isnan(values[which]):
@@ -66,7 +54,7 @@ def table(demo: Demo, parts: Sequence[Sequence[Row]]) -> list[str]:
     for part, found in zip(demo.parts, parts):
         names = list(part.columns)
         for row in found:
-            which = shown(row)
+            which = row.shown
             error = "" if row.error is None or which else f"{row.error:.0e}"
             cells = [
                 row.label, names[which], number(row.auto, which), number(row.fine, which), number(row.contin, which, 12), error,

@@ -10,6 +10,10 @@ from contin import Branch, Point
 #: Labels that are compared. EP and MX are ends of runs, RG are points that AUTO prints at regular distances.
 LABELS = "LP", "BP", "HB", "PD", "TR", "CP", "BT", "ZH", "GH", "R1", "R2", "R3", "R4", "LPD", "UZ"
 
+#: Distance of paired points, relative to max(1, |value|). AUTO's points at its own tolerances lie within 1e-3 of finer ones in all
+#: but one demo; a hundred times less leaves them unpaired, ten times more joins neighbours of ``tor``.
+NEAR = 2e-3
+
 Column = str | Callable[[Point], float]
 
 
@@ -32,6 +36,8 @@ class Part:
         Values by a third method: labels, and values by AUTO's columns.
     also : mapping
         contin's label to AUTO's, where one event has two names.
+    near : float
+        Points of one label that differ less, relative to max(1, |value|), in all columns are the same point.
     """
 
     runs: Sequence[int]
@@ -40,6 +46,7 @@ class Part:
     labels: Sequence[str] = LABELS
     known: Sequence[tuple[str, Mapping[str, float]]] = ()
     also: Mapping[str, str] = field(default_factory=dict)
+    near: float = NEAR
 
 
 @dataclass(frozen=True)
