@@ -69,8 +69,10 @@ def arguments(argv=None) -> argparse.Namespace:
     parser.add_argument("--auto-demos", metavar="DIR", help="the folder demos of AUTO-07p's distribution: run AUTO, too")
     parser.add_argument("--only-auto", action="store_true", help="run AUTO, and nothing else")
     parser.add_argument("--page", metavar="FILE", help="put the tables into this Markdown file")
-    parser.add_argument("--repeats", type=int, default=3, metavar="N", help="runs of which the median time is taken (default: 3)")
-    parser.add_argument("--kept", metavar="FILE", default="demos.json", help="contin's results are kept here (default: demos.json)")
+    parser.add_argument("--repeats", type=int, default=3, metavar="N", help="runs for the median time (default: 3)")
+    parser.add_argument(
+        "--kept", metavar="FILE", default="demos.json", help="contin's results are kept here (default: demos.json)"
+    )
     parser.add_argument("--alone", metavar="NAME", help=argparse.SUPPRESS)
     options = parser.parse_args(argv)
     if options.auto_demos and not (Path(options.auto_demos) / "ab").is_dir():
@@ -104,7 +106,7 @@ def main(argv=None) -> int:
             RECORDED.write_text(json.dumps(recorded, indent=1, sort_keys=True) + "\n")
         if options.only_auto:
             continue
-        kept[demo.name] = contin_of(demo.name, 1 if demo.slow else options.repeats)
+        kept[demo.name] = contin_of(demo.name, 0 if demo.slow else options.repeats)
         kept_file.write_text(json.dumps(kept) + "\n")
         print(page.line(demo, recorded.get(demo.name), kept[demo.name]), flush=True)
     if options.page:

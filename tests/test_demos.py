@@ -14,11 +14,13 @@ from side_by_side import auto_07p, compare, page  # noqa: E402
 from side_by_side.all_demos import DEMOS  # noqa: E402
 
 #: The folders of AUTO-07p's ``demos`` (commit 44cc1c42 of its repository, June 2025).
-FOLDERS = (
-    "ab abc abcb apbp brc brf bru bvp c2c chu cir cusp dd2 enz exp ext ezp ffn fhh fhn fnb fnc frc fsh hen int ivp kar kdv kpr lcbp "
-    "lin log lor lrz man mtn nag nep non obv ops opt p2c pcl pd1 pd2 pen ph1 phs pla plp pp2 pp3 ppp pvl python r3b rev san she sib "
-    "snh spb sspg stw tfc tim tor um2 um3 vhb wav"
-).split()
+FOLDERS = [
+    "ab", "abc", "abcb", "apbp", "brc", "brf", "bru", "bvp", "c2c", "chu", "cir", "cusp", "dd2", "enz", "exp", "ext",
+    "ezp", "ffn", "fhh", "fhn", "fnb", "fnc", "frc", "fsh", "hen", "int", "ivp", "kar", "kdv", "kpr", "lcbp", "lin",
+    "log", "lor", "lrz", "man", "mtn", "nag", "nep", "non", "obv", "ops", "opt", "p2c", "pcl", "pd1", "pd2", "pen",
+    "ph1", "phs", "pla", "plp", "pp2", "pp3", "ppp", "pvl", "python", "r3b", "rev", "san", "she", "sib", "snh", "spb",
+    "sspg", "stw", "tfc", "tim", "tor", "um2", "um3", "vhb", "wav",
+]  # fmt: skip
 
 
 def test_every_demo_has_its_line():

@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
+from contin import Branch, Point
 from side_by_side.multipliers import distance
 from side_by_side.record import Column, Part
-
-from contin import Branch, Point
 
 #: Values that differ less, relative to max(1, |value|), are equal: below it AUTO's files have no digits (eleven are written).
 EQUAL = 1e-9
@@ -134,7 +133,7 @@ def rows(runs: Sequence[dict], fine: Sequence[dict], ours: Sequence[dict], part:
         inside = [run for number in part.runs if number < len(runs) for run in [runs[number]] if covers(run, point, part)]
         if point["end"] or point["label"] not in part.labels or point["label"] == "UZ" or not inside:
             continue
-        other, third = nearest(finer, point["label"], point["values"], part.near), nearest(known, point["label"], point["values"], part.near)
+        other, third = (nearest(ones, point["label"], point["values"], part.near) for ones in (finer, known))
         found.append(Row(
             point["label"], None, other and other["values"], point["values"], point["error"], third and third["values"],
             any(was_asked(run, point["label"]) for run in inside), point.get("check"),
@@ -152,8 +151,8 @@ def covers(run: dict, point: dict, part: Part) -> bool:
     return True
 
 
-#: A multiplier this close to its critical value, by SciPy at a point of contin, confirms that point: the integration's error times
-#: the size of the multipliers is below it for periods up to 30.
+#: A multiplier this close to its critical value, by SciPy at a point of contin, confirms that point. On the cycles of ``tor``
+#: the distances were 1e-11 at the period 8, 2e-6 at 29 and 5e-5 at 39; ten times less leaves the last open.
 CRITICAL = 1e-4
 
 

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from side_by_side.record import Demo, Part
 
 import contin
 from contin import AlgebraicProblem, ConnectionProblem
+from side_by_side.record import Demo, Part
 
 # --- fronts -----------------------------------------------------------------------------------------------------------
 
@@ -122,9 +122,13 @@ def pulse(u, p):
     return u.v, p.c * u.v + u.u * (u.u - p.a) * (u.u - 1) + u.w, p.eps * u.u / p.c
 
 
+#: Time of the first pulse, which is then made longer: at its end it is exp(-0.075 * 100) of its size away from rest.
+FHH_TIME = 130.0
+
+
 @functools.cache
 def fhh_orbit():
-    """A pulse at c = 0.21, from an orbit that leaves the origin."""
+    """A pulse at c = 0.21, from an orbit that leaves the origin; after 29 it decays along the slow direction."""
     c, a, eps = 0.21, 0.17928634, 0.0025
 
     def field(t, u):
@@ -133,12 +137,16 @@ def fhh_orbit():
     values, vectors = np.linalg.eig(np.array([[0, 1, 0], [a, c, 1], [eps / c, 0, 0]]))
     leaving = vectors[:, values.real.argmax()].real
     start = 1e-3 * leaving / leaving[0]
-    found = solve_ivp(field, (0, 60), start, rtol=1e-10, atol=1e-12, dense_output=True)
-    size = np.abs(found.y[0])
-    last = found.t[size.argmax() + size[size.argmax() :].argmin()]
+    away, slow = 29.0, sorted(values.real)[1]
+    found = solve_ivp(field, (0, away), start, rtol=1e-10, atol=1e-12, dense_output=True)
+
+    def guess(t):
+        s = FHH_TIME * t
+        return tuple(found.sol(min(s, away)) * math.exp(slow * max(0.0, s - away)))
+
     problem = ConnectionProblem(pulse, ["u", "v", "w"], {"c": c, "a": a, "eps": eps}, unstable=1)
-    orbit = contin.solve(problem, lambda t: tuple(found.sol(last * t)), {"time": last}, free=["a"], intervals=60)
-    return contin.trace(orbit, free=["a", "time"], primary="time", limits={"time": (0, 300)}).points[-1]
+    orbit = contin.solve(problem, guess, {"time": FHH_TIME}, free=["a"], intervals=60)
+    return contin.trace(orbit, free=["a", "time"], primary="time", limits={"time": (0, 250)}).points[-1]
 
 
 def fhh_curve():

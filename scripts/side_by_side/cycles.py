@@ -5,10 +5,9 @@ from __future__ import annotations
 import functools
 import math
 
+import contin
 from side_by_side.columns import equilibria, norm, single, with_branches
 from side_by_side.record import Demo, Part
-
-import contin
 
 
 def columns(parameter: str, name: str = "PAR(1)", period: bool = True) -> dict:
@@ -207,7 +206,8 @@ def plp_folds():
 def plp_isola():
     """The closed branch at s0 = 111."""
     problem = contin.CycleProblem(plant, ["x", "y"], {"rho": 4.0, "s0": 111.0, **PLANT})
-    return [contin.trace(contin.cycle(problem, [5.0, 50.0], settle=300), free=["rho"], limits={"rho": (1, 8)}, zeros={"rho": [4.0]})]
+    orbit = contin.cycle(problem, [5.0, 50.0], settle=300)
+    return [contin.trace(orbit, free=["rho"], limits={"rho": (1, 8)}, zeros={"rho": [4.0]})]
 
 
 def fitzhugh(u, p):
@@ -357,7 +357,8 @@ def chua(u, p):
 @functools.cache
 def chu_rest():
     """Equilibria beside the origin."""
-    return equilibria(chua, ["x", "y", "z"], {"alpha": 5.0, "beta": single(14.3), "a0": single(-1 / 7), "a1": single(2 / 7)}, [1.4994022, 0.0, -1.4994022], "alpha", {"alpha": (4, 9.5)})
+    values = {"alpha": 5.0, "beta": single(14.3), "a0": single(-1 / 7), "a1": single(2 / 7)}
+    return equilibria(chua, ["x", "y", "z"], values, [1.4994022, 0.0, -1.4994022], "alpha", {"alpha": (4, 9.5)})
 
 
 def chu_cycles():
@@ -373,7 +374,8 @@ def demos() -> list[Demo]:
             *(Part([n], functools.partial(lambda p2: [ab_rest(p2)], p2), columns("p1", period=False))
               for n, p2 in ((2, 14.0), (3, 15.0), (4, 16.0), (5, 17.0), (6, 18.0))),
             Part(range(7, 14), ab_cycles, columns("p1")),
-        ], note="At p2 = 16 both folds lie at the same place: there x (1 - x) = 1/4, which is the hysteresis point; p1 = exp(-2)."),
+        ], note="At p2 = 16 both folds lie at the same place: there x (1 - x) = 1/4, which is the hysteresis point; "
+             "p1 = exp(-2)."),
         Demo("abc", "reactions A → B → C in a stirred tank", [
             Part([0], lambda: [abc_rest()], columns("d", period=False)),
             Part([1, 2, 3, 4], abc_cycles, columns("d")),

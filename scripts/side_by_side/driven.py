@@ -6,11 +6,11 @@ import functools
 import math
 
 import numpy as np
+
+import contin
 from side_by_side.columns import equilibria, norm, single
 from side_by_side.cycles import abc_rest, columns
 from side_by_side.record import Demo, Part
-
-import contin
 
 
 def rms(name: str):
@@ -217,8 +217,8 @@ def demos() -> list[Demo]:
     return [
         Demo("frc", "a periodically forced system", [
             Part([0], frc, {"PAR(3)": "r", "L2-NORM U(1)": rms("square")}),
-        ], note="The second run asks for periods of 1 and more, which it does not reach in its 20 steps. AUTO adds an oscillator of two "
-                "states; contin's field depends on t."),
+        ], note="The second run asks for periods of 1 and more, which it does not reach in its 20 steps. AUTO adds an "
+                "oscillator of two states; contin's field depends on t."),
         Demo("ffn", "FitzHugh's equations with a forcing", [
             Part([0], lambda: [ffn_first()], {"amp": "amp", "L2-NORM x": rms("square")}),
             Part([1], ffn_in_a, {"a": "a", "L2-NORM x": rms("square")}),
@@ -236,14 +236,15 @@ def demos() -> list[Demo]:
             Part([0], lambda: [tfc_rest()], {"PAR(3)": "d1", "U(1)": "x", "U(2)": "y"}),
             Part([1], lambda: [tfc_cycles()], {"PAR(3)": "d1", "PERIOD": "period"}),
             Part([2], tfc_in_d2, {"PAR(6)": "d2", "PERIOD": "period"}),
-        ], note="Not compared: curves of branch points of cycles, and cycles of given period in two parameters, which contin does "
-                "not have."),
+        ], note="Not compared: curves of branch points of cycles, and cycles of given period in two parameters, which "
+                "contin does not have."),
         Demo("abcb", "branch points of cycles in a reactor", [
             Part([0], lambda: [abc_rest()], columns("d", period=False)),
             Part([1], abcb_cycles, {"PAR(1)": "d", "PERIOD": "period"}),
             Part([3, 4], abcb_folds, {"PAR(2)": "alpha", "PAR(1)": "d", "PERIOD": "period"}),
-        ], note="AUTO passes the Hopf point at d = 0.3462, which it calls a fold, and comes back; contin's cycles end there. The curve "
-                "of branch points in three parameters labels regular points only."),
+        ], note="AUTO passes the Hopf point at d = 0.3462, which it calls a fold, and comes back; contin's cycles end there. "
+                "The turn of the curve of folds at alpha = 1.2687 is a cusp. The curve of branch points in three parameters "
+                "labels regular points only."),
         Demo("lcbp", "a curve of branch points of cycles", [
             Part([0], lcbp, {"PAR(1)": "p1", "PERIOD": "period"}, known=[("BP", {"PAR(1)": 2.0, "PERIOD": 1.0})]),
         ], note="The curves of branch points label regular points, and one in which the circles shrink to nothing."),

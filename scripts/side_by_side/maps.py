@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import functools
 
+import contin
 from side_by_side.columns import fixed_points, single, with_branches
 from side_by_side.record import Demo, Part
-
-import contin
 
 
 def logistic(u, p):
@@ -89,8 +88,8 @@ def demos() -> list[Demo]:
         Demo("dd2", "a discrete system of predators and prey", [
             Part([0], dd2_single, {"p1": "p1", "u1": "x", "u2": "y"}),
             *(Part([n + 1], functools.partial(lambda n: [dd2_doubled(n)], n), {"p1": "p1"}, labels=("PD",)) for n in (1, 2)),
-        ], note="The curve of period doublings (AUTO's second run) has no labelled point but its end; contin has no such curves "
-                "of maps."),
+        ], note="The curve of period doublings (AUTO's second run) has no labelled point but its end; contin has no such "
+                "curves of maps."),
         Demo("hen", "Hénon's map", [
             Part([0], lambda: [hen_beta()], {"beta": "beta", "x": "x"},
                  known=[("PD", {"beta": 2 * (2 / 3) ** 0.5 - 1}), ("TR", {"beta": 1.0, "x": 3**0.5 - 1})]),

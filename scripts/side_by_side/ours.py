@@ -30,12 +30,17 @@ def points(demo: Demo) -> list[list[dict]]:
 
 
 def run(name: str, repeats: int) -> dict:
-    """Return the points of a demo, and processor seconds: of this process up to the end of its first run, and of a further run."""
+    """Return the points of a demo, and processor seconds.
+
+    ``first`` are those of this process up to the end of its first run, ``again`` those of a further run: the median of so many
+    ``repeats``, or of the first run itself for 0.
+    """
     (demo,) = [demo for demo in DEMOS if demo.name == name]
     forget()
+    loaded = time.process_time()
     found = points(demo)
     first = time.process_time()
-    further = []
+    further = [] if repeats else [first - loaded]
     for _ in range(repeats):
         forget()
         began = time.process_time()

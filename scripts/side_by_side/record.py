@@ -10,8 +10,8 @@ from contin import Branch, Point
 #: Labels that are compared. EP and MX are ends of runs, RG are points that AUTO prints at regular distances.
 LABELS = "LP", "BP", "HB", "PD", "TR", "CP", "BT", "ZH", "GH", "R1", "R2", "R3", "R4", "LPD", "UZ"
 
-#: Distance of paired points, relative to max(1, |value|). AUTO's points at its own tolerances lie within 1e-3 of finer ones in all
-#: but one demo; a hundred times less leaves them unpaired, ten times more joins neighbours of ``tor``.
+#: Distance of paired points, relative to max(1, |value|). AUTO's points at its own tolerances lie within 1e-3 of finer ones
+#: in all but one demo; a hundred times less leaves them unpaired, ten times more joins neighbours of ``tor``.
 NEAR = 2e-3
 
 Column = str | Callable[[Point], float]

@@ -10,11 +10,10 @@ from collections.abc import Callable, Sequence
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from side_by_side.columns import equilibria, mean, norm, single
-from side_by_side.record import Demo, Part
-
 import contin
 from contin import BoundaryValueProblem
+from side_by_side.columns import equilibria, mean, norm, single
+from side_by_side.record import Demo, Part
 
 
 def bank(name: str):
@@ -95,7 +94,10 @@ def nep():
     )  # fmt: skip
     limits = {"end": (-1, 10)}
     first = contin.trace(
-        contin.solve(problem, [0, 0, 0], free=["load"]), free=["end", "load"], limits=limits, zeros={"end": [2.0, 4.0, 6.0, 8.0]}
+        contin.solve(problem, [0, 0, 0], free=["load"]),
+        free=["end", "load"],
+        limits=limits,
+        zeros={"end": [2.0, 4.0, 6.0, 8.0]},
     )
     bent = contin.trace(first.labelled("BP")[0], branch=1, limits=limits, zeros={"end": [6.0, 8.0]})
     return [first, bent]
@@ -138,6 +140,20 @@ def obv_second():
 def obv_third():
     """Extrema in three."""
     return [contin.curve(obv_second().labelled("EX")[-1], "l3", limits={"l3": (-1, 3), "objective": (0, 10)})]
+
+
+@functools.cache
+def opt(count: int):
+    """Extrema of the sum of the coordinates of a point on the unit sphere, as ``count`` of them become free."""
+    if count > 2:
+        start = opt(count - 1).labelled("EX")[0]
+        return contin.curve(start, f"x{count}", limits={f"x{count}": (-0.9, 0.9)})
+    problem = contin.AlgebraicProblem(
+        lambda u, p: (u.x1**2 + p.x2**2 + p.x3**2 + p.x4**2 + p.x5**2 - 1,), ["x1"],
+        {"x2": 0.0, "x3": 0.0, "x4": 0.0, "x5": 0.0},
+        {"sum": lambda u, p: u.x1 + p.x2 + p.x3 + p.x4 + p.x5},
+    )  # fmt: skip
+    return contin.trace(contin.solve(problem, [1.0]), free=["x2"], limits={"x2": (-0.1, 0.95)}, extrema=["sum"])
 
 
 def sspg():
@@ -215,7 +231,7 @@ def demos() -> list[Demo]:
         Demo("bvp", "a nonlinear eigenvalue problem", [part("bvp", range(11), {"PAR(1)": "lam", "PAR(2)": "mean"})]),
         Demo("lin", "a linear eigenvalue problem", [part("lin", [0, 1], {"PAR(1)": "lam", "PAR(3)": "p3"})],
              note="AUTO's run ends at λ = 5 (UZ), which is a branch point."),
-        Demo("non", "a problem that depends on t", [part("non", [0], {"PAR(1)": "p1", "MAX U(1)": lambda point: math.nan}, non)],
+        Demo("non", "a problem that depends on t", [part("non", [0], {"PAR(1)": "p1"}, non)],
              note="AUTO's norm contains the time, which is a state there, and is not compared."),
         Demo("ezp", "Bratu's problem for complex states", [part("ezp", [0, 1, 2], {"PAR(1)": "lam", "L2-NORM": norm})]),
         Demo("ext", "spurious solutions on a coarse mesh", [part("ext", [0], {"PAR(1)": "lam"}, ext, near=0.02)],
@@ -240,13 +256,17 @@ def demos() -> list[Demo]:
         ]),
         Demo("pvl", "columns that are computed from a solution", [part("exp", [0], {
             "PAR(1)": "lam", "L2-NORM": norm, "PAR(4)": "slope"}, pvl)],
-             note="The slope at an end is a further parameter with a condition here; the root of a mean of squares is given as its "
-                  "square."),
+             note="The slope at an end is a further parameter with a condition here; the root of a mean of squares is given as "
+                  "its square."),
         Demo("obv", "optimization of a boundary value problem", [
             Part([0], lambda: [obv_first()], {"PAR(10)": "objective", "PAR(1)": "l1"}, labels=("BP",), also={"EX": "BP"}),
             Part([2], lambda: [obv_second()], {"PAR(10)": "objective", "PAR(1)": "l1", "PAR(2)": "l2"}, also={"EX": "UZ"}),
             Part([3], obv_third, {"PAR(10)": "objective", "PAR(1)": "l1", "PAR(2)": "l2", "PAR(3)": "l3"}, also={"EX": "UZ"}),
         ], note="AUTO states the equations of the extremum itself; contin labels extrema (EX) and follows them."),
+        Demo("opt", "a constrained maximum", [
+            Part([count - 2], functools.partial(lambda n: [opt(n)], count), {"FOPT": "sum"}, also={"EX": "LP", "LP": ""},
+                 known=[("LP", {"FOPT": count**0.5})]) for count in (2, 3, 4, 5)
+        ], note="AUTO's LP is an extremum of the sum (EX in contin)."),
         Demo("sspg", "a curve of branch points of a boundary value problem", [
             Part([0], sspg, {"PAR(1)": "m"}, known=[("BP", {"PAR(1)": critical})]),
         ], note="The curves of branch points label regular points only."),
