@@ -44,7 +44,7 @@ def auto_of(folder: Path, demo, repeats: int) -> dict:
     """Run AUTO's side of a demo: its own runs, repeated for their times, and a finer one."""
     from side_by_side import auto_07p
 
-    found = [auto_07p.run(folder, demo.name, demo.file) for _ in range(1 if demo.slow else repeats)]
+    found = [auto_07p.run(folder, demo.name, demo.file) for _ in range(1 if demo.slow else max(1, repeats))]
     runs = found[0]
     fine = auto_07p.run_finer(folder, demo.name, demo.file, runs)
     for number, each in enumerate(runs):
@@ -77,8 +77,8 @@ def arguments(argv=None) -> argparse.Namespace:
     options = parser.parse_args(argv)
     if options.auto_demos and not (Path(options.auto_demos) / "ab").is_dir():
         parser.error(f"--auto-demos {options.auto_demos!r}: must be a folder that holds AUTO's demos, ab among them")
-    if options.repeats < 1:
-        parser.error(f"--repeats {options.repeats}: must be at least 1")
+    if options.repeats < 0:
+        parser.error(f"--repeats {options.repeats}: must be 0 (time the first run) or more")
     return options
 
 

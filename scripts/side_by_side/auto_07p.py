@@ -26,6 +26,11 @@ WIDTH = 19
 CLOCK = 0.1
 #: Most processor seconds of one run of a demo.
 LONGEST = 60
+#: AUTO's front end without pictures: where it finds matplotlib, but no screen, a script that draws stops there.
+FRONT_END = (
+    "import runpy, sys; sys.modules['matplotlib'] = None; sys.argv = ['auto', {script!r}]; "
+    "runpy.run_module('auto', run_name='__main__')"
+)
 LABELS = {
     0: "", 1: "BP", 2: "LP", 3: "HB", 4: "RG", 5: "LP", 6: "BP", 7: "PD", 8: "TR", 9: "EP",
     -1: "BT", -2: "CP", -3: "ZH", -4: "UZ", -5: "R1", -6: "R2", -7: "R3", -8: "R4", -9: "MX", -32: "GH",
@@ -68,9 +73,9 @@ def run(demos: Path, name: str, script: str, level: int = -1, timeout: float = 6
         words = [sys.executable, str(Path(__file__).resolve()), str(log), str(level), "--"]
         environment = os.environ | {
             "AUTO_DIR": str(AUTO), "AUTO_COMMAND_PREFIX": " ".join(words), "PYTHONPATH": str(AUTO / "python"),
-            "OMP_NUM_THREADS": "1", "MPLBACKEND": "agg",
+            "OMP_NUM_THREADS": "1",
         }  # fmt: skip
-        command = [sys.executable, "-m", "auto", script]
+        command = [sys.executable, "-c", FRONT_END.format(script=script)]
         done = subprocess.run(
             command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=timeout
         )

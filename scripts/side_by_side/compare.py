@@ -12,6 +12,8 @@ from side_by_side.record import Column, Part
 
 #: Values that differ less, relative to max(1, |value|), are equal: below it AUTO's files have no digits (eleven are written).
 EQUAL = 1e-9
+#: Points of two branches of contin that differ less, relative to max(1, |value|), are one: both are good to about 1e-10.
+SAME = 1e-7
 #: A finer run of AUTO decides if it lies this many times closer to one of the values than to the other.
 CLEARLY = 4.0
 
@@ -31,10 +33,14 @@ class Row:
 
     @property
     def shown(self) -> int:
-        """Which column is shown: the first; of a point with a given value the first that was not given."""
+        """Which column is shown: that in which AUTO and contin differ most; a given value is not shown."""
         values = self.contin or self.fine or self.auto
-        found = [which for which, each in enumerate(values) if not math.isnan(each) and not is_given(each)]
-        return found[0] if self.label == "UZ" and found else 0
+        found = [which for which, each in enumerate(values) if not math.isnan(each)]
+        if self.label == "UZ":
+            found = [which for which in found if not is_given(values[which])] or found
+        if self.auto is None or self.contin is None:
+            return found[0]
+        return max(found, key=lambda which: gap(self.auto[which : which + 1], self.contin[which : which + 1]))
 
     @property
     def is_known(self) -> bool:
@@ -130,6 +136,8 @@ def rows(runs: Sequence[dict], fine: Sequence[dict], ours: Sequence[dict], part:
             pair and pair["error"], third and third["values"], True, pair and pair.get("check"),
         ))  # fmt: skip
     for point in left:
+        if any(row.contin and row.label == point["label"] and gap(row.contin, point["values"]) < SAME for row in found):
+            continue  # two of contin's branches meet it
         inside = [run for number in part.runs if number < len(runs) for run in [runs[number]] if covers(run, point, part)]
         if point["end"] or point["label"] not in part.labels or point["label"] == "UZ" or not inside:
             continue

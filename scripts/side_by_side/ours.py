@@ -14,6 +14,10 @@ from side_by_side.record import Demo
 KEEPERS = "bank", "side_by_side", "cycles"
 
 
+#: Seconds after which a demo is not repeated. The longest demo takes two minutes; ten times more makes the page take an hour.
+PATIENCE = 3.0
+
+
 def forget() -> None:
     """Drop all results that are kept, so that a second run computes everything again, recordings included."""
     for name, module in list(sys.modules.items()):
@@ -32,16 +36,16 @@ def points(demo: Demo) -> list[list[dict]]:
 def run(name: str, repeats: int) -> dict:
     """Return the points of a demo, and processor seconds.
 
-    ``first`` are those of this process up to the end of its first run, ``again`` those of a further run: the median of so many
-    ``repeats``, or of the first run itself for 0.
+    ``first`` are those of this process up to the end of its first run, ``again`` those of a further run: the median of at most
+    ``repeats``, and of the first run itself where it takes long, or for 0.
     """
     (demo,) = [demo for demo in DEMOS if demo.name == name]
     forget()
     loaded = time.process_time()
     found = points(demo)
     first = time.process_time()
-    further = [] if repeats else [first - loaded]
-    for _ in range(repeats):
+    further = [] if repeats and first < PATIENCE else [first - loaded]
+    while len(further) < repeats and sum(further) < PATIENCE:
         forget()
         began = time.process_time()
         points(demo)
