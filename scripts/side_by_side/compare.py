@@ -33,11 +33,12 @@ class Row:
 
     @property
     def shown(self) -> int:
-        """Which column is shown: that in which AUTO and contin differ most; a given value is not shown."""
+        """Which column is shown: of those that are not given, and that a third method has, the one of largest difference."""
         values = self.contin or self.fine or self.auto
         found = [which for which, each in enumerate(values) if not math.isnan(each)]
         if self.label == "UZ":
             found = [which for which in found if not is_given(values[which])] or found
+        found = [which for which in found if self.third and not math.isnan(self.third[which])] or found
         if self.auto is None or self.contin is None:
             return found[0]
         return max(found, key=lambda which: gap(self.auto[which : which + 1], self.contin[which : which + 1]))

@@ -61,8 +61,8 @@ def ffn_in_a():
 
 
 def ffn_in_amp():
-    """Or the forcing grows to its torus bifurcation."""
-    return [contin.trace(ffn_first().points[-1], free=["amp"], limits={"amp": (0, 4.6)})]
+    """Or the forcing grows to 10."""
+    return [contin.trace(ffn_first().points[-1], free=["amp"], limits={"amp": (0, 10)})]
 
 
 # --- reactions on a line ----------------------------------------------------------------------------------------------

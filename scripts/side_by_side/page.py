@@ -58,7 +58,7 @@ def table(demo: Demo, parts: Sequence[Sequence[Row]]) -> list[str]:
             error = "" if row.error is None or which else f"{row.error:.0e}"
             cells = [
                 row.label, names[which], number(row.auto, which), number(row.fine, which), number(row.contin, which, 12), error,
-                "" if row.third is None else number(row.third, which, 12), verdict(row),
+                number(row.third, which, 12) if row.is_known else "", verdict(row),
             ]  # fmt: skip
             lines.append("| " + " | ".join(cells) + " |")
     return lines

@@ -237,7 +237,9 @@ def demos() -> list[Demo]:
         Demo("ext", "spurious solutions on a coarse mesh", [part("ext", [0], {"PAR(1)": "lam"}, ext, near=0.02)],
              note="AUTO's mesh is coarse on purpose, to show spurious solutions; contin's is adapted, and has none."),
         Demo("kar", "von Kármán's flow above a rotating disk", [
-            part("kar", [0], {"PAR(1)": "gam", "PAR(2)": lambda point: -point["inf"]}),
+            Part([0], functools.partial(all_cases, "kar"), {"PAR(1)": "gam", "PAR(2)": lambda point: -point["inf"]},
+                 known=[(label, {"PAR(1)": values["gam"], "PAR(2)": -values["inf"]}) for label, values in
+                        known("kar", {"gam": "gam", "inf": "inf"})]),
         ], note="The demo asks for a tolerance of 1e-3 in given values: its γ = 0 is found at γ = -0.0084."),
         Demo("cusp", "the cusp", [part("cusp", [0, 1, 2, 3], {"mu": "mu", "lambda": "lam", "x": "X"}, labels=("LP", "CP"))]),
         Demo("enz", "two cells with an enzyme", [part("enz", [0], {"s0": "s0", "s1": "S1"})],
