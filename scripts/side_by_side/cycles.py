@@ -340,7 +340,7 @@ def ops_extrema():
     """Extrema of p3 in p2, to the one with respect to p2."""
     return [
         contin.curve(start, "p2", direction=way, limits={"p2": (0.5, 6)}, zeros={"p3": [0.92, 0.93]})
-        for start in ops_cycles().labelled("EX")[:1] for way in (1, -1)
+        for start in ops_cycles().labelled("EX")[:2] for way in (1, -1)
     ]  # fmt: skip
 
 
@@ -391,7 +391,7 @@ def demos() -> list[Demo]:
             Part([1], pp2_cycles, {"quota": "p1", "L2-NORM": norm, "PERIOD": "period"}),
         ]),
         Demo("pp3", "three species", [
-            Part([0], pp3_rest, {"PAR(1)": "p1", "U(1)": "x", "U(2)": "y", "U(3)": "z"}),
+            Part([0], pp3_rest, {"PAR(1)": "p1", "U(1)": "x", "U(2)": "y", "U(3)": "z"}, labels=("BP", "LP", "HB")),
             Part([1, 2, 3, 4], pp3_cycles, columns("p1")),
         ]),
         Demo("ppp", "three species", [Part([0], ppp_rest, {"PAR(1)": "p1", "U(1)": "x", "U(2)": "y", "U(3)": "z"})]),

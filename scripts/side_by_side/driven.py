@@ -228,7 +228,7 @@ def demos() -> list[Demo]:
         Demo("abcb", "branch points of cycles in a reactor", [
             Part([0], lambda: [abc_rest()], columns("d", period=False)),
             Part([1], abcb_cycles, {"PAR(1)": "d", "PERIOD": "period"}),
-            Part([3, 4], abcb_folds, {"PAR(2)": "alpha", "PAR(1)": "d", "PERIOD": "period"}),
+            Part([3, 4], abcb_folds, {"PAR(2)": "alpha", "PAR(1)": "d", "PERIOD": "period"}, also={"CP": "LP"}),
         ], note="AUTO passes the Hopf point at d = 0.3462, which it calls a fold, and comes back; contin's cycles end there. "
                 "The turn of the curve of folds at alpha = 1.2687 is a cusp. The curve of branch points in three parameters "
                 "labels regular points only."),

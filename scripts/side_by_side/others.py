@@ -43,15 +43,15 @@ OTHERS = (
     ),
     (
         "p2c", "a connection of a point and a cycle",
-        "The same.",
+        "contin's connections join equilibria, not cycles (as `c2c`).",
     ),
     (
         "pcl", "a connection of a point and a cycle by Lin's method",
-        "The same.",
+        "contin's connections join equilibria, not cycles (as `c2c`).",
     ),
     (
         "snh", "connections near a saddle-node Hopf bifurcation",
-        "The same; one of its states is an angle.",
+        "contin's connections join equilibria, not cycles (as `c2c`); one of the states is an angle.",
     ),
     (
         "pen", "rotations of coupled pendula",
@@ -72,7 +72,7 @@ OTHERS = (
     ),
     (
         "fnb", "pulses of several rounds",
-        "The same. Pulses of one round are compared under `fhh`.",
+        "Lin's method again (as `sib`). Pulses of one round are compared under `fhh`.",
     ),
     (
         "mtn", "homoclinic orbits to a saddle-node",
@@ -98,8 +98,8 @@ OTHERS = (
     ),
     (
         "r3b", "the restricted problem of three bodies",
-        "Not done: conservative families, which contin follows ([Cycles](cycles.md#families-of-conservative- "
-        "systems)), in 24 scripts.",
+        "Not done: conservative families, which contin follows "
+        "([Cycles](cycles.md#families-of-conservative-systems)), in 24 scripts.",
     ),
 )  # fmt: skip
 

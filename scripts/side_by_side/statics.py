@@ -234,7 +234,9 @@ def demos() -> list[Demo]:
         Demo("non", "a problem that depends on t", [part("non", [0], {"PAR(1)": "p1"}, non)],
              note="AUTO's norm contains the time, which is a state there, and is not compared."),
         Demo("ezp", "Bratu's problem for complex states", [part("ezp", [0, 1, 2], {"PAR(1)": "lam", "L2-NORM": norm})]),
-        Demo("ext", "spurious solutions on a coarse mesh", [part("ext", [0], {"PAR(1)": "lam"}, ext, near=0.02)],
+        Demo("ext", "spurious solutions on a coarse mesh", [
+            Part([0], ext, {"PAR(1)": "lam"}, known=[("BP", {"PAR(1)": float(k)}) for k in range(1, 7)], near=0.02),
+        ],
              note="AUTO's mesh is coarse on purpose, to show spurious solutions; contin's is adapted, and has none."),
         Demo("kar", "von Kármán's flow above a rotating disk", [
             Part([0], functools.partial(all_cases, "kar"), {"PAR(1)": "gam", "PAR(2)": lambda point: -point["inf"]},
