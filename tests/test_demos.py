@@ -79,7 +79,7 @@ def test_constants_and_branches_of_auto():
 
 def test_a_page_is_written_between_its_marks(tmp_path):
     file = tmp_path / "page.md"
-    file.write_text(f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n")
+    file.write_text(f"before\n{page.BEGIN}\nstale numbers\n{page.END}\nafter\n")
     page.write(file, DEMOS, {}, {})
     text = file.read_text()
-    assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text and "| ivp |" in text
+    assert text.startswith("before\n") and text.endswith("\nafter\n") and "stale numbers" not in text and "| ivp |" in text

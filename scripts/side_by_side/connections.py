@@ -158,6 +158,13 @@ def fhh_curve():
     ]  # fmt: skip
 
 
+#: What is behind the differences of fhh.
+FHH_NOTE = (
+    "AUTO's orbits last 1000, contin's 250, to save time: after the first fold they have two pulses, for which 250 is short. "
+    "AUTO goes on to c = 0.69; contin's run ends at c = 0.54, as its orbit needs a longer time there (its `stop` says so)."
+)
+
+
 def demos() -> list[Demo]:
     """Return the demos."""
 
@@ -179,7 +186,5 @@ def demos() -> list[Demo]:
         ]),
         Demo("fhh", "homoclinic orbits of FitzHugh and Nagumo's pulses", [
             Part([3, 4], fhh_curve, {"PAR(2)": "a", "PAR(1)": "c"}, also={"DRS": "UZ"}),
-        ], script="fhn.auto", note="AUTO's orbits last 1000, contin's 250, to save time: after the first fold they have two pulses, for "
-                                   "which 250 is short. AUTO goes on with c beyond 0.54, where contin's run ends: its orbit needs a "
-                                   "longer time there, as its `stop` says."),
+        ], script="fhn.auto", note=FHH_NOTE),
     ]  # fmt: skip

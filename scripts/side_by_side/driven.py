@@ -237,5 +237,6 @@ def demos() -> list[Demo]:
         ], note="The curves of branch points label regular points, and one in which the circles shrink to nothing."),
         Demo("pla", "bursting of a nerve cell", [
             Part([0], lambda: [pla_rest()], columns("gi", period=False)),
-        ], slow=True, note="The two runs of cycles, to the periods 10000 and 50000, are not compared."),
+        ], note="The two runs of cycles, to the periods 10000 and 50000, are not compared: AUTO's script was cut off after its "
+                "first run, as the others take it half a minute."),
     ]  # fmt: skip
