@@ -23,7 +23,7 @@ def norm(point: Point) -> float:
     """AUTO's L2-NORM: the root of the sum of squares of the states, of its mean for a function of t."""
     system = point.system
     if not hasattr(system, "evaluate"):
-        states = np.asarray(point.x)[: len(system.problem.states)]
+        states = np.asarray(system.states(point.x))
         return float(np.sqrt((states**2).sum()))
     nodes = np.asarray(system.nodes)[:: system.degree]
     places, weights = GAUSS

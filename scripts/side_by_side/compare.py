@@ -164,8 +164,8 @@ def covers(run: dict, point: dict, part: Part) -> bool:
 #: the distances were 1e-11 at the period 8, 2e-6 at 29 and 5e-5 at 39; ten times less leaves the last open.
 CRITICAL = 1e-4
 
-#: A multiplier this close to its critical value decides for contin where AUTO's point differs by more, relative to max(1, |value|).
-#: At the fold of ``tor`` with the period 13.9119 the distance is 1e-7 at contin's point, and 0.03 at AUTO's, 2e-5 away.
+#: A multiplier this close to its critical value decides for contin where AUTO's point differs by more, relative to
+#: max(1, |value|). At the fold of ``tor`` of period 13.9119 the distance is 1e-7 at contin's point, and 0.03 at AUTO's.
 EXACT = 1e-6
 
 
