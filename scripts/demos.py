@@ -3,8 +3,8 @@
     python scripts/demos.py [NAME ...] [--auto-demos DIR] [--page FILE] [--repeats N]
 
 AUTO's values and times are measured where ``--auto-demos`` names the folder ``demos`` of AUTO's distribution, and are then
-recorded in scripts/side_by_side/auto_07p.json; without it the recorded values are used, and no times are compared. Each demo
-runs in a process of its own. ``--page`` puts the tables between the two markers of that file.
+recorded in scripts/side_by_side/auto_07p.json; without it the recorded values and times are used. Each demo runs in a process
+of its own. ``--page`` puts the tables between the two markers of that file.
 """
 
 from __future__ import annotations
