@@ -1,0 +1,53 @@
+"""contin's side of one demo: its labelled points, and processor times of a first run and of further ones."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+
+from side_by_side.all_demos import DEMOS
+from side_by_side.compare import of_contin
+from side_by_side.record import Demo
+
+#: Modules whose results are kept between runs: those of the bank and of this package.
+KEEPERS = "bank", "side_by_side", "cycles"
+
+
+#: Seconds after which a demo is not repeated. The longest demo takes two minutes; ten times more makes the page take an hour.
+PATIENCE = 3.0
+
+
+def forget() -> None:
+    """Drop all results that are kept, so that a second run computes everything again, recordings included."""
+    for name, module in list(sys.modules.items()):
+        if name.split(".")[0] in KEEPERS:
+            for member in list(vars(module).values()):
+                clear = getattr(member, "cache_clear", None)
+                if clear is not None:
+                    clear()
+
+
+def points(demo: Demo) -> list[list[dict]]:
+    """Return contin's labelled points of each part of a demo."""
+    return [of_contin(part.branches(), part) for part in demo.parts]
+
+
+def run(name: str, repeats: int) -> dict:
+    """Return the points of a demo, and processor seconds.
+
+    ``first`` are those of this process up to the end of its first run, ``again`` those of a further run: the median of at most
+    ``repeats``, and of the first run itself where it takes long, or for 0.
+    """
+    (demo,) = [demo for demo in DEMOS if demo.name == name]
+    forget()
+    loaded = time.process_time()
+    found = points(demo)
+    first = time.process_time()
+    further = [] if repeats and first < PATIENCE else [first - loaded]
+    while len(further) < repeats and sum(further) < PATIENCE:
+        forget()
+        began = time.process_time()
+        points(demo)
+        further.append(time.process_time() - began)
+    return {"points": found, "first": first, "again": statistics.median(further)}
