@@ -26,6 +26,7 @@ from contin.detection.segment import Segment, SpecialPoint
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
+from contin.discretization.maps import MapSystem
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.state import Stop
@@ -125,7 +126,7 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
     ]
     if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
         found += _of_equilibria()
-    if isinstance(system.base, PeriodicCollocation):
+    if isinstance(system.base, PeriodicCollocation | MapSystem):
         found += _of_cycles(system.base)
     return found
 
@@ -197,15 +198,16 @@ def normal_product(v: Array, w: Array) -> float:
     return cosine if abs(cosine) > _NORMAL else 0.0
 
 
-def _of_cycles(cycles: PeriodicCollocation) -> list[TestFunction]:
+def _of_cycles(cycles: PeriodicCollocation | MapSystem) -> list[TestFunction]:
     """Where a further multiplier of a cycle is one (the change of g with the multiplier vanishes), or another is -1."""
-    critical = 1 + cycles.autonomous
+    autonomous = isinstance(cycles, PeriodicCollocation) and cycles.autonomous
+    critical, ends = 1 + autonomous, [] if isinstance(cycles, MapSystem) else shrinking(cycles)
 
     def further(trial: Trial) -> float:
         system: Any = trial.system
         v, w, _ = system.null_vectors(trial.x)
         n = len(system.problem.states)
-        return normal_product(v[:n], w[-1 - n : -1] if cycles.autonomous else w[-n:])
+        return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:])
 
     def flip(trial: Trial) -> float:
         system: Any = trial.system
@@ -216,7 +218,7 @@ def _of_cycles(cycles: PeriodicCollocation) -> list[TestFunction]:
         multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
         return signed_smallest(np.exp(-size) + multipliers)
 
-    return [*shrinking(cycles), TestFunction("R1", "resonance 1:1", further), TestFunction("LPPD", "fold-flip", flip)]
+    return [*ends, TestFunction("R1", "resonance 1:1", further), TestFunction("LPPD", "fold-flip", flip)]
 
 
 def _of_equilibria() -> list[TestFunction]:

@@ -153,6 +153,20 @@ def test_a_curve_of_folds_of_a_cycle_of_three():
         assert point["r"] * point["s"] == pytest.approx(1 + math.sqrt(8), abs=1e-10)
 
 
+def test_a_curve_of_folds_of_henon_passes_a_resonance_and_a_fold_flip():
+    """x' = a + b y - x^2, y' = x: folds at a = -(1 - b)^2 / 4, where the other multiplier is -b."""
+    problem = MapProblem(lambda u, p: (p.a + p.b * u.y - u.x**2, u.x), ["x", "y"], {"a": 0.1, "b": 0.3})
+    start = contin.solve(problem, [0.1, 0.1])
+    (fold,) = contin.trace(start, free=["a"], direction=-1, limits={"a": (-1, 2)}, max_points=20).labelled("LP")
+    for direction, label, known in ((-1, "R1", (-1, -1)), (1, "LPPD", (0, 1))):
+        found = contin.curve(fold, "b", direction=direction, limits={"b": (-1.5, 1.5)})
+        (point,) = found.labelled(label)
+        assert (point["a"], point["b"]) == pytest.approx(known, abs=1e-9)
+        assert [point.label for point in found if point.label] == ["EP", label, "EP"]
+        for point in found:
+            assert point["a"] == pytest.approx(-((1 - point["b"]) ** 2) / 4, abs=1e-10)
+
+
 def test_a_stored_doubling_goes_on(tmp_path):
     single = logistic()
     contin.save(single, tmp_path / "map.npz")
