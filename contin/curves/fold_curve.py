@@ -44,6 +44,8 @@ _SMALL = 0.3
 _TURNS = 1e-4
 #: Vectors are normal to each other where the cosine between them is smaller: their round-off.
 _NORMAL = 1e-10
+#: The same of cycles of maps, without a mesh: a point is located to this part of the way on which the cosine is of order one.
+_NORMAL_OF_MAPS = 1e-14
 #: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
 _ROUNDS = 3
 
@@ -192,22 +194,23 @@ def shrinking(cycles: PeriodicCollocation) -> list[TestFunction]:
     return [TestFunction("EP", name, amplitude, terminal=True)] if cycles.autonomous else []
 
 
-def normal_product(v: Array, w: Array) -> float:
+def normal_product(v: Array, w: Array, noise: float = _NORMAL) -> float:
     """Return the cosine between two vectors; 0 where it is round-off, as all along a curve of a conservative system."""
     cosine = float(v @ w) / float(np.linalg.norm(v) * np.linalg.norm(w))
-    return cosine if abs(cosine) > _NORMAL else 0.0
+    return cosine if abs(cosine) > noise else 0.0
 
 
 def _of_cycles(cycles: PeriodicCollocation | MapSystem) -> list[TestFunction]:
     """Where a further multiplier of a cycle is one (the change of g with the multiplier vanishes), or another is -1."""
     autonomous = isinstance(cycles, PeriodicCollocation) and cycles.autonomous
-    critical, ends = 1 + autonomous, [] if isinstance(cycles, MapSystem) else shrinking(cycles)
+    critical = 1 + autonomous
+    ends, noise = ([], _NORMAL_OF_MAPS) if isinstance(cycles, MapSystem) else (shrinking(cycles), _NORMAL)
 
     def further(trial: Trial) -> float:
         system: Any = trial.system
         v, w, _ = system.null_vectors(trial.x)
         n = len(system.problem.states)
-        return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:])
+        return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:], noise)
 
     def flip(trial: Trial) -> float:
         system: Any = trial.system

@@ -46,6 +46,9 @@ _DEEPER = 0.5
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
 #: larger, period doublings beside folds lose their coefficients.
 _ONE = 1e-5
+#: A multiplier whose logarithm is smaller is not called unstable: in a conservative system the mesh moves the second multiplier
+#: 1 by up to 1e-10, where round-off moves it by 1e-13. Ten times larger, a cycle beside a fold may count as stable.
+_NEARLY_ONE = 1e-9
 #: Step along the tangent over which multipliers are compared: their errors need one digit. In a canard explosion they change by
 #: a tenth of their value where the step is a thousand times longer.
 _ASIDE = 1e-5
@@ -160,9 +163,13 @@ def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
     return int(np.abs(system.eigenvalues(x)).argmin()) if isinstance(system, CycleCollocation) else None
 
 
-def unstable(system: PeriodicCollocation | MapSystem, x: Array) -> int:
-    """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off."""
-    outside, trivial = (system.eigenvalues(x).real > 0) & ~system.neutral(x), _trivial(system, x)
+def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = _NEARLY_ONE) -> int:
+    """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off.
+
+    Multipliers whose logarithm is below ``least`` are left out, too.
+    """
+    values, trivial = system.eigenvalues(x), _trivial(system, x)
+    outside = (values.real > 0) & ~system.neutral(x) & (np.abs(values) >= least)
     if trivial is not None:
         outside[trivial] = False
     return int(np.count_nonzero(outside))
@@ -342,7 +349,9 @@ def torus() -> TestFunction:
 def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
     system: Any = segment.trial.system
-    if unstable(system, segment.before.x) == unstable(system, segment.trial.x) and not _comes_near(segment, _from_torus):
+    if unstable(system, segment.before.x, 0.0) == unstable(system, segment.trial.x, 0.0) and not _comes_near(
+        segment, _from_torus
+    ):
         return []
     return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
 

@@ -216,7 +216,7 @@ class Inspection:
                 return points
         state = self.segment.state
         same = [point for point in (*self._folds, *crossings) if self._coincides(test, point)]
-        found = [self._at_special(test, point) for point in same]
+        found = [self._at_special(test, point) for point in same if test.confirm is None or test.confirm(point.trial)]
         for left, right in self._pieces(test, same):
             before, after = left[1].value(test), right[1].value(test)
             if state.accepted == 0 and left[0] == 0 and abs(before) < _ON_ZERO * abs(after):

@@ -226,6 +226,10 @@ class Algebraic(System):
         matrix = self.jacobian(x)
         return off_axis(eigenvalues, matrix, eigenvalues(matrix))
 
+    def computed_eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the eigenvalues with their round-off, where a zero of a real part is located."""
+        return self.eigenvalues(x) if self.is_sparse else eigenvalues(self.jacobian(x))
+
     def is_symmetric(self, x: Array) -> bool:
         """Return whether F_u is a large symmetric matrix, up to round-off: its eigenvalues are real."""
         if not self.is_sparse:

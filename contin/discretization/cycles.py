@@ -63,7 +63,7 @@ class PeriodicCollocation(Collocation):
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
-        self._known: dict[bytes, tuple[ComplexArray, Mask]] = {}
+        self._known: dict[bytes, tuple[ComplexArray, Mask, ComplexArray]] = {}
         self.order = problem.order
         sizes = np.ones(self._n) if scales is None else scales.states
         self._turn: Array = problem.symmetry * sizes / sizes[:, None]
@@ -187,15 +187,19 @@ class PeriodicCollocation(Collocation):
         """Return which multipliers lie on the unit circle up to round-off, shape (n,), but for the one that always is 1."""
         return self._multipliers(x)[1]
 
-    def _multipliers(self, x: Array) -> tuple[ComplexArray, Mask]:
-        """Return the logarithms of the multipliers, and which of them lie on the unit circle; they are computed once."""
+    def computed_eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers with their round-off, where a zero of a real part is located."""
+        return self._multipliers(x)[2]
+
+    def _multipliers(self, x: Array) -> tuple[ComplexArray, Mask, ComplexArray]:
+        """Return the logarithms of the multipliers, which lie on the unit circle, and all as computed, once."""
         key = x.tobytes()
         if key not in self._known:
             if len(self._known) > _KEPT:
                 self._known.clear()
             values = self._computed(x)
             neutral = on_circle(self._computed, x, values, expected=int(self.autonomous))
-            self._known[key] = np.where(neutral & is_pair(values), 1j * values.imag, values), neutral
+            self._known[key] = np.where(neutral & is_pair(values), 1j * values.imag, values), neutral, values
         return self._known[key]
 
     def _computed(self, x: Array) -> ComplexArray:

@@ -216,15 +216,15 @@ class MapSystem(Algebraic):
 
         That of a pair on the unit circle, to round-off, has the real part zero.
         """
-        values = self._computed(x)
+        values = self.computed_eigenvalues(x)
         return np.where(self.neutral(x) & is_pair(values), 1j * values.imag, values)
 
     def neutral(self, x: Array) -> Mask:
         """Return which multipliers lie on the unit circle up to round-off, shape (n,)."""
-        return on_circle(self._computed, x, self._computed(x))
+        return on_circle(self.computed_eigenvalues, x, self.computed_eigenvalues(x))
 
-    def _computed(self, x: Array) -> ComplexArray:
-        """Return the logarithms of the multipliers as they are computed."""
+    def computed_eigenvalues(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers with their round-off, where a zero of a real part is located."""
         values = log_eigenvalues(self.transitions(x))
         values.real = np.maximum(values.real, np.log(_NO_MULTIPLIER))
         return values

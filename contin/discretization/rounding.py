@@ -22,9 +22,10 @@ _NEAR_AXIS = 1e-9
 #: Random roundings, and the seed that draws them. The largest change of ten is at most twice that of three.
 _DRAWS, _SEED = 3, 13
 #: A real part is zero if it is below so many times the largest change. With three draws the change is a tenth of the round-off
-#: by chance once in 5,000 times; ten times larger, a torus bifurcation is located worse.
+#: by chance once in 5,000 times.
 _CERTAIN = 10.0
-#: That of the logarithm of a multiplier is zero below this, too. Ten times larger, a torus bifurcation is located worse.
+#: That of the logarithm of a multiplier is zero below this, too. Where a pair passes the circle is located with what is
+#: computed.
 _ON_CIRCLE = 1e-12
 
 
