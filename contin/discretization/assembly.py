@@ -60,7 +60,7 @@ class Tables(NamedTuple):
     weights: Vector
 
 
-@kernel
+@kernel(last=True)
 def fill_phase_row(n: int, tables: Tables, h: Vector, v: ReadOnlyVector, row: Vector) -> float:
     """Add to the ``row`` that of the integral of u . v', v the values at the nodes; return the integral of v' . v'."""
     value, slope, weights = tables

@@ -67,7 +67,7 @@ def _at(curve: Curve, x: ReadOnlyVector, n: int, state: int, t: float) -> float:
     return above / below
 
 
-@kernel(reorder=False)
+@kernel(reorder=False, last=True)
 def find(curve: Curve, values: Matrix, x: ReadOnlyVector, found: Matrix) -> None:
     """Fill the extremes (n, 2) of the states in x; ``values`` (looks, d + 1) takes nodal values to those that are compared."""
     n, looks, d, mesh = found.shape[0], values.shape[0], curve.nodes.size - 1, curve.mesh

@@ -43,13 +43,13 @@ class Kernel:
     ----------
     function : callable
         The Python function.
-    reorder : bool
+    reorder, last : bool
         As in `kernel`.
     """
 
-    def __init__(self, function: Callable[..., Any], reorder: bool) -> None:
+    def __init__(self, function: Callable[..., Any], reorder: bool, last: bool = False) -> None:
         functools.update_wrapper(self, function)
-        self.function, self.reorder = function, reorder
+        self.function, self.reorder, self.last = function, reorder, last
         self.name = f"{function.__module__}.{function.__qualname__}"
 
     @functools.cached_property
@@ -106,19 +106,19 @@ def kernel(function: _Function) -> _Function: ...
 
 
 @overload
-def kernel(*, reorder: bool = True) -> Callable[[_Function], _Function]: ...
+def kernel(*, reorder: bool = True, last: bool = False) -> Callable[[_Function], _Function]: ...
 
 
-def kernel(function: Any = None, *, reorder: bool = True) -> Any:
+def kernel(function: Any = None, *, reorder: bool = True, last: bool = False) -> Any:
     """Let a function run as machine code, with the types in its annotations.
 
     These are ``int``, ``float``, ``None``, the arrays above, and named tuples of them. Division by zero gives inf. Sums are
     evaluated in any order, so that loops become vector instructions; without ``reorder`` sums and products are evaluated one by
-    one as they stand.
+    one as they stand. One that only some kinds of problem need is made ``last`` where all are made.
     """
     if function is None:
-        return functools.partial(kernel, reorder=reorder)
-    made = Kernel(function, reorder)
+        return functools.partial(kernel, reorder=reorder, last=last)
+    made = Kernel(function, reorder, last)
     found = made.stored()
     if found is None:
         _PENDING.append(made)
@@ -140,7 +140,7 @@ def _share_work() -> subprocess.Popen[bytes] | None:
     if not modules:
         return None
     if sys.stderr is not None and sys.stderr.isatty():
-        text = "contin: compiling the engine for this machine, once; this takes some 15 s"
+        text = "contin: compiling the engine for this machine, once; this takes some 10 s"
         print(f"\r{text:<79}", file=sys.stderr)  # a line of progress may stand there
     if (os.cpu_count() or 1) < 2 or not sys.executable:
         return None
@@ -172,8 +172,8 @@ def prepare(modules: Sequence[str]) -> None:
 
 
 def _by_length(kernels: Iterable[Kernel]) -> list[Kernel]:
-    """Return kernels in the order in which two processes make them: short ones, some of which are not needed, last."""
-    return sorted(kernels, key=lambda each: -length(each.function))
+    """Return kernels in the order in which two processes make them: long ones first, then those of some kinds of problem."""
+    return sorted(kernels, key=lambda each: (each.last, -length(each.function)))
 
 
 @functools.cache

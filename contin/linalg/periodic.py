@@ -156,7 +156,7 @@ def _logarithm(value: complex, size: float) -> complex:
     return cmath.log(value) + size
 
 
-@kernel(reorder=False)
+@kernel(reorder=False, last=True)
 def separate(factors: Stack, iterates: Iterates, groups: Groups) -> int:
     """Iterate from the first basis until groups of eigenvalues are apart; fill the groups, and return their number."""
     first, last, triangles, coupling, product, vectors, sizes = iterates

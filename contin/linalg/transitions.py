@@ -46,7 +46,7 @@ def transitions(value: Array, slope: Array, h: Array, jacobian: Array) -> Array:
     return result
 
 
-@kernel(reorder=False)
+@kernel(reorder=False, last=True)
 def fill(value: Matrix, slope: Matrix, h: Vector, jacobian: Stack, matrices: Stack) -> None:
     """Fill the equations of the intervals."""
     for j in range(h.size):
@@ -68,7 +68,7 @@ def _fill_block(value, slope, h, jacobian, first, turn, block):
                 row[start + a] += slope[q, m]
 
 
-@kernel
+@kernel(last=True)
 def condense(
     value: Matrix, slope: Matrix, h: Vector, jacobian: Stack, block: Matrix, pivots: IndexVector, result: Stack
 ) -> None:
