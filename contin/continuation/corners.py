@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contin.detection.refinement import BENT
+from contin.discretization.switching import Switching
 from contin.stepping.trial import Trial
 
 
@@ -13,8 +14,7 @@ def jump(trial: Trial, primary: str) -> str:
     found = trial.system.switching(trial.x)
     if not found.jumps.any():
         return ""
-    at = int(np.argmax(found.jumps))
-    where = f"{found.names[at]} changes its sign (t = {found.places[at]:.6g} at {primary} = {trial[primary]:.10g})"
+    where = _where(found, int(np.argmax(found.jumps)), trial, primary)
     return (
         f"the equations jump where {where}: derivatives leave this out, so special points and stability are not told from "
         "there on; a SegmentedProblem with one segment on each side of the jump tells them"
@@ -26,9 +26,12 @@ def unsettled(trial: Trial, tolerance: float, primary: str) -> str:
     found = trial.system.switching(trial.x)
     if not (found.costs > tolerance).any():
         return ""
-    at = int(np.argmax(found.costs))
-    where = f"{found.names[at]} changes its sign (t = {found.places[at]:.6g} at {primary} = {trial[primary]:.10g})"
+    where = _where(found, int(np.argmax(found.costs)), trial, primary)
     return f"no mesh has a point where {where}: from there on the points are as exact as discretization_error says"
+
+
+def _where(found: Switching, at: int, trial: Trial, primary: str) -> str:
+    return f"{found.names[at]} changes its sign (t = {found.places[at]:.6g} at {primary} = {trial[primary]:.10g})"
 
 
 def why_lost(trial: Trial, is_located: bool) -> str:

@@ -80,10 +80,8 @@ def advice(state: State, settings: Settings) -> str:
         loose = dataclasses.replace(settings.newton, tolerance=times * settings.newton.tolerance)
         if loose.tolerance < 1 and _goes_on(state, dataclasses.replace(settings, newton=loose), way):
             return f"the run goes on with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
-    for part in _SHORTER:
-        shorter = part * settings.min_step
-        if _goes_on(state, dataclasses.replace(settings, min_step=shorter), way):
-            return f"the run goes on with steps of {shorter:g}: set min_step to that or less"
+    if (shorter := _least_step(state, settings)) is not None:
+        return f"the run goes on with steps of {shorter:g}: set min_step to that or less"
     finer = _on_finer_mesh(state)
     return _mesh_advice(finer.system, settings) if finer is not None and _goes_on(finer, settings, way) else ""
 
@@ -95,11 +93,14 @@ def shorter_steps(state: State, settings: Settings) -> float | None:
     """
     if settings.min_step != Settings.min_step or _goes_on(state, settings, settings.min_step):
         return None
-    for part in _SHORTER:
-        least = part * settings.min_step
-        if _goes_on(state, dataclasses.replace(settings, min_step=least), settings.min_step):
-            return least
-    return None
+    return _least_step(state, settings)
+
+
+def _least_step(state: State, settings: Settings) -> float | None:
+    """Return the largest of some shorter ``min_step`` with which a run goes on; None where it does with none."""
+    shorter = (part * settings.min_step for part in _SHORTER)
+    way = settings.min_step
+    return next((step for step in shorter if _goes_on(state, dataclasses.replace(settings, min_step=step), way)), None)
 
 
 def _as_it_is(state: State, settings: Settings) -> str:

@@ -3,8 +3,8 @@
 The determinant sees the parity only: two modes that cross together, or two branch points in one step, leave its sign as it
 was. They are seen in the quotient of the inverse matrices at both ends: each passage of a singular value through zero turns one
 of its eigenvalues negative. Of a small matrix all eigenvalues are computed; of a larger one those in the directions in which
-the inverses differ most, by subspace iteration. Directions in which the matrix is nearest to singular are not the same: small
-singular values that stay as they are would hide those that pass.
+the inverses differ most, by a block Krylov method. Directions in which the matrix is nearest to singular are not the same:
+small singular values that stay as they are would hide those that pass.
 """
 
 from __future__ import annotations

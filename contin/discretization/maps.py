@@ -217,7 +217,7 @@ class MapSystem(Algebraic):
         That of a pair on the unit circle, to round-off, has the real part zero.
         """
         values = self.computed_eigenvalues(x)
-        return np.where(self.neutral(x) & is_pair(values), 1j * values.imag, values)
+        return np.where(on_circle(self.computed_eigenvalues, x, values) & is_pair(values), 1j * values.imag, values)
 
     def neutral(self, x: Array) -> Mask:
         """Return which multipliers lie on the unit circle up to round-off, shape (n,)."""
