@@ -15,6 +15,7 @@ solves with the matrix and with its transpose only substitute, in `contin.linalg
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 
@@ -22,6 +23,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.linalg.elimination import Eliminated, factorize
+from contin.linalg.ends import Ends
 from contin.linalg.layout import Blocks, Layout
 from contin.linalg.segments import Share, run, share
 from contin.linalg.substitution import solve, solve_transposed, work_size
@@ -63,6 +65,7 @@ class Factorization:
         self._unknowns = intervals * rows + n + k
         self._work = np.empty((work_size(segments, intervals, rows, n, r, size), LANES))  # of solves, one at a time
         carried = np.empty((segments, n + r, size))
+        self._left = carried, first, last
         #: Sign of the determinant up to a factor that depends on the shape only.
         self.sign: float
         if segments == 1:
@@ -71,6 +74,12 @@ class Factorization:
             corners = np.concatenate([corner[None], np.zeros((segments - 1, r, k))])
             given = layout, self._factors, corners, first, last, carried
             self.sign = math.prod(run(factorize, given, self._whole, (True, False)))
+
+    @functools.cached_property
+    def ends(self) -> Ends | None:
+        """What is left between both ends of the mesh; None for a single interval, and for matrices of several segments."""
+        carried, first, last = self._left
+        return Ends(self._factors.chain, carried[0], first, last) if self._whole.last == 1 < len(self._factors.local) else None
 
     def solve(self, b: Array) -> Array:
         """Return the x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""

@@ -21,10 +21,10 @@ def random_rows(count: int, size: int) -> Array:
 
 
 @kernel
-def orthonormalize(rows: Matrix) -> None:
-    """Make the rows orthonormal, in place: Gram-Schmidt, twice."""
+def orthonormalize(rows: Matrix, first: int) -> None:
+    """Make the rows from ``first`` on orthonormal, and orthogonal to those before, which are: in place, Gram-Schmidt, twice."""
     count, size = rows.shape
-    for i in range(count):
+    for i in range(first, count):
         largest = 0.0
         for k in range(size):
             largest = max(largest, abs(rows[i, k]))
@@ -37,6 +37,26 @@ def orthonormalize(rows: Matrix) -> None:
                 product += rows[j, k] * rows[i, k]
             for k in range(size):
                 rows[i, k] = rows[i, k] - product * rows[j, k] if j < i else rows[i, k] / np.sqrt(product)
+
+
+@kernel
+def fill_products(one: Matrix, other: Matrix, known: int, count: int, products: Matrix) -> None:
+    """Fill one[i].other[j] for i, j < ``count``, in place, where not both are less than ``known``; both are multiples of four.
+
+    BLAS gives products of this size to several threads: on a busy machine they wait for each other, a thousand times as long as
+    the products take.
+    """
+    size = one.shape[1]
+    for i in range(count):
+        row = one[i]
+        for j in range(known if i < known else 0, count, 4):
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for k in range(size):
+                a += row[k] * other[j, k]
+                b += row[k] * other[j + 1, k]
+                c += row[k] * other[j + 2, k]
+                d += row[k] * other[j + 3, k]
+            products[i, j], products[i, j + 1], products[i, j + 2], products[i, j + 3] = a, b, c, d
 
 
 def smallest_directions(factors: Factors, size: int, count: int, rounds: int = 2) -> tuple[Array, Array, Array]:
@@ -54,8 +74,8 @@ def smallest_directions(factors: Factors, size: int, count: int, rounds: int = 2
     right = random_rows(min(count, size), size)
     for _ in range(rounds):
         left = factors.solve_transposed(right)
-        orthonormalize(left)
+        orthonormalize(left, 0)
         solved = factors.solve(left)
         right = solved.copy()
-        orthonormalize(right)
+        orthonormalize(right, 0)
     return right, left, right @ solved.T

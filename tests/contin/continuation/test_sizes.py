@@ -86,15 +86,19 @@ def test_a_linear_problem_reaches_a_generous_limit():
 
 @pytest.mark.parametrize(("load", "height"), [(1.0, 1e-8), (1e6, 1e-5), (1e-7, 1e7), (1e9, 1e9)])
 def test_the_amplitude_of_a_buckled_column_is_found(load, height):
-    """The same branch in all units: at P = 20 its largest angle is that of the column with P = 20 in units of one."""
+    """The same branch in all units: at P = 20 its slopes at the hinges are those of the column with P = 20 in units of one.
+
+    Hinges are mesh points: inside intervals solutions are known to 4e-9, and meshes may differ.
+    """
     ends = []
     for of_load, of_height in ((1.0, 1.0), (load, height)):
         limits = {"P": (0, 20 * of_load)}
         straight = trace(solve(column(of_load, of_height), [0, 0]), free=["P"], limits=limits)
         buckled = trace(straight.labelled("BP")[0], branch=1, limits=limits)
         assert buckled.stop.reason == "limit"
-        ends.append(np.abs(buckled.points[-1].system.states(buckled.points[-1].x)).max(axis=0) / of_height)
-    assert ends[1] == pytest.approx(ends[0], rel=1e-9)
+        last = buckled.points[-1]
+        ends.append(np.abs(last.system.evaluate(last.x, np.array([0.0, 1.0]))) / of_height)
+    assert ends[1] == pytest.approx(ends[0], rel=1e-9, abs=1e-10)
 
 
 @pytest.mark.parametrize("power", [2, 3, 4, 5])
