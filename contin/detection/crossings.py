@@ -92,14 +92,14 @@ def _condensed(before: Factors, after: Factors) -> Array | None:
         return None
     if not min(before.ends.least_pivot, after.ends.least_pivot) > _PIVOT:
         return None
-    first, second, turn = compared(before.ends, after.ends)
-    if not (turn < _TURN and np.all(np.isfinite(first)) and np.all(np.isfinite(second))):
+    one, other, turn = compared(before.ends, after.ends)
+    if not (turn < _TURN and np.all(np.isfinite(one)) and np.all(np.isfinite(other))):
         return None
     try:
-        quotient: Array = np.linalg.solve(second, first)
+        quotient: Any = np.linalg.solve(other, one)
     except np.linalg.LinAlgError:
         return None
-    return quotient
+    return np.asarray(quotient)
 
 
 def _finite_eigenvalues(matrix: Array) -> ComplexArray:
@@ -181,8 +181,8 @@ class _Watch:
                 fill_products(one, other, self._compared, self.count, products)
             self._compared = self.count
             vectors, sizes = self._vectors, np.abs(values)
-            products = self._gram[:, : self.count, : self.count] @ vectors
-            first, mixed, last = np.sum(vectors.conj() * products, axis=1)
+            images = self._gram[:, : self.count, : self.count] @ vectors
+            first, mixed, last = np.sum(vectors.conj() * images, axis=1)
             missed = last.real - 2 * (values.conj() * mixed).real + sizes**2 * first.real
             changes = _KEPT**2 * last.real - 2 * _KEPT * mixed.real + first.real
             converged = missed < (_CONVERGED * (np.sqrt(last.real) + sizes * np.sqrt(first.real))) ** 2

@@ -15,6 +15,8 @@ This matrix is singular where the whole one is, with a kernel of the same dimens
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from contin.arrays import Array
@@ -26,10 +28,11 @@ from contin.functions.kernel_parts import Stack
 def orthonormal_rows(chain: Stack, relations: Stack) -> float:
     """Fill the ``relations`` (N - 1, n, 2 n + k) of the first point to each of the others, from the second on.
 
-    ``chain`` is that of `contin.linalg.elimination.Eliminated`. Returns the least pivot of the mesh points, as a part of the mean.
+    ``chain`` is that of `contin.linalg.elimination.Eliminated`. The result is the least pivot of the mesh points, as a part of
+    their mean.
     """
     points, n, width = relations.shape
-    least, total = np.inf, 0.0
+    least, total = math.inf, 0.0
     for j in range(points):
         block, rows = chain[j], relations[j]
         for i in range(n):
@@ -51,8 +54,8 @@ def orthonormal_rows(chain: Stack, relations: Stack) -> float:
             for b in range(width):
                 square += rows[i, b] * rows[i, b]
             for b in range(width):
-                rows[i, b] /= np.sqrt(square)
-    return least * points * n / total
+                rows[i, b] /= math.sqrt(square)
+    return float(least * points * n / total)
 
 
 @kernel
