@@ -270,7 +270,7 @@ class Continuation:
     ) -> tuple[Discretization, Array, Linearization]:
         """Return the first point on a mesh on which its error is within the tolerance, as far as one is found."""
         for _ in range(_ATTEMPTS):
-            accuracy = self._accuracy_of(Trial(system, x, linear))
+            accuracy = accuracy_of(Trial(system, x, linear))
             finer = self._finer_mesh(system, x, accuracy.error) if self._is_poor(accuracy) else None
             if finer is None:
                 break
@@ -419,7 +419,7 @@ class Continuation:
         The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point.
         """
         step = self._step(self.state)
-        self._accuracy = self._accuracy_of(step.end)
+        self._accuracy = accuracy_of(step.end)
         for _ in range(_ATTEMPTS):
             end, known = step.end, (self.state, self._end)
             if not self._is_poor(self._accuracy) or self._ends_inside(step.segment):
@@ -430,7 +430,7 @@ class Continuation:
             if finer is None or not self._move_to(finer):
                 break
             again = self._step(self.state)
-            accuracy = self._accuracy_of(again.end)
+            accuracy = accuracy_of(again.end)
             if not accuracy.error < _HELPS * self._accuracy.error:
                 self.state, self._end = known
                 break
@@ -473,13 +473,12 @@ class Continuation:
         before, trial = segment.before, segment.trial
         return any(test.passed(before.value(test), trial.value(test)) for test in self._ends)
 
-    def _accuracy_of(self, trial: Trial) -> Accuracy:
-        return accuracy_of(trial, self.settings.mesh.tolerance)
-
     def _is_poor(self, accuracy: Accuracy) -> bool:
         """Return whether a point has a larger error than the tolerance of the mesh, which a finer one would lower."""
         control = self.settings.mesh
-        return bool(control.every and not accuracy.is_round_off and accuracy.error > control.tolerance)
+        if not (control.every and accuracy.error > control.tolerance and accuracy.trial is not None):
+            return False
+        return accuracy.trial.system.intervals < control.max_intervals and not accuracy.is_round_off
 
     def _finer_mesh(self, system: Discretization, x: Array, error: float) -> tuple[Discretization, Carrier] | None:
         """Return the system on a finer mesh that is adapted to x, as fine as the error takes; None if it may not be finer."""
@@ -763,7 +762,7 @@ class Continuation:
             return False
         if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, self.settings.newton):
             return False
-        if system.intervals < state.system.intervals and self._is_poor(self._accuracy_of(end)):
+        if system.intervals < state.system.intervals and self._is_poor(accuracy_of(end)):
             return False
         self._end = end
         self.state = dataclasses.replace(
@@ -796,7 +795,7 @@ class Continuation:
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
         if accuracy is None and found.name != "closed" and np.all(np.isfinite(trial.tangent)):
-            accuracy = self._accuracy_of(trial)
+            accuracy = accuracy_of(trial)
         elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on no finer mesh
             accuracy = self._accuracy
         stability = Stability()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,21 +18,21 @@ _UNITS = 10.0
 
 @dataclass(frozen=True)
 class Accuracy:
-    """The estimated discretization error of a point, relative to 1 + size; NaN where it is not known, 0 without a mesh.
-
-    ``is_round_off``: a finer mesh would not make it smaller. It is looked at only where the error is larger than wanted.
-    """
+    """The estimated discretization error of a point, relative to 1 + size; NaN where it is not known, 0 without a mesh."""
 
     error: float
-    is_round_off: bool = False
+    trial: Trial | None = None
+
+    @functools.cached_property
+    def is_round_off(self) -> bool:
+        """A finer mesh would not make it smaller."""
+        trial = self.trial
+        return trial is not None and self.error <= _UNITS * trial.system.newton_error(trial.x, trial.factors)
 
 
-def accuracy_of(trial: Trial, wanted: float) -> Accuracy:
+def accuracy_of(trial: Trial) -> Accuracy:
     """Return the estimated discretization error of a point of a curve."""
-    error = trial.discretization_error
-    if not error > wanted:
-        return Accuracy(error)
-    return Accuracy(error, is_round_off=error <= _UNITS * trial.system.newton_error(trial.x, trial.factors))
+    return Accuracy(trial.discretization_error, trial)
 
 
 class _Bordered:

@@ -229,22 +229,23 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
 
 
-def _comes_near(segment: Segment, distances: Callable[[list[complex]], list[float]]) -> bool:
+def _comes_near(segment: Segment, distances: Callable[[Sequence[complex]], list[float]]) -> bool:
     """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
     ends = [_without_trivial(trial) for trial in (segment.before, segment.trial)]
-    for here, there in (ends, ends[::-1]):
-        for value, distance in zip(here, distances(here)):
-            stays = any(_CHANGES * abs(_difference(value, other)) < distance for other in there)
-            if not (stays and distance > _NEAR):
+    changes = [[_CHANGES * abs(_difference(here, there)) for there in ends[1]] for here in ends[0]]
+    for values, moves in ((ends[0], changes), (ends[1], zip(*changes))):
+        for distance, several in zip(distances(values), moves):
+            if not (distance > _NEAR and any(move < distance for move in several)):
                 return True
     return False
 
 
-def _without_trivial(trial: Trial) -> list[complex]:
+@functools.lru_cache(maxsize=4)
+def _without_trivial(trial: Trial) -> tuple[complex, ...]:
     """Return the logarithms of the multipliers of a cycle but for the one that is 1."""
     system: Any = trial.system
     values, trivial = system.eigenvalues(trial.x).tolist(), _trivial(system, trial.x)
-    return [value for place, value in enumerate(values) if place != trivial]
+    return tuple(value for place, value in enumerate(values) if place != trivial)
 
 
 def _difference(value: complex, other: complex) -> complex:
@@ -253,12 +254,12 @@ def _difference(value: complex, other: complex) -> complex:
     return complex(gap.real, math.remainder(gap.imag, 2 * math.pi)) if math.isfinite(gap.real) else gap
 
 
-def _from_doubling(values: list[complex]) -> list[float]:
+def _from_doubling(values: Sequence[complex]) -> list[float]:
     """Return how far each logarithm is from that of -1."""
     return [abs(complex(value.real, math.pi - abs(value.imag))) for value in values]
 
 
-def _from_torus(values: list[complex]) -> list[float]:
+def _from_torus(values: Sequence[complex]) -> list[float]:
     """Return how far each logarithm is from that of a complex pair on the unit circle; real ones can meet, and form a pair."""
     angles = [abs(value.imag) for value in values]
     sizes = [abs(value.real) for value in values]

@@ -311,6 +311,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
     def _set_reference(self, reference: Array) -> None:
         """Take the phase row from an orbit, states at the nodes."""
         self.reference = reference
+        self._amplitude: Array | None = None
         self._phase = self.phase_row(reference if self.scales is None else reference / self.scales.states)
 
     # --- the discrete equations ----------------------------------------------------------------------------------
@@ -384,12 +385,13 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 
         It is the product of both, without their means, over that of the reference with itself.
         """
-        weights = self.weights[: self.state_size : self._n]
-        group = sum(np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)) / self.order
-        reference = self.reference - group @ (weights @ self.reference)
-        states = self.states(x)
-        product = np.einsum("k,ka,ka->", weights, reference, states - group @ (weights @ states))
-        return float(product / np.einsum("k,ka,ka->", weights, reference, reference))
+        if self._amplitude is None:  # it is linear in x
+            weights = self.weights[: self.state_size : self._n]
+            group = sum(np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)) / self.order
+            reference = self.reference - group @ (weights @ self.reference)
+            row = weights[:, None] * (reference - (weights @ reference) @ group) / (weights @ np.sum(reference**2, axis=1))
+            self._amplitude = (row if self.scales is None else row * self.scales.states).ravel()
+        return float(self._amplitude @ x[: self.state_size])
 
     # --- meshes and references -----------------------------------------------------------------------------------
 

@@ -357,16 +357,17 @@ class Batch:
         return self.recording
 
     def _values_program(self) -> Program:
-        found: Program = self._kept(
-            "values", lambda: program(self._known().tape, list(zip(self._known().results, range(self.count))), self._inputs())
-        )
+        found: Program | None = self._programs.get("values")
+        if found is None:
+            stores = list(zip(self._known().results, range(self.count)))
+            self._programs["values"] = found = program(self._known().tape, stores, self._inputs())
         return found
 
     def _slopes(self, inputs: tuple[int, ...], packed: bool = False) -> tuple[Program, list[tuple[int, int]]]:
         """Return the program of values and derivatives by these inputs, and the entries that it fills, by value and column."""
-        found: tuple[Program, list[tuple[int, int]]] = self._kept(
-            ("slopes", inputs, packed), lambda: self._slopes_program(inputs, packed)
-        )
+        found: tuple[Program, list[tuple[int, int]]] | None = self._programs.get(("slopes", inputs, packed))
+        if found is None:
+            self._programs["slopes", inputs, packed] = found = self._slopes_program(inputs, packed)
         return found
 
     def _slopes_program(self, inputs: tuple[int, ...], packed: bool) -> tuple[Program, list[tuple[int, int]]]:

@@ -44,15 +44,21 @@ def orthonormal_rows(chain: Stack, relations: Stack) -> float:
                 largest = max(largest, abs(rows[i, b]))
             for b in range(width):
                 rows[i, b] /= largest
-            for turn in range(2 * i):
-                other, product = rows[turn % i], 0.0
-                for b in range(width):
-                    product += other[b] * rows[i, b]
-                for b in range(width):
-                    rows[i, b] -= product * other[b]
             square = 0.0
             for b in range(width):
                 square += rows[i, b] * rows[i, b]
+            for _ in range(2):
+                before, square = square, 0.0
+                for other in range(i):
+                    product = 0.0
+                    for b in range(width):
+                        product += relations[j, other, b] * rows[i, b]
+                    for b in range(width):
+                        rows[i, b] -= product * relations[j, other, b]
+                for b in range(width):
+                    square += rows[i, b] * rows[i, b]
+                if square >= 0.5 * before:  # where little of a row is left, that is round-off: once more
+                    break
             for b in range(width):
                 rows[i, b] /= math.sqrt(square)
     return float(least * points * n / total)

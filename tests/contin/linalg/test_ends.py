@@ -1,0 +1,56 @@
+"""What condensation leaves between both ends of a mesh: Euler's column u'' + P u = 0, whose solutions are sines and cosines."""
+
+import math
+
+import numpy as np
+import pytest
+
+from contin import BoundaryValueProblem
+from contin.discretization.collocation import Collocation
+from contin.linalg.ends import compared
+
+COLUMN = BoundaryValueProblem(lambda t, u, p: (u.v, -p.P * u.u), lambda a, b, p: (a.u, b.u), ["u", "v"], {"P": 1.0})
+
+
+def ends(load, intervals=12):
+    """Return what is left of the straight column's matrix, bordered by the tangent of its branch."""
+    system = Collocation(COLUMN, np.linspace(0, 1, intervals + 1) ** 1.2, 7, ["P"], {})
+    x = np.zeros(system.size)
+    tangent = np.zeros(system.size)
+    x[-1], tangent[-1] = load, 1.0
+    return system.mesh, system.linearize(x, (tangent,))[1].ends
+
+
+@pytest.mark.parametrize("load", [0.0, 3.0, 40.0])
+def test_relations_hold_for_every_solution(load):
+    """Closed form: cos(w t) and sin(w t) / w, at t = 0 and at every mesh point; the load does not act on the straight column."""
+    mesh, found = ends(load)
+    w = math.sqrt(load) or 1e-8
+    for first, rows in enumerate(found.relations, start=2):
+        t = mesh[first]
+        for u, v, u_0, v_0 in ((math.cos(w * t), -w * math.sin(w * t), 1, 0), (math.sin(w * t) / w, math.cos(w * t), 0, 1)):
+            assert rows @ [u_0, v_0, u, v, 0] == pytest.approx([0, 0], abs=1e-12)
+        assert rows @ rows.T == pytest.approx(np.eye(2), abs=1e-14)
+
+
+@pytest.mark.parametrize(("load", "other", "passed"), [(5, 9, 0), (8, 11, 1), (12, 14, 0), (39, 40, 1), (86, 88, 0)])
+def test_a_buckling_load_turns_one_eigenvalue_negative(load, other, passed):
+    """Buckling loads are (k pi)^2: 9.87, 39.48, 88.83."""
+    before, after = ends(load)[1], ends(other)[1]
+    one, two, turn = compared(before, after)
+    values = np.linalg.eigvals(np.linalg.solve(two, one))
+    assert (np.count_nonzero((np.abs(values.imag) < 1e-9) & (values.real < 0)), turn < 0.5) == (passed, True)
+
+
+def test_half_waves_between_two_loads_show_as_a_turn_inside():
+    """From 5 to 500 the column gains six half-waves: the relation of both ends has turned often, and cannot tell how often."""
+    before, after = ends(5.0, 40)[1], ends(500.0, 40)[1]
+    assert compared(before, after)[2] > 0.9 and before.least_pivot > 0.2
+
+
+def test_pivots_tell_a_mesh_too_coarse():
+    assert ends(1e5, 3)[1].least_pivot < 0.2 < ends(1.0, 3)[1].least_pivot
+
+
+def test_a_single_interval_has_no_inside():
+    assert ends(1.0, 1)[1] is None
