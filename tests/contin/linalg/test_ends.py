@@ -23,7 +23,7 @@ def ends(load, intervals=12):
 
 @pytest.mark.parametrize("load", [0.0, 3.0, 40.0])
 def test_relations_hold_for_every_solution(load):
-    """Closed form: cos(w t) and sin(w t) / w, at t = 0 and at every mesh point; the load does not act on the straight column."""
+    """Closed form: cos(w t) and sin(w t) / w, at t = 0 and at every mesh point; no load acts on the straight column."""
     mesh, found = ends(load)
     w = math.sqrt(load) or 1e-8
     for first, rows in enumerate(found.relations, start=2):
