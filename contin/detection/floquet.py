@@ -349,12 +349,16 @@ def torus() -> TestFunction:
 
 def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
-    system: Any = segment.trial.system
-    if unstable(system, segment.before.x, 0.0) == unstable(system, segment.trial.x, 0.0) and not _comes_near(
-        segment, _from_torus
-    ):
+    if _unstable(segment.before) == _unstable(segment.trial) and not _comes_near(segment, _from_torus):
         return []
     return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
+
+
+@functools.lru_cache(maxsize=4)
+def _unstable(trial: Trial) -> int:
+    """Return the number of unstable multipliers of a cycle, however near to the circle."""
+    system: Any = trial.system
+    return unstable(system, trial.x, 0.0)
 
 
 def _doubtful(point: SpecialPoint) -> SpecialPoint:

@@ -109,7 +109,8 @@ class Trial:
     @property
     def tangent(self) -> Array:
         """Unit tangent, shape (size,)."""
-        return self.linear.tangent
+        linear = self._linear
+        return (self.linear if callable(linear) else linear).tangent
 
     @property
     def sign(self) -> float:
