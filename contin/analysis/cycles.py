@@ -13,6 +13,7 @@ from contin import checks
 from contin.analysis.solving import solve
 from contin.arrays import Array
 from contin.errors import ProblemError
+from contin.problems.angles import periods_of, whole_rounds, winding_names
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
@@ -66,11 +67,12 @@ def cycle(
     field = _vector_field(problem, values)
     if problem.period is None:
         settled = _integrated(field, first, settle).y[:, -1]
-        times, states = _one_round(field, settled, settle)
+        times, states = _one_round(field, settled, settle, periods_of(problem))
         values[PERIOD] = float(times[-1])
     else:
         (times, states), values[ROUNDS] = _forced_rounds(problem, field, (first, settle), values)
-    return solve(problem, (times / times[-1], states), values, intervals=intervals, degree=degree)
+    given = {name: value for name, value in values.items() if name not in winding_names(problem.angles)}  # as the motion has
+    return solve(problem, (times / times[-1], states), given, intervals=intervals, degree=degree)
 
 
 def _numbers(start: Any, count: int) -> Array:
@@ -123,9 +125,10 @@ def _forced_rounds(
     period = problem.duration({**values, ROUNDS: 1.0})
     settled = _integrated(field, start[0], period * math.ceil(start[1] / period)).y[:, -1]
     done = _integrated(field, settled, period * _MOST_ROUNDS, dense_output=True)
-    size = float(np.ptp(done.y, axis=1).max()) or 1.0
+    periods = periods_of(problem)
+    size = _size(done.y, periods) or 1.0
     for rounds in range(1, _MOST_ROUNDS + 1):
-        if np.abs(done.sol(rounds * period) - settled).max() <= _CLOSED * size:
+        if np.abs(_apart(done.sol(rounds * period), settled, periods)).max() <= _CLOSED * size:
             times = np.linspace(0.0, rounds * period, _SAMPLES)
             return (times, done.sol(times).T), rounds
     raise ProblemError(
@@ -134,10 +137,23 @@ def _forced_rounds(
     )
 
 
-def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
+def _size(states: Array, periods: Array) -> float:
+    """Return the size of a motion (n, K): an angle that goes round has its period."""
+    return float(np.minimum(np.ptp(states, axis=1), np.where(periods > 0, periods, np.inf)).max())
+
+
+def _apart(states: Array, start: Array, periods: Array) -> Array:
+    """Return differences of states (..., n) from the start, those of angles up to whole rounds."""
+    apart = states - start
+    found: Array = apart - whole_rounds(apart, periods)
+    return found
+
+
+def _one_round(field: Any, start: Array, longest: float, periods: Array) -> tuple[Array, Array]:
     """Return times (K,), from 0, and states (K, n) of one round of a motion that has settled.
 
-    A round ends where the motion comes back through the plane normal to it at its start, close to the start.
+    A round ends where the motion comes back through the plane normal to it at its start, close to the start; angles come back
+    up to whole rounds.
 
     Raises
     ------
@@ -145,11 +161,11 @@ def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
     """
     across = np.asarray(field(0.0, start), dtype=float)
     done = _integrated(field, start, longest, dense_output=True)
-    size = float(np.ptp(done.y, axis=1).max())
+    size = _size(done.y, periods)
     if size <= _RESTS * (1 + np.abs(start).max()):
         raise ProblemError(f"start: the motion from there comes to rest near {', '.join(f'{value:.6g}' for value in start)}")
-    for t in _passages(done, lambda t: across @ (done.sol(t).T - start).T):
-        if np.abs(done.sol(t) - start).max() <= _BACK * size:
+    for t in _passages(done, lambda t: across @ _apart(done.sol(t).T, start, periods).T):
+        if np.abs(_apart(done.sol(t), start, periods)).max() <= _BACK * size:
             times = np.linspace(0.0, t, _SAMPLES)
             return times, done.sol(times).T
     raise ProblemError(

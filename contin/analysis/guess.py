@@ -15,10 +15,12 @@ from contin.arrays import Array
 from contin.discretization.collocation import Collocation
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.kinds import algebraic, discretized
+from contin.discretization.maps import MapSystem
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.names import exact_text
 from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import CycleProblem
 from contin.problems.segmented import SegmentedProblem
@@ -62,7 +64,23 @@ def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tu
     states = np.zeros(count) if given is None else _numbers(given)
     if states.size != count:
         states = _numbers(given, system.state_size)
-    return system, system.pack(states, {**problem.parameters, **options.parameters})
+    x = system.pack(states, {**problem.parameters, **options.parameters})
+    return (system, x) if not isinstance(system, MapSystem) else _with_rounds_of_map(system, x, options)
+
+
+def _with_rounds_of_map(system: MapSystem, x: Array, options: Options) -> tuple[MapSystem, Array]:
+    """Return a map with the winding numbers of a guess, unless they are given, and x with each point near the image before."""
+    problem = system.problem
+    if not problem.angles:
+        return system, x
+    x = system.continuous(x)
+    read = windings(problem.angles, problem.state_names, system.gained(x))
+    return system.with_parameters({**read, **_only(read, options.parameters)}), x  # type: ignore[return-value]
+
+
+def _only(names: Mapping[str, float], parameters: Mapping[str, float]) -> dict[str, float]:
+    """Return those of the given parameters that have one of these names."""
+    return {name: value for name, value in parameters.items() if name in names}
 
 
 #: Part of the domain by which the times of a guess may miss its ends: cos(pi/2) is 6e-17.
@@ -86,8 +104,29 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
     if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
         return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
     states = _sampled(guess, system.nodes / order, len(problem.state_names))
+    if getattr(problem, "angles", None):
+        system, states = _with_rounds(system, states, options)
     x = system.pack(states, {**problem.parameters, **options.parameters})
     return system.with_reference(x), x
+
+
+def _with_rounds(system: Collocation, states: Array, options: Options) -> tuple[Collocation, Array]:
+    """Return an orbit with the winding numbers of a guess, unless they are given, and its states.
+
+    Angles may jump by whole rounds from node to node, as of values between -pi and pi. Of angles that are given to rotate, and
+    do not, those rounds are added, uniformly.
+    """
+    problem: Any = system.problem
+    periods, symmetry = periods_of(problem), getattr(problem, "symmetry", np.eye(len(problem.states)))
+    states = states - np.concatenate([0 * states[:1], np.cumsum(whole_rounds(np.diff(states, axis=0), periods), axis=0)])
+    read = windings(problem.angles, problem.state_names, states[-1] - symmetry @ states[0])
+    given = _only(read, options.parameters)
+    for name, value in given.items():
+        if not read[name]:
+            place = problem.state_names.index(name.removeprefix(WINDING))
+            states[:, place] += system.nodes * value * periods[place]
+    found: Collocation = system.with_parameters({**read, **given})
+    return found, states
 
 
 @first_guess.register

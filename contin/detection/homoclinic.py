@@ -17,6 +17,7 @@ from contin.discretization.cycles import CycleCollocation
 from contin.errors import ConvergenceError
 from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
+from contin.problems.angles import whole_rounds
 from contin.problems.cycle import PERIOD
 from contin.stepping.newton import correct
 from contin.stepping.trial import TestFunction, Trial, linearization
@@ -123,7 +124,9 @@ def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
         return None
     states, eigenvalues = found
     size = np.ptp(points, axis=0)
-    near = np.abs((points - states) / np.where(size > 0, size, 1.0)).max(axis=1) < _NEAR
+    apart = points - states
+    apart = apart - whole_rounds(apart, system.circles)
+    near = np.abs(apart / np.where(size > 0, size, 1.0)).max(axis=1) < _NEAR
     share = float(system.gauss_weights @ near)
     if share < _MOSTLY:
         return None
