@@ -19,6 +19,8 @@ from contin.results.point import Point
 
 #: Tolerance of the integration; the motion is at rest below this part of 1 + its size, and back within this part of its size.
 _ACCURATE, _RESTS, _BACK = 1e-9, 1e-6, 1e-2
+#: Looks at a motion in each round of an angle: at three or less, a whole round could look like none.
+_PER_ROUND = 8
 #: Places of the round that is the guess.
 _SAMPLES = 1000
 #: A forced motion closes after at most so many periods of the forcing, where it comes back within this part of its size: ten
@@ -71,6 +73,7 @@ def cycle(
         values[PERIOD] = float(times[-1])
     else:
         (times, states), values[ROUNDS] = _forced_rounds(problem, field, (first, settle), values)
+    states = states - whole_rounds(states[0], periods_of(problem))  # begins in the first round
     given = {name: value for name, value in values.items() if name not in winding_names(problem.angles)}  # as the motion has
     return solve(problem, (times / times[-1], states), given, intervals=intervals, degree=degree)
 
@@ -101,14 +104,24 @@ def _integrated(field: Any, start: Array, time: float, **options: Any) -> Any:
     return done
 
 
-def _passages(done: Any, height: Callable[[Any], Any]) -> Iterator[float]:
-    """Yield the times at which a height along a motion passes zero upwards; SciPy's own events fail at ends of its steps."""
+def _passages(times: Array, height: Callable[[Any], Any]) -> Iterator[float]:
+    """Yield the times between given ones at which a height passes zero upwards; SciPy's own events fail at ends of its steps."""
     from scipy.optimize import brentq  # type: ignore[import-untyped]  # the integrator has loaded it
 
-    values = height(done.t)
+    values = height(times)
     values[0] = 0.0  # where it begins, to the last digit
     for i in np.flatnonzero((values[:-1] < 0) & (values[1:] >= 0)):
-        yield float(brentq(height, done.t[i], done.t[i + 1]))
+        yield float(brentq(height, times[i], times[i + 1]))
+
+
+def _looks(done: Any, periods: Array) -> Array:
+    """Return the steps of a motion, divided where an angle goes round by more than a part of its period."""
+    advance = np.abs(np.diff(done.y, axis=1)) / np.where(periods > 0, periods, np.inf)[:, None]
+    pieces = np.ceil(_PER_ROUND * advance.max(axis=0)).astype(int).clip(1)
+    starts = np.repeat(done.t[:-1], pieces)
+    within = np.concatenate([np.arange(count) / count for count in pieces])
+    found: Array = np.append(starts + within * np.repeat(np.diff(done.t), pieces), done.t[-1])
+    return found
 
 
 def _forced_rounds(
@@ -164,7 +177,7 @@ def _one_round(field: Any, start: Array, longest: float, periods: Array) -> tupl
     size = _size(done.y, periods)
     if size <= _RESTS * (1 + np.abs(start).max()):
         raise ProblemError(f"start: the motion from there comes to rest near {', '.join(f'{value:.6g}' for value in start)}")
-    for t in _passages(done, lambda t: across @ _apart(done.sol(t).T, start, periods).T):
+    for t in _passages(_looks(done, periods), lambda t: across @ _apart(done.sol(t).T, start, periods).T):
         if np.abs(_apart(done.sol(t), start, periods)).max() <= _BACK * size:
             times = np.linspace(0.0, t, _SAMPLES)
             return times, done.sol(times).T

@@ -10,6 +10,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.discretization.cycles import CycleCollocation, ForcedCollocation
+from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.problems.angles import whole_rounds
 
@@ -87,6 +88,21 @@ def _of_forced_cycles(
 
     nearest = min(places, key=apart)
     return orbit(nearest), [moved(vector, nearest) for vector in vectors]
+
+
+@in_phase.register
+def _of_maps(system: MapSystem, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+    """A cycle of several points may begin with any of them."""
+
+    def apart(shift: int) -> float:
+        gap = system.lifted(system.moved(x, shift), reference) - reference
+        return float(system.weights @ gap**2)
+
+    nearest = min(range(system.rounds), key=apart)
+    turned = [vector.copy() for vector in vectors]
+    for vector in turned:
+        system.states(vector)[:] = np.roll(system.states(vector), -nearest, axis=0)
+    return system.lifted(system.moved(x, nearest), reference), turned
 
 
 def _is_odd(system: ForcedCollocation, x: Array) -> bool:

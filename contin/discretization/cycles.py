@@ -132,6 +132,8 @@ class PeriodicCollocation(Collocation):
 
     def moved(self, x: Array, shift: float) -> Array:
         """Return a cycle that begins later by ``shift``, in units of the part that is computed."""
+        if shift == 0:
+            return x.copy()
         return np.concatenate([self.evaluate_scaled(x, self.nodes + shift).ravel(), x[self.state_size :]])
 
     @property

@@ -135,6 +135,21 @@ class MapSystem(Algebraic):
         gaps[-1] -= self.gain
         return gaps.ravel()
 
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that those of the first point are nearest to those of a reference."""
+        if not self.circles.any():
+            return x
+        moved = x.copy()
+        self.states(moved)[0] += whole_rounds(self.states(reference)[0] - self.states(x)[0], self.circles)
+        return self.continuous(moved)
+
+    def moved(self, x: Array, shift: int) -> Array:
+        """Return a cycle that begins with a later point."""
+        moved = x.copy()
+        states = self.states(x)
+        self.states(moved)[:] = np.concatenate([states[shift:], states[:shift] + self.gain])
+        return moved
+
     def continuous(self, x: Array) -> Array:
         """Return x with angles moved by whole rounds, so that each point is nearest to the image of the one before."""
         x = x.copy()

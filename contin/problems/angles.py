@@ -70,7 +70,7 @@ def gain(angles: Mapping[str, float], states: Sequence[str], parameters: Mapping
 
 def windings(angles: Mapping[str, float], states: Sequence[str], gained: Array) -> dict[str, float]:
     """Return the parameters of `gain` for what states gain over one round, shape (n,): the nearest whole numbers of rounds."""
-    return {WINDING + name: float(np.round(gained[states.index(name)] / period)) for name, period in angles.items()}
+    return {WINDING + name: float(np.round(gained[states.index(name)] / period)) + 0.0 for name, period in angles.items()}
 
 
 def check_windings(angles: Mapping[str, float], free: Sequence[str], parameters: Mapping[str, float]) -> None:
@@ -110,7 +110,8 @@ def check_periodic(what: str, batch: Any, angles: Mapping[str, float], parameter
                 wrong = np.abs(gap) > _EQUAL * (1 + np.abs(here).max(axis=1, keepdims=True))
                 if np.any(wrong):
                     place, value = np.argwhere(wrong)[0]
+                    of_state = f"that of {names[value]}" if gap.shape[1] == len(names) else f"number {value + 1}"
                     raise ProblemError(
-                        f"angles: the {what} is not periodic in {name}; its value {value + 1} changes by {gap[place, value]:.3g} "
-                        f"from {name} = {u[place, names.index(name)]:.3g} to {name} + {period:.6g}"
+                        f"angles: the {what} is not periodic in {name}; of its values, {of_state} changes by "
+                        f"{gap[place, value]:.3g} from {name} = {u[place, names.index(name)]:.3g} to {name} + {period:.6g}"
                     )
