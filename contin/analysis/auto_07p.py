@@ -16,8 +16,8 @@ from contin.discretization.kinds import discretized
 from contin.discretization.system import System
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
-from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.angles import windings
+from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.problems.statement import with_multipliers
 from contin.results.auto_07p import AutoSolution

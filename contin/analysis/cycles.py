@@ -105,7 +105,7 @@ def _integrated(field: Any, start: Array, time: float, **options: Any) -> Any:
 
 
 def _passages(times: Array, height: Callable[[Any], Any]) -> Iterator[float]:
-    """Yield the times between given ones at which a height passes zero upwards; SciPy's own events fail at ends of its steps."""
+    """Yield the times between given ones at which a height passes zero upwards. SciPy's events fail at ends of its steps."""
     from scipy.optimize import brentq  # type: ignore[import-untyped]  # the integrator has loaded it
 
     values = height(times)

@@ -65,22 +65,7 @@ def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tu
     if states.size != count:
         states = _numbers(given, system.state_size)
     x = system.pack(states, {**problem.parameters, **options.parameters})
-    return (system, x) if not isinstance(system, MapSystem) else _with_rounds_of_map(system, x, options)
-
-
-def _with_rounds_of_map(system: MapSystem, x: Array, options: Options) -> tuple[MapSystem, Array]:
-    """Return a map with the winding numbers of a guess, unless they are given, and x with each point near the image before."""
-    problem = system.problem
-    if not problem.angles:
-        return system, x
-    x = system.continuous(x)
-    read = windings(problem.angles, problem.state_names, system.gained(x))
-    return system.with_parameters({**read, **_only(read, options.parameters)}), x  # type: ignore[return-value]
-
-
-def _only(names: Mapping[str, float], parameters: Mapping[str, float]) -> dict[str, float]:
-    """Return those of the given parameters that have one of these names."""
-    return {name: value for name, value in parameters.items() if name in names}
+    return system.with_rounds_of(x, options.parameters) if isinstance(system, MapSystem) else (system, x)
 
 
 #: Part of the domain by which the times of a guess may miss its ends: cos(pi/2) is 6e-17.
@@ -120,7 +105,7 @@ def _with_rounds(system: Collocation, states: Array, options: Options) -> tuple[
     periods, symmetry = periods_of(problem), getattr(problem, "symmetry", np.eye(len(problem.states)))
     states = states - np.concatenate([0 * states[:1], np.cumsum(whole_rounds(np.diff(states, axis=0), periods), axis=0)])
     read = windings(problem.angles, problem.state_names, states[-1] - symmetry @ states[0])
-    given = _only(read, options.parameters)
+    given = {name: value for name, value in options.parameters.items() if name in read}
     for name, value in given.items():
         if not read[name]:
             place = problem.state_names.index(name.removeprefix(WINDING))

@@ -14,7 +14,7 @@ from contin.discretization.rounding import on_circle
 from contin.discretization.scales import Scales
 from contin.functions.batch import Batch
 from contin.linalg.periodic import log_eigenvalues
-from contin.problems.angles import check_windings, gain, whole_rounds, winding_names
+from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.cycle import ROUNDS, rounds_of
 from contin.problems.map import MapProblem
 
@@ -141,7 +141,9 @@ class MapSystem(Algebraic):
             return x
         moved = x.copy()
         self.states(moved)[0] += whole_rounds(self.states(reference)[0] - self.states(x)[0], self.circles)
-        return self.continuous(moved)
+        moved = self.continuous(moved)
+        # y' = y + ..., x' = x + y' of a standard map: one round more of y changes what x gains, and is another cycle here
+        return x if whole_rounds(self.gained(moved) - self.gain, self.circles).any() else moved
 
     def moved(self, x: Array, shift: int) -> Array:
         """Return a cycle that begins with a later point."""
@@ -157,6 +159,16 @@ class MapSystem(Algebraic):
         for at in range(1, self.rounds):
             states[at] += whole_rounds(self._images(x, states[at - 1 : at])[0] - states[at], self.circles)
         return x
+
+    def with_rounds_of(self, x: Array, given: Mapping[str, float]) -> tuple[MapSystem, Array]:
+        """Return the system with the winding numbers that x has, unless they are given, and a continuous x."""
+        if not self.circles.any():
+            return self, x
+        x = self.continuous(x)
+        read = windings(self.problem.angles, self.problem.state_names, self.gained(x))
+        other = self.with_parameters({name: given.get(name, value) for name, value in read.items()})
+        assert isinstance(other, MapSystem)
+        return other, x
 
     def gained(self, x: Array) -> Array:
         """Return the image of the last point less the first one, shape (n,)."""
@@ -287,11 +299,9 @@ class MapSystem(Algebraic):
     def doubled(self, x: Array) -> tuple[MapSystem, Array]:
         """Return the same problem with twice the rounds, and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
-        twice = (ROUNDS, *winding_names(self.problem.angles))
-        other = self.with_parameters({name: 2.0 * values[name] for name in twice})
+        other, states = self.with_parameters({ROUNDS: 2.0 * self.rounds}), self.states(x)
         assert isinstance(other, MapSystem)
-        states = self.states(x)
-        return other, other.pack(np.concatenate([states, states + self.gain]), values)
+        return other.with_rounds_of(other.pack(np.concatenate([states, states + self.gain]), values), {})
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapSystem, Array]:
         """Return the same."""

@@ -87,7 +87,9 @@ def check_windings(angles: Mapping[str, float], free: Sequence[str], parameters:
             raise ProblemError(f"parameters: {name} = {checks.shown(parameters[name])} must be a whole number")
 
 
-def check_periodic(what: str, batch: Any, angles: Mapping[str, float], parameters: Mapping[str, float], lifts: bool = False) -> None:
+def check_periodic(
+    what: str, batch: Any, angles: Mapping[str, float], parameters: Mapping[str, float], lifts: bool = False
+) -> None:
     """Check at some places that a function of the states is periodic in each angle; where it has no value nothing is checked.
 
     A map (``lifts``) may gain whole rounds of the angles that it returns.

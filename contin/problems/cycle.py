@@ -116,7 +116,8 @@ class CycleProblem(BoundaryValueProblem):
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *,
-        functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: Any = None, angles: Angles = (),
+        functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: Any = None,
+        angles: Angles = (),
     ) -> None:  # fmt: skip
         means = dict(checks.mapping("functionals", functionals or {}, "functions"))
         names = check_statement(states, parameters, means)
