@@ -37,8 +37,8 @@ from contin.stepping.trial import TestFunction
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          event: TestFunction | None = None, kind: str | None = None, branch: int = 0, progress: bool | None = None,
-          **options: Any) -> Branch:  # fmt: skip
+          event: TestFunction | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
+          progress: bool | None = None, **options: Any) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
     From a point of such a curve, without a further parameter, it goes on; ``kind`` takes another one that leaves there.
@@ -58,6 +58,9 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         Both parameters, in place of ``second``; the first one replaces that in which the start was found.
     event : TestFunction, optional
         The one that labelled the start, where that is one of yours (``test_functions``).
+    hold : str, optional
+        A column that keeps the value of the start, whatever its label: with ``"period"`` the curve is one of cycles of given
+        period. ``branch_points=True`` looks for the points where such curves cross.
     kind : str, optional
         From BT, GH, ZH, HH: ``"LP"``, ``"HB"``, ``"TR"`` or ``"homoclinic"``, as in `Point.curves`; some begin a little beside.
     branch : int
@@ -87,14 +90,15 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     [('CP', True)]
     """
     _check(start, event, kind, branch)
-    shown, goes_on = Progress(progress), isinstance(start.system, Extended) and (second, free, event) == (None, None, None)
+    new = (second, free, event, hold) != (None, None, None, None)
+    shown, goes_on = Progress(progress), isinstance(start.system, Extended) and not new
     if kind is not None and not goes_on:
         raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
     names = start.system.free if goes_on else _free_parameters(start, second, free)
     options = {"branch_points": False, "primary": names[-1], **options}
     if goes_on:
         return _from_curve(start, kind, branch, settings_with(settings, options), shown)
-    found = _first_of_curve(start, names, event)
+    found = _first_of_curve(start if hold is None else _holding(start, hold), names, event, hold)
     return follow_until_interrupted(Continuation(*found, settings_with(settings, options)), shown)
 
 
@@ -146,7 +150,7 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
 _First = tuple[Extended, Array]
 
 
-def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | None) -> _First:
+def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | None, hold: str | None) -> _First:
     """Return the extended system of the kind of a point.
 
     Raises
@@ -157,6 +161,8 @@ def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | No
     base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
     if event is not None:
         return _event(start, base, x, event)
+    if hold is not None:
+        return _value(start, base, x)
     for kind in _KINDS if isinstance(start.system, System) else _KINDS_ON_CURVES:
         found = kind(start, base, x)
         if found is not None:
@@ -216,9 +222,31 @@ def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
 
 def _values(start: Point, base: Any, x: Array) -> _First | None:
     """A point where a column has a given value."""
-    column, value = start.column, start.value
-    if value is None or not abs(start[column] - value) <= _LOCATED * (1 + abs(value)):
+    value = start.value
+    if value is None or not abs(start[start.column] - value) <= _LOCATED * (1 + abs(value)):
         return None
+    return _value(start, base, x)
+
+
+def _holding(start: Point, column: str) -> Point:
+    """Return the point as one where a column has a given value, the one that it has.
+
+    Raises
+    ------
+    ProblemError
+        There is no such column.
+    """
+    checks.instance("hold", column, str, "the name of a column")
+    known = (*start.parameters, *start.functionals, *start.system.named_states)
+    if column not in known:
+        raise ProblemError(f"hold: {checks.shown(column)} is no column; there are {checks.listed(known)}")
+    return dataclasses.replace(start, column=column, value=start[column])
+
+
+def _value(start: Point, base: Any, x: Array) -> _First:
+    """The value of a column."""
+    column, value = start.column, start.value
+    assert value is not None
     known = base.column_gradient(x, column) is not None
     gradient = (lambda system, x: system.column_gradient(x, column)) if known else None
     return EventCurve(base, lambda trial: trial[column] - value, gradient), x
