@@ -35,6 +35,9 @@ _MOSTLY = 0.5
 _NOTHING = 1e-13
 #: Newton's method for the equilibrium: updates at most, and the size of the last one relative to 1 + the states.
 _UPDATES, _CONVERGED = 30, 1e-10
+#: A saddle-node lies within this distance in the parameter, relative to 1 + that, where the least speed of a cycle beside it is
+#: below `_STILL`, to which it is proportional. Slow stretches of relaxation oscillations have none within 1e-2.
+_BESIDE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,17 +51,21 @@ class RestingPlace:
         Those of the equilibrium, the largest real part first.
     share : float
         Part of the period that the cycle is near.
+    fold : bool
+        The equilibrium is that of a saddle-node, beside the value of the parameter.
     """
 
     states: Array
     eigenvalues: ComplexArray
     share: float
+    fold: bool = False
 
     def describe(self, names: tuple[str, ...]) -> str:
         """Return all that as a sentence."""
         place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, self.states))
         values = ", ".join(_number(value) for value in self.eigenvalues if value.imag >= 0)
-        return f"the cycle spends {100 * self.share:.3g} % of its time near the equilibrium {place}, eigenvalues {values}"
+        kind = ", at a fold of equilibria" if self.fold else ""
+        return f"the cycle spends {100 * self.share:.3g} % of its time near the equilibrium {place}{kind}, eigenvalues {values}"
 
 
 def _number(value: complex) -> str:
@@ -112,14 +119,50 @@ def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, Compl
             break
     else:
         return None
+    return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), _spectrum(system, x, states)
+
+
+def _spectrum(system: CycleCollocation, x: Array, states: Array) -> ComplexArray:
+    """Return the eigenvalues of an equilibrium, the largest real part first."""
     values = eigenvalues(system.rates_by_states(x, states[None])[0]) / system.unit_time(x)
-    return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), values[np.argsort(-values.real)]
+    found: ComplexArray = values[np.argsort(-values.real)]
+    return found
+
+
+def _fold_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
+    """Return the equilibrium of a saddle-node beside a cycle, as `equilibrium_beside` does; None where there is none.
+
+    Beyond a saddle-node there is no equilibrium. That of the nearest value of the parameter p comes from Newton's method for
+    F(u, p) = 0 with the smallest updates of u and p. On slow stretches of relaxation oscillations it is far away.
+    """
+    at = next(system.parameter_index(name) for name in system.free if name != PERIOD)
+    points, y = system.at_gauss_points(x), x.copy()
+    states = points[first_least(_speeds(system, x))].copy()
+    step = np.sqrt(np.finfo(float).eps) * (1 + abs(x[at]))
+    for _ in range(_UPDATES):
+        ahead, rates = y.copy(), system.rates(y, states[None])[0]
+        ahead[at] += step
+        slope = (system.rates(ahead, states[None])[0] - rates) / step
+        matrix = np.column_stack([system.rates_by_states(y, states[None])[0], slope])
+        if not np.all(np.isfinite(matrix)):
+            return None
+        update = np.linalg.lstsq(matrix, -rates)[0]
+        states += update[:-1]
+        y[at] += update[-1]
+        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(states).max()):
+            near = abs(y[at] - x[at]) <= _BESIDE * (1 + abs(x[at]))
+            return (states, _spectrum(system, y, states)) if near else None
+    return None
 
 
 def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
     """Return the equilibrium near which a cycle spends most of its time; None where there is none."""
     points, speeds = system.at_gauss_points(x), _speeds(system, x)
-    found = equilibrium_beside(system, x) if speeds.min() < _SLOW * speeds.max() else None
+    if not speeds.min() < _SLOW * speeds.max():
+        return None
+    found = equilibrium_beside(system, x)
+    fold = found is None
+    found = _fold_beside(system, x) if found is None else found
     if found is None:
         return None
     states, eigenvalues = found
@@ -131,7 +174,7 @@ def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
     if share < _MOSTLY:
         return None
     scales = np.ones(len(states)) if system.scales is None else system.scales.states
-    return RestingPlace(states * scales, eigenvalues, share)
+    return RestingPlace(states * scales, eigenvalues, share, fold)
 
 
 @dataclass(frozen=True)

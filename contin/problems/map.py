@@ -77,7 +77,7 @@ class MapProblem(AlgebraicProblem):
             raise ProblemError(f"map returns {self.equation_size} values for the {len(names)} states {', '.join(names)}")
 
     def _check_angles(self) -> None:
-        if self.angles:
+        if self.angles and self.equation_size == len(self.state_names):
             check_periodic("map", self.batch("map"), self.angles, self.parameters, lifts=True)
 
     def _signatures(self) -> Mapping[str, Arguments]:

@@ -89,7 +89,7 @@ def test_running_solutions_end_at_an_orbit_that_is_homoclinic_on_the_circle():
     assert abs(last["current"] - limit) < 1e-9
     orbit = contin.homoclinic(last, free=["current"])
     assert abs(orbit["current"] - limit) < 1e-9
-    assert orbit["winding_phi"] == 1 and abs(orbit["from_phi"] - math.pi + math.asin(limit)) % TWO_PI < 1e-8
+    assert orbit["winding_phi"] == 1 and abs(math.remainder(orbit["from_phi"] - math.pi + math.asin(limit), TWO_PI)) < 1e-8
     ends = contin.trace(orbit, free=["current", "beta"], zeros={"beta": [3]}, limits={"beta": (1.9, 3.1)}, direction=-1)
     (there,) = ends.labelled("UZ")
     assert abs(there["current"] - brentq(lambda current: apart_of_manifolds(current, 3.0), 0.66, 0.69, xtol=1e-13)) < 1e-8
@@ -197,6 +197,15 @@ def test_periods_near_a_saddle_node_on_a_circle():
     for point in branch.points:
         assert abs(point["period"] * math.sqrt(point["w"] ** 2 - 1) - TWO_PI) < 1e-9 * point["period"]
         assert point["winding_x"] == 1
+
+
+def test_branches_end_at_a_saddle_node_on_a_circle():
+    """Where round-off no longer tells the parameter from that of the saddle-node: at w = a, x = pi / 2."""
+    start = contin.solve(oscillator(), lambda t: (TWO_PI * t,), {"period": 4.0})
+    branch = contin.trace(start, free=["w"], direction=-1, limits={"w": (0, 5)})
+    assert "homoclinic orbit" in branch.stop.message
+    assert "near the equilibrium x = 1.5708, at a fold of equilibria" in branch.stop.message
+    assert abs(branch.points[-1]["w"] - 1) < 1e-7 and "limit_w" not in branch.stop.details
 
 
 def test_rotation_backwards():
