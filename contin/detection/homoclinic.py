@@ -51,6 +51,8 @@ class RestingPlace:
         Those of the equilibrium, the largest real part first.
     share : float
         Part of the period that the cycle is near.
+    passes : int
+        How often it comes near in a period: twice where two saddles are one, as at the angles -pi and pi.
     fold : bool
         The equilibrium is that of a saddle-node, beside the value of the parameter.
     """
@@ -58,6 +60,7 @@ class RestingPlace:
     states: Array
     eigenvalues: ComplexArray
     share: float
+    passes: int = 1
     fold: bool = False
 
     def describe(self, names: tuple[str, ...]) -> str:
@@ -174,7 +177,8 @@ def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
     if share < _MOSTLY:
         return None
     scales = np.ones(len(states)) if system.scales is None else system.scales.states
-    return RestingPlace(states * scales, eigenvalues, share, fold)
+    passes = max(int(np.count_nonzero(near & ~np.roll(near, 1))), 1)
+    return RestingPlace(states * scales, eigenvalues, share, passes, fold)
 
 
 @dataclass(frozen=True)
@@ -191,18 +195,22 @@ class Limit:
         return f"as the period grows, {self.name} tends to {self.value:.{places}f} +- {self.error:.1g}"
 
 
-def limit_of_parameter(system: CycleCollocation, x: Array, eigenvalues: ComplexArray) -> Limit | None:
+def limit_of_parameter(system: CycleCollocation, x: Array, place: RestingPlace) -> Limit | None:
     """Return the limit of the free parameter p on a branch that tends to a homoclinic orbit; None where it is not known.
 
-    Near a saddle p - limit = A exp(-k T), with the eigenvalue k or -k that is nearest to the imaginary axis, so that the limit
-    is p + (dp/dT) / k. The error is its difference from that of a cycle with half the rate dp/dT, where the next exponentials
-    are larger, and from that on the mesh halved. Of a complex leading eigenvalue p oscillates, and is not extrapolated.
+    Near a saddle p - limit = A exp(-k T), with the eigenvalue k or -k that is nearest to the imaginary axis, over the number of
+    passes in a period, so that the limit is p + (dp/dT) / k. The error is its difference from that of a cycle with half the
+    rate dp/dT, where the next exponentials are larger, and from that on the mesh halved. Of a complex leading eigenvalue p
+    oscillates, and is not extrapolated.
     """
+    if place.fold:
+        return None
+    eigenvalues = place.eigenvalues
     (name, *_), rates = [name for name in system.free if name != PERIOD], np.abs(eigenvalues.real)
     leading = eigenvalues[rates.argmin()]
     if leading.imag or not rates.min() > 0 or len(set(np.sign(eigenvalues.real))) < 2:
         return None
-    k = float(rates.min()) / system.order
+    k = float(rates.min()) / (system.order * place.passes)
     try:
         value = _extrapolated(system, x, (name, k), 0.0)
         shorter = _extrapolated(system, x, (name, k), np.log(2) / k)

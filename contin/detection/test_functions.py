@@ -253,7 +253,7 @@ def _of_slow_cycles(system: CycleCollocation, trial: Trial, stop: Stop) -> Stop:
     if place is None:
         return stop
     message = f"{stop.message}; {place.describe(cycles.problem.states)}"
-    limit = None if place.fold else limit_of_parameter(cycles, trial.x, place.eigenvalues)
+    limit = limit_of_parameter(cycles, trial.x, place)
     if limit is None:
         return dataclasses.replace(stop, message=message)
     details = {f"limit_{limit.name}": limit.value, f"limit_{limit.name}_error": limit.error}

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
 import contin
@@ -35,13 +36,39 @@ def test_solutions_one_round_on_are_known():
 
 
 def test_librations_know_the_angle():
-    """At the Hopf point of a torque-free oscillator whose damping changes its sign; the cycles end at the saddle."""
-    problem = contin.AlgebraicProblem(
-        lambda u, p: (u.v, -math.sin(u.phi) + u.v * (p.a - 1 + math.cos(u.phi))), ["phi", "v"], {"a": -0.1}, angles=["phi"]
-    )
+    """From a Hopf point to the orbits that connect the saddle at -pi with itself, at pi, and back: two passes in a period."""
+
+    def field(u, p):
+        return u.v, -math.sin(u.phi) + u.v * (p.a - 1 + math.cos(u.phi))
+
+    problem = contin.AlgebraicProblem(field, ["phi", "v"], {"a": -0.1}, angles=["phi"])
     (hopf,) = contin.trace(contin.solve(problem, [0.0, 0.0]), free=["a"], limits={"a": (-0.1, 0.1)}).labelled("HB")
-    cycles = contin.trace(hopf, branch=1, limits={"a": (-1, 2), "period": (0, 12)}, errors=False)
-    assert cycles.points[-1]["winding_phi"] == 0 and 2 < cycles.points[-1]["max_phi"] < math.pi
+    cycles = contin.trace(hopf, branch=1, limits={"a": (-1, 2), "period": (0, 30)}, errors=False)
+    last = cycles.points[-1]
+    assert last["winding_phi"] == 0 and 3 < last["max_phi"] < math.pi
+
+    def apart(a):
+        """How far the manifolds of both saddles are apart at phi = 0, by SciPy."""
+
+        def at_rest(sign):
+            def middle(t, u):
+                return u[0]
+
+            middle.terminal = True
+            eigenvalue = (a - 2 + sign * math.sqrt((a - 2) ** 2 + 4)) / 2
+            begin = [-sign * (math.pi - 1e-7), sign * 1e-7 * eigenvalue]
+            options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-13, "events": middle}
+            done = solve_ivp(
+                lambda t, u: [u[1], -math.sin(u[0]) + u[1] * (a - 1 + math.cos(u[0]))], (0, 99 * sign), begin, **options
+            )
+            return done.y_events[0][0][1]
+
+        return at_rest(1) - at_rest(-1)
+
+    limit = brentq(apart, 0.6, 0.75, xtol=1e-12)
+    assert abs(last.details["limit_a"] - limit) < last.details["limit_a_error"] < 1e-5
+    whole = contin.trace(hopf, branch=1, limits={"a": (-1, 2)}, errors=False)
+    assert abs(whole.points[-1]["a"] - limit) < 1e-9
 
 
 def circle(u, p):
