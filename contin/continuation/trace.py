@@ -13,7 +13,6 @@ from contin.arrays import Array
 from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
-from contin.curves.fold_curve import MEETS
 from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.system import System
@@ -86,7 +85,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
 def _solution(start: Point, free: Sequence[str]) -> Point:
     """Return the solution itself of a point of a curve; where folds meet a branch point, as that point of its branches."""
     found = underlying(start)
-    if found is start or (start.label, start.name) != (MEETS.label, MEETS.name):
+    if found is start or start.label != "BP":
         return found
     system, x = found.system.with_free(free, found.x)  # type: ignore[attr-defined]
     try:
@@ -94,7 +93,7 @@ def _solution(start: Point, free: Sequence[str]) -> Point:
     except ConvergenceError:
         return found
     if not np.abs(point.x - x).max() < _HERE * (1 + np.abs(x).max()):
-        return found  # a fold in the other parameter
+        return found  # as at a fold in the other parameter
     return dataclasses.replace(found, label=start.label, name=start.name, x=point.x, system=system, details=point)
 
 

@@ -124,7 +124,7 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
 
     found = [
         TestFunction("CP", "cusp", cusp, search=lambda segment, _: None if _singular_point(segment) is None else []),
-        MEETS,
+        _MEETS,
     ]
     if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
         found += _of_equilibria()
@@ -154,7 +154,7 @@ def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
     The extended system is singular there. At a pitchfork the curve turns back as its mirror image, so that the run ends; at a
     transcritical bifurcation it goes on.
     """
-    a, b = (trial.value(MEETS) for trial in (segment.before, segment.trial))
+    a, b = (trial.value(_MEETS) for trial in (segment.before, segment.trial))
     if not a * b < 0:
         return None
     near = segment.low + (segment.step - segment.low) * a / (a - b)
@@ -168,7 +168,7 @@ def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
     stop = None
     if turns_back(found.trial, [system.state_size, system.size - 1]):
         stop = Stop("pitchfork", "the folds end on a pitchfork: beyond it the curve is its own mirror image")
-    return [SpecialPoint(found.at, MEETS.label, MEETS.name, found.trial, stop, found, MEETS)]
+    return [SpecialPoint(found.at, _MEETS.label, _MEETS.name, found.trial, stop, found, _MEETS)]
 
 
 def turns_back(trial: Trial, parameters: Any) -> bool:
@@ -177,7 +177,7 @@ def turns_back(trial: Trial, parameters: Any) -> bool:
 
 
 #: Where the fold meets a branch point: w.F_lambda = 0.
-MEETS = TestFunction("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment))
+_MEETS = TestFunction("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment))
 
 
 def shrinking(cycles: PeriodicCollocation) -> list[TestFunction]:
