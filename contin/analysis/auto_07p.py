@@ -16,6 +16,7 @@ from contin.discretization.kinds import discretized
 from contin.discretization.system import System
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.angles import windings
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.problems.statement import with_multipliers
@@ -92,6 +93,8 @@ def _values(problem: Any, solution: AutoSolution, given: Mapping[str, float]) ->
     own = {}
     if isinstance(problem, CycleProblem):
         own = {ROUNDS: 1.0} if problem.period is not None else {PERIOD: solution.parameters.get(_PERIOD, 0.0)}
+        gained = solution.states[-1] - problem.symmetry @ solution.states[0]
+        own |= windings(problem.angles, problem.state_names, gained)
     known = {**own, **solution.parameters, **given}
     for name in problem.parameters:
         if name not in known:

@@ -16,6 +16,7 @@ from contin.discretization.cycles import CycleCollocation
 from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
 from contin.linalg.orientation import first_least
+from contin.problems.angles import periods_of, whole_rounds, winding_names
 from contin.problems.connection import TIME, ConnectionProblem
 from contin.problems.cycle import PERIOD
 from contin.results.point import Point
@@ -64,14 +65,19 @@ def homoclinic(cycle: Point, free: Sequence[str], *, mesh: MeshControl | None = 
         raise ProblemError("cycle: must be one without a symmetry; solve takes this one as a guess of such a CycleProblem")
     states, names = system.states(cycle.x), system.problem.state_names
     rest, unstable = _saddle(system, cycle.x)
-    parameters = {name: value for name, value in cycle.parameters.items() if name != PERIOD}
-    problem = ConnectionProblem(system.problem.field, names, parameters, unstable=unstable)
+    angles, periods = system.problem.angles, periods_of(system.problem)
+    own = (PERIOD, *winding_names(angles))
+    parameters = {name: value for name, value in cycle.parameters.items() if name not in own}
+    problem = ConnectionProblem(system.problem.field, names, parameters, unstable=unstable, angles=angles)
     degree = system.degree
-    cut = first_least(np.abs(states[::degree] - rest).max(axis=1)[:-1])  # at a mesh point
+    apart = states[::degree] - rest
+    cut = first_least(np.abs(apart - whole_rounds(apart, periods)).max(axis=1)[:-1])  # at a mesh point
+    rest = rest + whole_rounds(apart[cut], periods)
     mesh_points = np.concatenate([system.mesh[cut:], 1 + system.mesh[1 : cut + 1]]) - system.mesh[cut]
     mesh_points[-1] = 1.0
-    turned = np.concatenate([states[cut * degree :], states[1 : cut * degree + 1]])
-    values = {**parameters, TIME: cycle.parameters[PERIOD], **dict(zip(problem.multipliers, rest))}
+    turned = np.concatenate([states[cut * degree :], states[1 : cut * degree + 1] + system.gains[-1]])
+    windings = {name: cycle.parameters[name] for name in winding_names(angles)}
+    values = {**parameters, **windings, TIME: cycle.parameters[PERIOD], **dict(zip(problem.multipliers, rest))}
     started = ConnectionCollocation(problem, mesh_points, degree, tuple(free), values)
     x = started.pack(turned, values)
     return solved(started.with_reference(x), x, MeshControl() if mesh is None else mesh, newton)

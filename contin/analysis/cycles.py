@@ -13,11 +13,14 @@ from contin import checks
 from contin.analysis.solving import solve
 from contin.arrays import Array
 from contin.errors import ProblemError
+from contin.problems.angles import periods_of, whole_rounds, winding_names
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
 #: Tolerance of the integration; the motion is at rest below this part of 1 + its size, and back within this part of its size.
 _ACCURATE, _RESTS, _BACK = 1e-9, 1e-6, 1e-2
+#: Looks at a motion in each round of an angle: at three or less, a whole round could look like none.
+_PER_ROUND = 8
 #: Places of the round that is the guess.
 _SAMPLES = 1000
 #: A forced motion closes after at most so many periods of the forcing, where it comes back within this part of its size: ten
@@ -66,11 +69,13 @@ def cycle(
     field = _vector_field(problem, values)
     if problem.period is None:
         settled = _integrated(field, first, settle).y[:, -1]
-        times, states = _one_round(field, settled, settle)
+        times, states = _one_round(field, settled, settle, periods_of(problem))
         values[PERIOD] = float(times[-1])
     else:
         (times, states), values[ROUNDS] = _forced_rounds(problem, field, (first, settle), values)
-    return solve(problem, (times / times[-1], states), values, intervals=intervals, degree=degree)
+    states = states - whole_rounds(states[0], periods_of(problem))  # begins in the first round
+    given = {name: value for name, value in values.items() if name not in winding_names(problem.angles)}  # as the motion has
+    return solve(problem, (times / times[-1], states), given, intervals=intervals, degree=degree)
 
 
 def _numbers(start: Any, count: int) -> Array:
@@ -99,14 +104,24 @@ def _integrated(field: Any, start: Array, time: float, **options: Any) -> Any:
     return done
 
 
-def _passages(done: Any, height: Callable[[Any], Any]) -> Iterator[float]:
-    """Yield the times at which a height along a motion passes zero upwards; SciPy's own events fail at ends of its steps."""
+def _passages(times: Array, height: Callable[[Any], Any]) -> Iterator[float]:
+    """Yield the times between given ones at which a height passes zero upwards. SciPy's events fail at ends of its steps."""
     from scipy.optimize import brentq  # type: ignore[import-untyped]  # the integrator has loaded it
 
-    values = height(done.t)
+    values = height(times)
     values[0] = 0.0  # where it begins, to the last digit
     for i in np.flatnonzero((values[:-1] < 0) & (values[1:] >= 0)):
-        yield float(brentq(height, done.t[i], done.t[i + 1]))
+        yield float(brentq(height, times[i], times[i + 1]))
+
+
+def _looks(done: Any, periods: Array) -> Array:
+    """Return the steps of a motion, divided where an angle goes round by more than a part of its period."""
+    advance = np.abs(np.diff(done.y, axis=1)) / np.where(periods > 0, periods, np.inf)[:, None]
+    pieces = np.ceil(_PER_ROUND * advance.max(axis=0)).astype(int).clip(1)
+    starts = np.repeat(done.t[:-1], pieces)
+    within = np.concatenate([np.arange(count) / count for count in pieces])
+    found: Array = np.append(starts + within * np.repeat(np.diff(done.t), pieces), done.t[-1])
+    return found
 
 
 def _forced_rounds(
@@ -123,9 +138,10 @@ def _forced_rounds(
     period = problem.duration({**values, ROUNDS: 1.0})
     settled = _integrated(field, start[0], period * math.ceil(start[1] / period)).y[:, -1]
     done = _integrated(field, settled, period * _MOST_ROUNDS, dense_output=True)
-    size = float(np.ptp(done.y, axis=1).max()) or 1.0
+    periods = periods_of(problem)
+    size = _size(done.y, periods) or 1.0
     for rounds in range(1, _MOST_ROUNDS + 1):
-        if np.abs(done.sol(rounds * period) - settled).max() <= _CLOSED * size:
+        if np.abs(_apart(done.sol(rounds * period), settled, periods)).max() <= _CLOSED * size:
             times = np.linspace(0.0, rounds * period, _SAMPLES)
             return (times, done.sol(times).T), rounds
     raise ProblemError(
@@ -134,10 +150,23 @@ def _forced_rounds(
     )
 
 
-def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
+def _size(states: Array, periods: Array) -> float:
+    """Return the size of a motion (n, K): an angle that goes round has its period."""
+    return float(np.minimum(np.ptp(states, axis=1), np.where(periods > 0, periods, np.inf)).max())
+
+
+def _apart(states: Array, start: Array, periods: Array) -> Array:
+    """Return differences of states (..., n) from the start, those of angles up to whole rounds."""
+    apart = states - start
+    found: Array = apart - whole_rounds(apart, periods)
+    return found
+
+
+def _one_round(field: Any, start: Array, longest: float, periods: Array) -> tuple[Array, Array]:
     """Return times (K,), from 0, and states (K, n) of one round of a motion that has settled.
 
-    A round ends where the motion comes back through the plane normal to it at its start, close to the start.
+    A round ends where the motion comes back through the plane normal to it at its start, close to the start; angles come back
+    up to whole rounds.
 
     Raises
     ------
@@ -145,11 +174,11 @@ def _one_round(field: Any, start: Array, longest: float) -> tuple[Array, Array]:
     """
     across = np.asarray(field(0.0, start), dtype=float)
     done = _integrated(field, start, longest, dense_output=True)
-    size = float(np.ptp(done.y, axis=1).max())
+    size = _size(done.y, periods)
     if size <= _RESTS * (1 + np.abs(start).max()):
         raise ProblemError(f"start: the motion from there comes to rest near {', '.join(f'{value:.6g}' for value in start)}")
-    for t in _passages(done, lambda t: across @ (done.sol(t).T - start).T):
-        if np.abs(done.sol(t) - start).max() <= _BACK * size:
+    for t in _passages(_looks(done, periods), lambda t: across @ _apart(done.sol(t).T, start, periods).T):
+        if np.abs(_apart(done.sol(t), start, periods)).max() <= _BACK * size:
             times = np.linspace(0.0, t, _SAMPLES)
             return times, done.sol(times).T
     raise ProblemError(

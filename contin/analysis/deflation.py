@@ -39,7 +39,7 @@ def correct_away(system: Discretization, x: Array, others: Sequence[Point], newt
         None was found.
     """
     known = [point.system.carrier(system)(point.x)[: system.state_size] for point in others]
-    known = [np.append(states, x[system.state_size :]) for states in known]
+    known = [system.lifted(np.append(states, x[system.state_size :]), x) for states in known]
     nearest = known[first_least([inner(system, x - root, x - root) for root in known])]
     away = x - nearest
     if np.max(np.abs(away)) < _SAME:  # the known solution itself for a guess
@@ -49,7 +49,7 @@ def correct_away(system: Discretization, x: Array, others: Sequence[Point], newt
             found = _deflated(system, nearest + multiple * away, known, longest)
         if found is not None:
             done = correct(system, found, newton=newton)
-            if all(np.max(np.abs(done.x - root)) > _SAME for root in known):
+            if all(np.max(np.abs(done.x - system.lifted(root, done.x))) > _SAME for root in known):
                 return done
     raise ConvergenceError("no further solution was found from this guess; another guess may lead to one")
 
@@ -61,7 +61,7 @@ def _deflated(system: Discretization, x: Array, known: list[Array], longest: flo
         step = -factors.solve(residual)
         stretch = 0.0  # the derivative of log(prod (1 + 1 / |x - r|^2)) along the step
         for root in known:
-            away = x - root
+            away = x - system.lifted(root, x)
             distance = max(inner(system, away, away), _NO_DISTANCE)
             stretch -= 2 * inner(system, away, step) / (distance * (1 + distance))
         step = step / (1 - stretch)

@@ -24,6 +24,7 @@ from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
 from contin.functions.signature import argument_count
 from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.problems.variational import VariationalProblem
 from contin.results import plot
@@ -260,11 +261,14 @@ class _Explorer:
         if isinstance(known.system, Algebraic) and isinstance(point.system, CycleCollocation):
             states = known.system.states(known.x).ravel()
             ours |= {f"max_{name}": value for name, value in zip(known.system.problem.state_names, states)}
-        names = [name for name in ours if name in theirs and name != ROUNDS]
+        angles = getattr(known.system.problem, "angles", {})
+        names = [name for name in ours if name in theirs and name != ROUNDS and name not in winding_names(angles)]
         factor = 2.0 if _is_end(point) and point.label == "PD" else 1.0
         for name in names:
             mine = ours[name] * (factor if name == PERIOD else 1.0)
-            if abs(mine - theirs[name]) > self.tolerance * (1 + abs(mine)):
+            apart = np.array([theirs[name] - mine])
+            apart = apart - whole_rounds(apart, np.array([angles.get(name.removeprefix("max_").removeprefix("min_"), 0.0)]))
+            if abs(float(apart[0])) > self.tolerance * (1 + abs(mine)):
                 return False
         return True
 

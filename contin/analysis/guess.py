@@ -15,10 +15,12 @@ from contin.arrays import Array
 from contin.discretization.collocation import Collocation
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.kinds import algebraic, discretized
+from contin.discretization.maps import MapSystem
 from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.names import exact_text
 from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import CycleProblem
 from contin.problems.segmented import SegmentedProblem
@@ -62,7 +64,8 @@ def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tu
     states = np.zeros(count) if given is None else _numbers(given)
     if states.size != count:
         states = _numbers(given, system.state_size)
-    return system, system.pack(states, {**problem.parameters, **options.parameters})
+    x = system.pack(states, {**problem.parameters, **options.parameters})
+    return system.with_rounds_of(x, options.parameters) if isinstance(system, MapSystem) else (system, x)
 
 
 #: Part of the domain by which the times of a guess may miss its ends: cos(pi/2) is 6e-17.
@@ -85,9 +88,38 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
         system = system.on_breaks()
     if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
         return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
-    states = _sampled(guess, system.nodes / order, len(problem.state_names))
+    periods = periods_of(problem)
+    states = _sampled(guess, system.nodes / order, len(problem.state_names), periods)
+    if periods.any():
+        system, states = _with_rounds(system, states, options)
     x = system.pack(states, {**problem.parameters, **options.parameters})
     return system.with_reference(x), x
+
+
+def _continuous(states: Array, periods: Array | None) -> Array:
+    """Return states (K, n) whose angles do not jump by whole rounds from one to the next, as values between -pi and pi do."""
+    if periods is None or not periods.any():
+        return states
+    jumps = whole_rounds(np.diff(states, axis=0), periods)
+    found: Array = states - np.concatenate([np.zeros((1, states.shape[1])), np.cumsum(jumps, axis=0)])
+    return found
+
+
+def _with_rounds(system: Collocation, states: Array, options: Options) -> tuple[Collocation, Array]:
+    """Return an orbit with the winding numbers of a guess, unless they are given, and its states.
+
+    Of angles that are given to rotate, and do not, those rounds are added, uniformly.
+    """
+    problem: Any = system.problem
+    periods, symmetry = periods_of(problem), getattr(problem, "symmetry", np.eye(len(problem.states)))
+    read = windings(problem.angles, problem.state_names, states[-1] - symmetry @ states[0])
+    given = {name: value for name, value in options.parameters.items() if name in read}
+    for name, value in given.items():
+        if not read[name]:
+            place = problem.state_names.index(name.removeprefix(WINDING))
+            states[:, place] += system.nodes * value * periods[place]
+    found: Collocation = system.with_parameters({**read, **given})
+    return found, states
 
 
 @first_guess.register
@@ -100,8 +132,8 @@ def _of_segments(problem: SegmentedProblem, guess: Any, options: Options) -> tup
     return _of_boundary_value(problem, guess, options)
 
 
-def _sampled(guess: Guess, nodes: Array, count: int) -> Array:
-    """Return the states of a guess at the nodes, shape (K, count)."""
+def _sampled(guess: Guess, nodes: Array, count: int, periods: Array | None = None) -> Array:
+    """Return the states of a guess at the nodes, shape (K, count); angles, of these periods, are made continuous."""
     if isinstance(guess, Point):
         states = _meshed(guess).evaluate(guess.x, nodes * _order(guess.system))
         if states.shape[1] != count:
@@ -112,12 +144,13 @@ def _sampled(guess: Guess, nodes: Array, count: int) -> Array:
             values = [guess(t) for t in nodes]
         except Exception as error:  # a user's function may raise anything
             raise ProblemError(f"guess cannot be called: {type(error).__name__}: {error}") from error
-        return np.array([_numbers(value, count) for value in values])
+        return _continuous(np.array([_numbers(value, count) for value in values]), periods)
     if _is_pair(guess):
         t, columns = _numbers(guess[0]), _numbers(guess[1])
         if columns.size != len(t) * count:
             raise ProblemError(f"guess: {columns.size} numbers for {len(t)} places t and {count} states")
-        return np.stack([np.interp(nodes, t, column) for column in columns.reshape(len(t), count).T], axis=1)
+        known = _continuous(columns.reshape(len(t), count), periods)
+        return np.stack([np.interp(nodes, t, column) for column in known.T], axis=1)
     if guess is None:
         raise ProblemError("guess: a boundary value problem needs one (a function of t, arrays, or numbers)")
     return np.tile(_numbers(guess, count), (len(nodes), 1))

@@ -19,6 +19,7 @@ from contin.discretization.mesh import MOST_INTERVALS, MeshControl
 from contin.discretization.system import System
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.angles import winding_names
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.cycle import PERIOD, CycleProblem
 from contin.problems.statement import forget_changed, with_multipliers
@@ -83,7 +84,8 @@ def solve(
     parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
         guess = underlying(guess)
-        parameters = {**guess.parameters, **parameters}
+        read = winding_names(getattr(problem, "angles", {}))  # off the guess, as of all others
+        parameters = {**{name: value for name, value in guess.parameters.items() if name not in read}, **parameters}
     held = _check_count(problem, free)
     options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))
     system, x = first_guess(problem, guess, options)

@@ -37,8 +37,8 @@ from contin.stepping.trial import TestFunction
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          event: TestFunction | None = None, kind: str | None = None, branch: int = 0, progress: bool | None = None,
-          **options: Any) -> Branch:  # fmt: skip
+          event: TestFunction | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
+          progress: bool | None = None, **options: Any) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
     From a point of such a curve, without a further parameter, it goes on; ``kind`` takes another one that leaves there.
@@ -52,12 +52,13 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     second : str, optional
         The parameter that is free beside those of the branch.
     settings : Settings, optional
-        Or any of its fields by name. Folds of the curve are with respect to ``primary`` (the second parameter by default).
-        ``branch_points`` is False by default.
+        Or any of its fields by name. Defaults: ``primary``, of which folds are labelled, is ``second``; no ``branch_points``.
     free : pair of str, optional
         Both parameters, in place of ``second``; the first one replaces that in which the start was found.
     event : TestFunction, optional
-        The one that labelled the start, where that is one of yours (``test_functions``).
+        The one of yours (``test_functions``) that labelled the start.
+    hold : str, optional
+        A column that keeps the value of any start, such as ``"period"``; ``branch_points=True`` labels where curves cross.
     kind : str, optional
         From BT, GH, ZH, HH: ``"LP"``, ``"HB"``, ``"TR"`` or ``"homoclinic"``, as in `Point.curves`; some begin a little beside.
     branch : int
@@ -86,23 +87,25 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     >>> [(point.label, abs(point["b"]) < 1e-9) for point in folds.labelled("CP")]
     [('CP', True)]
     """
-    _check(start, event, kind, branch)
-    shown, goes_on = Progress(progress), isinstance(start.system, Extended) and (second, free, event) == (None, None, None)
-    if kind is not None and not goes_on:
-        raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
-    names = start.system.free if goes_on else _free_parameters(start, second, free)
-    options = {"branch_points": False, "primary": names[-1], **options}
-    if goes_on:
-        return _from_curve(start, kind, branch, settings_with(settings, options), shown)
-    found = _first_of_curve(start, names, event)
-    return follow_until_interrupted(Continuation(*found, settings_with(settings, options)), shown)
-
-
-def _check(start: object, event: object, kind: object, branch: object) -> None:
     checks.instance("start", start, Point, "a Point")
+    shown, new = Progress(progress), any(each is not None for each in (second, free, event, hold))
+    goes_on = isinstance(start.system, Extended) and not new
+    _check(event, hold, kind, branch, goes_on)
+    names = start.system.free if goes_on else _free_parameters(start, second, free)
+    settings = settings_with(settings, {"branch_points": False, "primary": names[-1], **options})
+    if goes_on:
+        return _from_curve(start, kind, branch, settings, shown)
+    return follow_until_interrupted(Continuation(*_first_of_curve(start, names, event, hold), settings), shown)
+
+
+def _check(event: object, hold: object, kind: object, branch: object, goes_on: bool) -> None:
     checks.instance("event", event, (TestFunction, type(None)), "a TestFunction")
     checks.instance("kind", kind, (str, type(None)), "a name")
     checks.whole("branch", branch, 0, 1)
+    if kind is not None and not goes_on:
+        raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
+    if hold is not None and event is not None:
+        raise ProblemError("hold: must be left out where event is given")
 
 
 def _from_curve(start: Point, kind: str | None, branch: int, settings: Settings, shown: Progress) -> Branch:
@@ -146,7 +149,7 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
 _First = tuple[Extended, Array]
 
 
-def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | None) -> _First:
+def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | None, hold: str | None) -> _First:
     """Return the extended system of the kind of a point.
 
     Raises
@@ -157,6 +160,8 @@ def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | No
     base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
     if event is not None:
         return _event(start, base, x, event)
+    if hold is not None:
+        return _value(_holding(start, hold), base, x)
     for kind in _KINDS if isinstance(start.system, System) else _KINDS_ON_CURVES:
         found = kind(start, base, x)
         if found is not None:
@@ -216,9 +221,31 @@ def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
 
 def _values(start: Point, base: Any, x: Array) -> _First | None:
     """A point where a column has a given value."""
-    column, value = start.column, start.value
-    if value is None or not abs(start[column] - value) <= _LOCATED * (1 + abs(value)):
+    value = start.value
+    if value is None or not abs(start[start.column] - value) <= _LOCATED * (1 + abs(value)):
         return None
+    return _value(start, base, x)
+
+
+def _holding(start: Point, column: str) -> Point:
+    """Return the point as one where a column has a given value, the one that it has.
+
+    Raises
+    ------
+    ProblemError
+        There is no such column.
+    """
+    checks.instance("hold", column, str, "the name of a column")
+    known = (*start.parameters, *start.functionals, *start.system.named_states)
+    if column not in known:
+        raise ProblemError(f"hold: {checks.shown(column)} is no column; there are {checks.listed(known)}")
+    return dataclasses.replace(start, column=column, value=start[column])
+
+
+def _value(start: Point, base: Any, x: Array) -> _First:
+    """The value of a column."""
+    column, value = start.column, start.value
+    assert value is not None
     known = base.column_gradient(x, column) is not None
     gradient = (lambda system, x: system.column_gradient(x, column)) if known else None
     return EventCurve(base, lambda trial: trial[column] - value, gradient), x

@@ -20,6 +20,7 @@ from contin.discretization.maps import MapSystem
 from contin.discretization.mesh import MeshControl
 from contin.discretization.scales import usual
 from contin.errors import ProblemError
+from contin.problems.angles import windings
 from contin.problems.cycle import PERIOD, ROUNDS, CycleProblem
 from contin.results.point import Point
 
@@ -142,12 +143,14 @@ def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array
     system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))
     mesh = np.concatenate([system.mesh, 1 + system.mesh[1:]]) / 2
     longer, factor = PERIOD if system.problem.period is None else ROUNDS, 2 if system.order % 2 else 1
-    parameters = {**point.parameters, longer: factor * point.parameters[longer]}
-    twice: Any = discretized(system.problem.doubled(), mesh, system.degree, system.free, parameters, system.scales)
+    problem, turn, gained = system.problem, system.problem.symmetry, system.gains[1]
+    further = windings(problem.angles, problem.state_names, gained + turn @ gained)
+    parameters = {**point.parameters, longer: factor * point.parameters[longer], **further}
+    twice: Any = discretized(problem.doubled(), mesh, system.degree, system.free, parameters, system.scales)
     states = system.states(x)
-    x = twice.pack(np.concatenate([states, states[1:] @ system.problem.symmetry.T]), parameters)
+    x = twice.pack(np.concatenate([states, states[1:] @ turn.T + gained]), parameters)
     found = locate_branch_point(twice.with_reference(x), x)
-    return twice.with_reference(found.x), found.x, _alternating(twice, found, system.problem.symmetry)
+    return twice.with_reference(found.x), found.x, _alternating(twice, found, turn)
 
 
 def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,15 +13,18 @@ from contin.arrays import Array
 from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
-from contin.detection.branch_point import BranchPoint
+from contin.detection.branch_point import BranchPoint, locate_branch_point
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.system import System
-from contin.errors import ProblemError
+from contin.errors import ConvergenceError, ProblemError
 from contin.linalg.orientation import oriented_along
 from contin.problems.statement import forget_changed
 from contin.results.branch import Branch
 from contin.results.point import Point, underlying
 from contin.stepping.settings import Settings, settings_with
+
+#: A branch point lies no further from where folds meet it, relative to 1 + its size: both are located to 1e-9 or better.
+_HERE = 1e-5
 
 
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
@@ -37,7 +41,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         Or any of its fields by name.
     free : sequence of str, optional
         Free parameters, if they shall differ from those of ``start``; the first is the primary one. From a point of a curve in
-        two parameters they lead to the branch of solutions through it. With ``branch=1`` at HB and PD, those of the new branch.
+        two parameters they lead to the branch of solutions through it (where folds meet a branch point, to those that cross
+        there). With ``branch=1`` at HB and PD, those of the new branch.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
         the opposite way. By default the one that it was found on, with ``direction`` that of the primary parameter.
@@ -59,7 +64,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     """
     checks.instance("start", start, Point, "a Point")
     settings, shown = settings_with(settings, options), Progress(progress)
-    start = start if free is None else underlying(start)
+    start = start if free is None else _solution(start, checks.names("free", free))
     system: Any = start.system
     x = start.x
     if isinstance(system, System) and forget_changed(system.problem):
@@ -75,6 +80,21 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         return follow_until_interrupted(Continuation(system, x, settings, _own_tangent(start, system, settings)), shown)
     tangent = settings.direction * _tangent(start, system, branch)
     return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)
+
+
+def _solution(start: Point, free: Sequence[str]) -> Point:
+    """Return the solution itself of a point of a curve; where folds meet a branch point, as that point of its branches."""
+    found = underlying(start)
+    if found is start or start.label != "BP":
+        return found
+    system, x = found.system.with_free(free, found.x)  # type: ignore[attr-defined]
+    try:
+        point = locate_branch_point(system, x)
+    except ConvergenceError:
+        return found
+    if not np.abs(point.x - x).max() < _HERE * (1 + np.abs(x).max()):
+        return found  # as at a fold in the other parameter
+    return dataclasses.replace(found, label=start.label, name=start.name, x=point.x, system=system, details=point)
 
 
 def _own_tangent(start: Point, system: Any, settings: Settings) -> Array | None:

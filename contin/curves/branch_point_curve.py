@@ -12,10 +12,14 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.curves.extended import FITS, Borders, Extended, cosine
+from contin.curves.fold_curve import shrinking
 from contin.detection.bordered import BorderedMatrix
 from contin.detection.branch_point import locate_branch_point
+from contin.detection.test_functions import own_test_functions
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
+from contin.stepping.trial import TestFunction
 
 
 class BranchPointCurve(Extended):
@@ -74,3 +78,9 @@ class BranchPointCurve(Extended):
         psi = self.borders[1]
         residual, factors = base.linearize(y, np.vstack([top, rows]), np.vstack([psi, columns[:, :-2]]))
         return np.concatenate([residual + x[-1] * psi, matrix.g]), factors
+
+
+@own_test_functions.register
+def _of_branch_point_curve(system: BranchPointCurve) -> list[TestFunction]:
+    """Cycles may shrink onto an equilibrium."""
+    return shrinking(system.base) if isinstance(system.base, PeriodicCollocation) else []

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import math
-from abc import abstractmethod
 from collections.abc import Callable
 from typing import cast
 
@@ -17,7 +16,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.curves.extended import Borders
 from contin.curves.fold_curve import FoldCurve, shrinking
-from contin.curves.multipliers import RESONANCES, Doubling, MultiplierCurve, Pair, resonances, second_doubling
+from contin.curves.multipliers import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.lyapunov import Coefficient
 from contin.detection.test_functions import own_test_functions
@@ -29,9 +28,6 @@ from contin.stepping.trial import TestFunction, Trial
 
 #: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
 _DOUBLE = 1e-3
-#: With a smaller imaginary part of the multiplier the curve is at its end, with a smaller difference of kappa at a resonance:
-#: they are located more exactly than that.
-_REAL = 1e-6
 
 
 class CycleCurve(MultiplierCurve):
@@ -78,10 +74,6 @@ class CycleCurve(MultiplierCurve):
         n = len(self.cycles.problem.state_names)
         return left[..., self.base.state_size - n : self.base.state_size]
 
-    @abstractmethod
-    def normal_form(self, x: Array) -> Coefficient:
-        """Return the coefficient of the normal form."""
-
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, and the coefficient of the normal form."""
         return np.append(super().functionals(x), self.normal_form(x).value)
@@ -111,7 +103,7 @@ class TorusCurve(Pair, CycleCurve):
 
     def normal_form(self, x: Array) -> Coefficient:
         """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
-        if self.imaginary_part(x) < _REAL or abs(self.kappa(x) - RESONANCES["R3"]) < _REAL:
+        if self.is_infinite(x):
             return Coefficient(math.nan, math.nan, math.nan)
         return NormalForms(self.cycles, x[: self.base.size]).torus(self.angle(x))
 
@@ -133,18 +125,10 @@ def _at_fold(label: str, name: str) -> TestFunction:
     return TestFunction(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)
 
 
-def _degenerate(label: str, name: str) -> TestFunction:
-    """Return the test function of points where the coefficient of the normal form is zero."""
-    return TestFunction(
-        label, name, lambda trial: _curve(trial).normal_form(trial.x).signed,
-        confirm=lambda trial: _curve(trial).normal_form(trial.x).vanishes,
-    )  # fmt: skip
-
-
 @own_test_functions.register
 def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
     """Strong resonances, Chenciner points, and folds."""
-    return [*shrinking(system.cycles), *resonances(), _degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
+    return [*shrinking(system.cycles), *resonances(), degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
 
 @own_test_functions.register
@@ -153,6 +137,6 @@ def _of_doubling_curve(system: DoublingCurve) -> list[TestFunction]:
     return [
         *shrinking(system.cycles),
         second_doubling(),
-        _degenerate("GPD", "generalized period doubling"),
+        degenerate("GPD", "generalized period doubling"),
         _at_fold("LPPD", "fold-flip"),
     ]

@@ -21,10 +21,13 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.curves.extended import FITS, Borders, Extended
+from contin.curves.fold_curve import shrinking
 from contin.detection.extrema import orthonormal
+from contin.detection.test_functions import own_test_functions
+from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.differences import derivative
 from contin.linalg.factors import Factors
-from contin.stepping.trial import Trial
+from contin.stepping.trial import TestFunction, Trial
 
 
 class EventCurve(Extended):
@@ -114,3 +117,9 @@ class EventCurve(Extended):
     ) -> tuple[Array, Factors]:
         """Return F and e, and the factored bordered matrix; the row of e comes first among the border rows."""
         return self.with_own_rows(x, (self.gradient(x)[None], np.array([self._own_value(x)])), rows, columns)
+
+
+@own_test_functions.register
+def _of_event_curve(system: EventCurve) -> list[TestFunction]:
+    """Cycles may shrink onto an equilibrium."""
+    return shrinking(system.base) if isinstance(system.base, PeriodicCollocation) else []

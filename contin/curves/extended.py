@@ -112,6 +112,11 @@ class Extended(Discretization):
         inside: Any = _Inside(factors, self)
         return self.base.newton_error(x[: self.base.size], inside)
 
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with the angles of the underlying system moved by whole rounds, nearest to those of a reference."""
+        size = self.base.size
+        return np.append(self.base.lifted(x[:size], reference[:size]), x[size:])
+
     def states(self, x: Array) -> Array:
         """Return the states of the underlying system."""
         return self.base.states(x[: self.base.size])

@@ -10,6 +10,7 @@ that of `contin.curves.multipliers`. One copy of it for k = 3, with A_j the deri
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import cast
 
@@ -17,7 +18,9 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.curves.extended import Borders
-from contin.curves.multipliers import Doubling, MultiplierCurve, Pair, resonances, second_doubling
+from contin.curves.multipliers import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
+from contin.detection.lyapunov import Coefficient
+from contin.detection.map_normal_forms import period_doubling, torus
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.maps import MapSystem
 from contin.discretization.system import System
@@ -63,21 +66,46 @@ class MapCurve(MultiplierCurve):
 
 
 class MapDoublingCurve(Doubling, MapCurve):
-    """Period doublings."""
+    """Period doublings; the column ``normal_form`` is their coefficient c."""
+
+    def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
+        super().__init__(base, borders, size, ("normal_form",))
+
+    def normal_form(self, x: Array) -> Coefficient:
+        """Return c."""
+        return period_doubling(self.cycles, x[: self.base.size]) or _UNKNOWN
+
+    def functionals(self, x: Array) -> Array:
+        """Return those of the underlying problem, and c."""
+        return np.append(super().functionals(x), self.normal_form(x).value)
 
 
 class MapTorusCurve(Pair, MapCurve):
-    """Torus bifurcations; column ``angle``, theta."""
+    """Torus bifurcations; columns ``normal_form``, Re d, and ``angle``, theta."""
 
     def __init__(self, base: System, borders: Borders | None = None, size: float = 1.0) -> None:
-        super().__init__(base, borders, size, ("angle",))
+        super().__init__(base, borders, size, ("normal_form", "angle"))
+
+    def normal_form(self, x: Array) -> Coefficient:
+        """Return the real part of d; NaN at the ends of the curve and at the resonance 1:3, where it is infinite."""
+        found = None if self.is_infinite(x) else torus(self.cycles, x[: self.base.size], self.angle(x))
+        return found or _UNKNOWN
+
+    def functionals(self, x: Array) -> Array:
+        """Return those of the underlying problem, Re d, and the angle."""
+        *known, angle = super().functionals(x)
+        return np.array([*known, self.normal_form(x).value, angle])
+
+
+#: Of long cycles, and where it is infinite.
+_UNKNOWN = Coefficient(math.nan, math.nan, math.nan)
 
 
 @own_test_functions.register
 def _of_torus_curve(system: MapTorusCurve) -> list[TestFunction]:
-    return resonances()
+    return [*resonances(), degenerate("CH", "Chenciner")]
 
 
 @own_test_functions.register
 def _of_doubling_curve(system: MapDoublingCurve) -> list[TestFunction]:
-    return [second_doubling()]
+    return [second_doubling(), degenerate("GPD", "generalized period doubling")]

@@ -24,12 +24,16 @@ from contin.arrays import Array
 from contin.curves.critical_curve import CriticalCurve
 from contin.curves.fold_curve import normal_product, turns_back
 from contin.detection.interpolated import interpolated_zero
+from contin.detection.lyapunov import Coefficient
 from contin.detection.segment import Segment, SpecialPoint
 from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
 
 #: Cosines of the angles at strong resonances.
 RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
+#: With a smaller imaginary part of the multiplier the curve is at its end, with a smaller difference of kappa at a resonance:
+#: they are located more exactly than that.
+_REAL = 1e-6
 #: Where kappa has an extremum, a value this close to that of a resonance is worth a search.
 _NEAR = 0.05
 
@@ -48,6 +52,10 @@ class MultiplierCurve(CriticalCurve):
     @abstractmethod
     def coupling(self, x: Array) -> Array:
         """Return P, shape (copies, copies)."""
+
+    @abstractmethod
+    def normal_form(self, x: Array) -> Coefficient:
+        """Return the coefficient of the normal form."""
 
     def angle(self, x: Array) -> float:
         """Return the angle of the pair of multipliers."""
@@ -92,6 +100,10 @@ class Pair(MultiplierCurve):
         result: Array = -np.einsum("ija,jk,ka->i", self.ends(left), change, self.starts(right))
         return result
 
+    def is_infinite(self, x: Array) -> bool:
+        """Return whether the coefficient of the normal form has a pole: at the ends of the curve, and at the resonance 1:3."""
+        return self.imaginary_part(x) < _REAL or abs(self.kappa(x) - RESONANCES["R3"]) < _REAL
+
     def functionals(self, x: Array) -> Array:
         """Return those of the underlying problem, and the angle."""
         return np.append(super().functionals(x), self.angle(x))
@@ -111,6 +123,14 @@ def second_doubling() -> TestFunction:
         return normal_product(curve.starts(right[0]), curve.ends(left[0, 0]))
 
     return TestFunction("R2", "resonance 1:2", double)
+
+
+def degenerate(label: str, name: str) -> TestFunction:
+    """Return the test function of points where the coefficient of the normal form is zero."""
+    return TestFunction(
+        label, name, lambda trial: _curve(trial).normal_form(trial.x).signed,
+        confirm=lambda trial: _curve(trial).normal_form(trial.x).vanishes,
+    )  # fmt: skip
 
 
 def _curve(trial: Trial) -> MultiplierCurve:

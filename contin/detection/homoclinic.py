@@ -17,6 +17,7 @@ from contin.discretization.cycles import CycleCollocation
 from contin.errors import ConvergenceError
 from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
+from contin.problems.angles import whole_rounds
 from contin.problems.cycle import PERIOD
 from contin.stepping.newton import correct
 from contin.stepping.trial import TestFunction, Trial, linearization
@@ -34,6 +35,9 @@ _MOSTLY = 0.5
 _NOTHING = 1e-13
 #: Newton's method for the equilibrium: updates at most, and the size of the last one relative to 1 + the states.
 _UPDATES, _CONVERGED = 30, 1e-10
+#: A saddle-node lies within this distance in the parameter, relative to 1 + that, where the least speed of a cycle beside it is
+#: below `_STILL`, to which it is proportional. Slow stretches of relaxation oscillations have none within 1e-2.
+_BESIDE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +51,24 @@ class RestingPlace:
         Those of the equilibrium, the largest real part first.
     share : float
         Part of the period that the cycle is near.
+    passes : int
+        How often it comes near in a period: twice where two saddles are one, as at the angles -pi and pi.
+    fold : bool
+        The equilibrium is that of a saddle-node, beside the value of the parameter.
     """
 
     states: Array
     eigenvalues: ComplexArray
     share: float
+    passes: int = 1
+    fold: bool = False
 
     def describe(self, names: tuple[str, ...]) -> str:
         """Return all that as a sentence."""
         place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, self.states))
         values = ", ".join(_number(value) for value in self.eigenvalues if value.imag >= 0)
-        return f"the cycle spends {100 * self.share:.3g} % of its time near the equilibrium {place}, eigenvalues {values}"
+        kind = ", at a fold of equilibria" if self.fold else ""
+        return f"the cycle spends {100 * self.share:.3g} % of its time near the equilibrium {place}{kind}, eigenvalues {values}"
 
 
 def _number(value: complex) -> str:
@@ -111,24 +122,63 @@ def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, Compl
             break
     else:
         return None
+    return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), _spectrum(system, x, states)
+
+
+def _spectrum(system: CycleCollocation, x: Array, states: Array) -> ComplexArray:
+    """Return the eigenvalues of an equilibrium, the largest real part first."""
     values = eigenvalues(system.rates_by_states(x, states[None])[0]) / system.unit_time(x)
-    return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), values[np.argsort(-values.real)]
+    found: ComplexArray = values[np.argsort(-values.real)]
+    return found
+
+
+def _fold_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
+    """Return the equilibrium of a saddle-node beside a cycle, as `equilibrium_beside` does; None where there is none.
+
+    Beyond a saddle-node there is no equilibrium. That of the nearest value of the parameter p comes from Newton's method for
+    F(u, p) = 0 with the smallest updates of u and p. On slow stretches of relaxation oscillations it is far away.
+    """
+    at = next(system.parameter_index(name) for name in system.free if name != PERIOD)
+    points, y = system.at_gauss_points(x), x.copy()
+    states = points[first_least(_speeds(system, x))].copy()
+    step = np.sqrt(np.finfo(float).eps) * (1 + abs(x[at]))
+    for _ in range(_UPDATES):
+        ahead, rates = y.copy(), system.rates(y, states[None])[0]
+        ahead[at] += step
+        slope = (system.rates(ahead, states[None])[0] - rates) / step
+        matrix = np.column_stack([system.rates_by_states(y, states[None])[0], slope])
+        if not np.all(np.isfinite(matrix)):
+            return None
+        update = np.linalg.lstsq(matrix, -rates)[0]
+        states += update[:-1]
+        y[at] += update[-1]
+        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(states).max()):
+            near = abs(y[at] - x[at]) <= _BESIDE * (1 + abs(x[at]))
+            return (states, _spectrum(system, y, states)) if near else None
+    return None
 
 
 def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
     """Return the equilibrium near which a cycle spends most of its time; None where there is none."""
     points, speeds = system.at_gauss_points(x), _speeds(system, x)
-    found = equilibrium_beside(system, x) if speeds.min() < _SLOW * speeds.max() else None
+    if not speeds.min() < _SLOW * speeds.max():
+        return None
+    found = equilibrium_beside(system, x)
+    fold = found is None
+    found = _fold_beside(system, x) if found is None else found
     if found is None:
         return None
     states, eigenvalues = found
     size = np.ptp(points, axis=0)
-    near = np.abs((points - states) / np.where(size > 0, size, 1.0)).max(axis=1) < _NEAR
+    apart = points - states
+    apart = apart - whole_rounds(apart, system.circles)
+    near = np.abs(apart / np.where(size > 0, size, 1.0)).max(axis=1) < _NEAR
     share = float(system.gauss_weights @ near)
     if share < _MOSTLY:
         return None
     scales = np.ones(len(states)) if system.scales is None else system.scales.states
-    return RestingPlace(states * scales, eigenvalues, share)
+    passes = max(int(np.count_nonzero(near & ~np.roll(near, 1))), 1)
+    return RestingPlace(states * scales, eigenvalues, share, passes, fold)
 
 
 @dataclass(frozen=True)
@@ -145,18 +195,22 @@ class Limit:
         return f"as the period grows, {self.name} tends to {self.value:.{places}f} +- {self.error:.1g}"
 
 
-def limit_of_parameter(system: CycleCollocation, x: Array, eigenvalues: ComplexArray) -> Limit | None:
+def limit_of_parameter(system: CycleCollocation, x: Array, place: RestingPlace) -> Limit | None:
     """Return the limit of the free parameter p on a branch that tends to a homoclinic orbit; None where it is not known.
 
-    Near a saddle p - limit = A exp(-k T), with the eigenvalue k or -k that is nearest to the imaginary axis, so that the limit
-    is p + (dp/dT) / k. The error is its difference from that of a cycle with half the rate dp/dT, where the next exponentials
-    are larger, and from that on the mesh halved. Of a complex leading eigenvalue p oscillates, and is not extrapolated.
+    Near a saddle p - limit = A exp(-k T), with the eigenvalue k or -k that is nearest to the imaginary axis, over the number of
+    passes in a period, so that the limit is p + (dp/dT) / k. The error is its difference from that of a cycle with half the
+    rate dp/dT, where the next exponentials are larger, and from that on the mesh halved. Of a complex leading eigenvalue p
+    oscillates, and is not extrapolated.
     """
+    if place.fold:
+        return None
+    eigenvalues = place.eigenvalues
     (name, *_), rates = [name for name in system.free if name != PERIOD], np.abs(eigenvalues.real)
     leading = eigenvalues[rates.argmin()]
     if leading.imag or not rates.min() > 0 or len(set(np.sign(eigenvalues.real))) < 2:
         return None
-    k = float(rates.min()) / system.order
+    k = float(rates.min()) / (system.order * place.passes)
     try:
         value = _extrapolated(system, x, (name, k), 0.0)
         shorter = _extrapolated(system, x, (name, k), np.log(2) / k)

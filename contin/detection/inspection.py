@@ -345,6 +345,7 @@ class Inspection:
         size = state.system.state_size
         if np.max(np.abs(x[size:] - trial.x[size:])) > _REACH * step:
             return None
+        x = state.system.lifted(x, trial.x)
         first, (leaving,) = in_phase(state.system, x, (tangent,), trial.x)
         passed = [inner(state.system, end - first, leaving) for end in (state.x, trial.x)]
         if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, leaving) < _SAME_WAY:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.discretization.cycles import CycleCollocation, ForcedCollocation
+from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
+from contin.problems.angles import whole_rounds
 
 #: Places at which two cycles are compared: a power of two for the Fourier transform, more than any cycle needs.
 _PLACES = 2048
@@ -28,9 +31,9 @@ def lasting(system: Discretization, x: Array) -> Array:
 
 @lasting.register
 def _of_one_cycle(system: CycleCollocation, x: Array) -> Array:
-    """Free parameters, means of the states, and the norm of the cycle without its mean."""
+    """Free parameters, means of the states that are no angles, and the norm of the cycle without its mean."""
     size, n = system.state_size, len(system.problem.state_names)
-    states = x[:size].reshape(-1, n)
+    states = x[:size].reshape(-1, n)[:, system.circles == 0]
     weights = system.weights[:size:n]
     means = weights @ states
     square = weights @ np.einsum("ka,ka->k", states, states) - means @ means
@@ -39,19 +42,22 @@ def _of_one_cycle(system: CycleCollocation, x: Array) -> Array:
 
 @functools.singledispatch
 def in_phase(system: Discretization, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
-    """Return a solution and vectors at it as they are; an autonomous cycle shifted in time to lie closest to another one."""
-    return x, list(vectors)
+    """Return a solution and vectors at it, the solution with angles nearest to those of another one.
+
+    An autonomous cycle is shifted in time to lie closest to that.
+    """
+    return system.lifted(x, reference), list(vectors)
 
 
 @in_phase.register
 def _of_cycles(system: CycleCollocation, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
-    times = (system.nodes + _shift(system, x, reference)) % system.order
-    size = system.state_size
+    shift, size = _shift(system, x, reference), system.state_size
+    times = (system.nodes + shift) % system.order
 
     def moved(vector: Array) -> Array:
-        return np.concatenate([system.evaluate_scaled(vector, times).ravel(), vector[size:]])
+        return np.concatenate([system.perturbation(vector, times).ravel(), vector[size:]])
 
-    return moved(x), [moved(vector) for vector in vectors]
+    return system.lifted(system.moved(x, shift), reference), [moved(vector) for vector in vectors]
 
 
 @in_phase.register
@@ -68,34 +74,71 @@ def _of_forced_cycles(
         shift, sign = place
         if shift == 0:
             return vector.copy()
-        return np.concatenate([sign * system.evaluate_scaled(vector, (system.nodes + shift) % 1).ravel(), vector[size:]])
+        return np.concatenate([sign * system.perturbation(vector, (system.nodes + shift) % 1).ravel(), vector[size:]])
+
+    def orbit(place: tuple[float, float]) -> Array:
+        shift, sign = place
+        later = system.moved(x, shift)
+        later[:size] *= sign
+        return system.lifted(later, reference)
 
     def apart(place: tuple[float, float]) -> float:
-        gap = moved(x, place) - reference
+        gap = orbit(place) - reference
         return float(system.weights @ gap**2)
 
     nearest = min(places, key=apart)
-    return moved(x, nearest), [moved(vector, nearest) for vector in vectors]
+    return orbit(nearest), [moved(vector, nearest) for vector in vectors]
+
+
+@in_phase.register
+def _of_maps(system: MapSystem, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+    """A cycle of several points may begin with any of them."""
+
+    def apart(shift: int) -> float:
+        gap = system.lifted(system.moved(x, shift), reference) - reference
+        return float(system.weights @ gap**2)
+
+    nearest = min(range(system.rounds), key=apart)
+    turned = [vector.copy() for vector in vectors]
+    for vector in turned:
+        system.states(vector)[:] = np.roll(system.states(vector), -nearest, axis=0)
+    return system.lifted(system.moved(x, nearest), reference), turned
 
 
 def _is_odd(system: ForcedCollocation, x: Array) -> bool:
-    """Return whether -u(t + T / 2) is a solution where u is one, T the period of the forcing."""
-    shifted = system.evaluate_scaled(x, (system.nodes + 0.5 / system.rounds) % 1)
-    image = np.concatenate([-shifted.ravel(), x[system.state_size :]])
+    """Return whether -u(t + T / 2) is a solution where u is one, T the period of the forcing; it never goes round as u."""
+    if system.rotates:
+        return False
+    image = system.moved(x, 0.5 / system.rounds)
+    image[: system.state_size] *= -1
     size = np.abs(system.residual(np.where(np.arange(x.size) < system.state_size, -x, x))).max()
     return bool(np.abs(system.residual(image)).max() <= _SAME * size)
 
 
 def _shift(system: CycleCollocation, x: Array, reference: Array) -> float:
-    """Return the s at which the integral of u(t + s) . v(t) is largest, v the reference."""
-    t = system.order * np.arange(_PLACES) / _PLACES
-    ours, theirs = (np.fft.fft(system.evaluate_scaled(z, t), axis=0) for z in (x, reference))
+    """Return the s at which the integral of |u(t + s) - v(t)|^2 is least, v the reference; angles up to whole rounds.
+
+    With u = a t + w, where angles gain a in the whole cycle, and w periodic, it is the integral of w(t + s) . w_v(t), both
+    without their means, less half the square of a s + the mean of u - v, up to whole rounds, that is largest.
+    """
+    part = np.arange(_PLACES) / _PLACES
+    gained = system.gains[-1] if system.scales is None else system.gains[-1] / system.scales.states
+    orbits = [system.evaluate_scaled(z, system.order * part) - part[:, None] * gained for z in (x, reference)]
+    means = orbits[0].mean(axis=0) - orbits[1].mean(axis=0)
+    ours, theirs = (np.fft.fft(orbit, axis=0) for orbit in orbits)
     products = np.sum(ours * theirs.conj(), axis=1)
     frequencies = 2 * np.pi * np.fft.fftfreq(_PLACES, 1 / _PLACES)
-    s = float(np.fft.ifft(products).real.argmax()) / _PLACES
+
+    def drift(s: Any) -> Array:
+        """Return a s + the mean of u - v, of angles that rotate, up to whole rounds."""
+        apart = np.where(gained != 0, np.multiply.outer(s, gained) + means, 0.0)
+        return apart - whole_rounds(apart, system.circles)
+
+    s = float((np.fft.ifft(products).real / _PLACES - (drift(part) ** 2).sum(axis=1) / 2).argmax()) / _PLACES
     for _ in range(_STEPS):
-        waves = products * np.exp(1j * frequencies * s)
-        slope, bend = float((1j * frequencies * waves).sum().real), float((-(frequencies**2) * waves).sum().real)
+        waves = products * np.exp(1j * frequencies * s) / _PLACES**2
+        slope = float((1j * frequencies * waves).sum().real - gained @ drift(s))
+        bend = float((-(frequencies**2) * waves).sum().real - gained @ gained)
         if not bend < 0:
             break
         s -= slope / bend

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from contin.detection import map_normal_forms
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.floquet import doubling, has_double_one, torus
 from contin.detection.homoclinic import homoclinic, limit_of_parameter, resting_place
@@ -168,6 +169,20 @@ def _of_bifurcations_of_cycles(system: PeriodicCollocation, point: SpecialPoint)
         return NormalForms(system, point.trial.x).torus(point.details["frequency"])
 
 
+@own_normal_form.register
+def _of_bifurcations_of_maps(system: MapSystem, point: SpecialPoint) -> Coefficient | None:
+    """The coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
+    x = point.trial.x
+    with np.errstate(all="ignore"):
+        if point.label == "LP" and point.details is None and point.is_located:
+            return map_normal_forms.fold(system, x)
+        if point.label not in ("PD", "TR") or not _is_simple(point):
+            return None
+        if point.label == "PD":
+            return map_normal_forms.period_doubling(system, x)
+        return map_normal_forms.torus(system, x, point.details["frequency"])
+
+
 def _is_simple(point: SpecialPoint) -> bool:
     """Return whether one eigenvalue or pair is critical at a located point."""
     simple = isinstance(point.details, dict) and point.details.get("pairs") == 1
@@ -183,7 +198,9 @@ def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficien
     found = found._replace(error=found.error + abs(found.value - coarse.value))
     value, error = ({} if found.is_meaningless else {"normal_form": found.value}), found.error
     details = {**(point.details or {}), **value, "normal_form_error": error}
-    kind = ", supercritical" if found.value < -error else ", subcritical" if found.value > error else ""
+    side = -1 if point.label == "PD" and isinstance(point.trial.system, MapSystem) else 1
+    attracts, repels = side * found.value < -error, side * found.value > error
+    kind = ", supercritical" if attracts else ", subcritical" if repels else ""
     return dataclasses.replace(point, name=point.name + kind * (point.label != "LP"), details=details)
 
 
@@ -236,7 +253,7 @@ def _of_slow_cycles(system: CycleCollocation, trial: Trial, stop: Stop) -> Stop:
     if place is None:
         return stop
     message = f"{stop.message}; {place.describe(cycles.problem.states)}"
-    limit = limit_of_parameter(cycles, trial.x, place.eigenvalues)
+    limit = limit_of_parameter(cycles, trial.x, place)
     if limit is None:
         return dataclasses.replace(stop, message=message)
     details = {f"limit_{limit.name}": limit.value, f"limit_{limit.name}_error": limit.error}

@@ -21,6 +21,7 @@ from contin.linalg.factors import Factors
 from contin.linalg.rightmost import nearest, rightmost
 from contin.linalg.sparse import SparseFactors
 from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.angles import whole_rounds
 
 
 class Algebraic(System):
@@ -74,6 +75,15 @@ class Algebraic(System):
         """Return the states, shape (1, n)."""
         states = x[: self.state_size].reshape(1, -1)
         return states if self.scales is None else states * self.scales.states
+
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that they are nearest to those of a reference."""
+        if not self.circles.any():
+            return x
+        apart = (reference - x)[: self.state_size].reshape(-1, self.circles.size)
+        moved = x.copy()
+        moved[: self.state_size] += whole_rounds(apart, self.circles).ravel()
+        return moved
 
     def residual(self, x: Array) -> Array:
         """Return F at x, shape (equations,)."""

@@ -15,6 +15,7 @@ from contin.discretization.multilinear import Numbers, shares, subsets
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
 from contin.errors import ConvergenceError
+from contin.problems.angles import WINDING, check_windings
 from contin.problems.connection import ConnectionProblem
 
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
@@ -47,6 +48,7 @@ class ConnectionCollocation(Conditioned):
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
+        check_windings(problem.angles, self.free, dict(zip(problem.parameters, map(float, self.parameters))))
         self._further = sum(problem.conditions) + 1
         self.equations = self._conditions + self._further
         self.reference: Array = np.empty(0)
@@ -74,8 +76,12 @@ class ConnectionCollocation(Conditioned):
         """Return the coordinates of the first and of the last equilibrium in the user's units, shape (m, n) each."""
         n, names = self._n, list(self.problem.parameters)
         first = names.index(self.problem.multipliers[0])
-        last = first if self.problem.homoclinic else first + n
-        return [p[:, place : place + n] for place in (first, last)]
+        if not self.problem.homoclinic:
+            return [p[:, place : place + n] for place in (first, first + n)]
+        here, gained = p[:, first : first + n], np.zeros((len(p), n))
+        for name, period in self.problem.angles.items():
+            gained[:, self.problem.state_names.index(name)] = period * p[:, names.index(WINDING + name)]
+        return [here, here + gained]
 
     def _jacobian_at(self, place: Array, p: Array) -> Array:
         """Return the derivatives of the field by the states at one place, scaled, for values of all parameters."""

@@ -24,6 +24,7 @@ from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks
 from contin.linalg.periodic import log_eigenvalues, log_eigenvalues_along
 from contin.linalg.transitions import interval_matrices, transitions
+from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
 from contin.problems.cycle import PERIOD, CycleProblem, rounds_of
 
 #: A pair on the unit circle that is this near to -1, as an angle, is no torus bifurcation: round-off of a double one is its
@@ -67,6 +68,10 @@ class PeriodicCollocation(Collocation):
         self.order = problem.order
         sizes = np.ones(self._n) if scales is None else scales.states
         self._turn: Array = problem.symmetry * sizes / sizes[:, None]
+        values = dict(zip(problem.parameters, map(float, self.parameters)))
+        check_windings(problem.angles, self.free, values)
+        #: What angles have gained after 0, 1, ... of the parts that a symmetry divides the cycle into, shape (order + 1, n).
+        self.gains: Array = _gains(gain(problem.angles, problem.state_names, values), problem.symmetry, self.order)
 
     @property
     def turn(self) -> Array:
@@ -93,21 +98,57 @@ class PeriodicCollocation(Collocation):
         half = np.linalg.matrix_power(self.problem.symmetry, (self.order + 1) // 2) if self.order > 1 else None
         later = self.evaluate(x, (self.nodes + 0.5) % self.order)
         states = states if half is None else states @ half.T
-        return bool(np.all(np.abs(states - later).max(axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
+        apart = states - later
+        apart = apart - whole_rounds(apart, periods_of(self.problem))
+        return bool(np.all(np.abs(apart).max(axis=0) <= _SHRUNK * (1 + np.abs(states).max(axis=0))))
 
     def _interpolated(self, x: Array, times: Array) -> Array:
-        """Return the piecewise polynomial of the values in x, beyond the unit interval by the symmetry."""
-        if self.order == 1 or (times.min() >= 0 and times.max() <= 1):
-            return super()._interpolated(x, times)
-        turns = np.floor(times).astype(int)
+        """Return the piecewise polynomial of the values in x, beyond the unit interval by the symmetry, without gains."""
+        turns = _turns(times)
         values = super()._interpolated(x, times - turns)
+        if self.order == 1 or not turns.any():
+            return values
         powers = np.array([np.linalg.matrix_power(self.turn, k) for k in range(self.order)])
         found: Array = np.einsum("mab,mb->ma", powers[turns % self.order], values)
         return found
 
+    def evaluate(self, x: Array, times: Array) -> Array:
+        """Return the states at ``times`` (m,), any number of rounds on, shape (m, n)."""
+        states, turns = super().evaluate(x, times), _turns(times)
+        if not self.rotates or not turns.any():
+            return states
+        rounds, parts = np.divmod(turns, self.order)
+        found: Array = states + rounds[:, None] * self.gains[-1] + self.gains[parts]
+        return found
+
+    def perturbation(self, v: Array, times: Array) -> Array:
+        """Return the states of a perturbation, divided by their sizes, at ``times`` (m,), shape (m, n): angles gain nothing."""
+        return self._interpolated(v, times)
+
     def evaluate_scaled(self, x: Array, times: Array) -> Array:
-        """Return the states divided by their sizes at ``times`` (m,), shape (m, n); of perturbations, too."""
-        return self._interpolated(x, times)
+        """Return the states divided by their sizes at ``times`` (m,), any number of rounds on, shape (m, n)."""
+        states = self.evaluate(x, times)
+        return states if self.scales is None else states / self.scales.states
+
+    def moved(self, x: Array, shift: float) -> Array:
+        """Return a cycle that begins later by ``shift``, in units of the part that is computed."""
+        if shift == 0:
+            return x.copy()
+        return np.concatenate([self.evaluate_scaled(x, self.nodes + shift).ravel(), x[self.state_size :]])
+
+    @property
+    def rotates(self) -> bool:
+        """An angle goes round."""
+        return bool(self.gains.any())
+
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that they are nearest to those of a reference in the mean."""
+        if not self.circles.any():
+            return x
+        apart = self._scaled_states(reference) - self._scaled_states(x)
+        moved = x.copy()
+        self._scaled_states(moved)[:] += whole_rounds(self.weights[: self.state_size : self._n] @ apart, self.circles)
+        return moved
 
     # --- columns -------------------------------------------------------------------------------------------------
 
@@ -117,8 +158,13 @@ class PeriodicCollocation(Collocation):
         return tuple(self.problem.means)
 
     def functionals(self, x: Array) -> Array:
-        """Return the largest and smallest values of each state, and the means of the user's functionals."""
+        """Return the largest and smallest values of each state, and the means of the user's functionals.
+
+        An angle that rotates takes all values: the largest is half a period, the smallest minus that.
+        """
         found = extremes(self.degree, *self._whole(x), self._n)
+        round_ = self.gains[-1] != 0
+        found[round_] = self.circles[round_, None] * [0.5, -0.5]
         if self.scales is not None:
             found *= self.scales.states[:, None]
         own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
@@ -130,7 +176,8 @@ class PeriodicCollocation(Collocation):
         if self.order == 1:
             return self.mesh, x
         states = x[: len(self.nodes) * self._n].reshape(-1, self._n)
-        parts = [states @ np.linalg.matrix_power(self.turn, k).T for k in range(self.order)]
+        gains = self.gains if self.scales is None else self.gains / self.scales.states
+        parts = [states @ np.linalg.matrix_power(self.turn, k).T + gains[k] for k in range(self.order)]
         values = np.concatenate([*(part[:-1] for part in parts), parts[-1][-1:]])
         mesh = (np.arange(self.order)[:, None] + self.mesh[:-1]).ravel() / self.order
         return np.append(mesh, 1.0), values.ravel()
@@ -293,6 +340,8 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         [ u(0) - u(1)   ]
         [ phase row . x ]
 
+    An angle that rotates gains whole rounds, which u(0) - u(1) contains; the phase row is then applied to u - v.
+
     Attributes
     ----------
     reference : ndarray, shape (K, n)
@@ -312,13 +361,15 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         """Take the phase row from an orbit, states at the nodes."""
         self.reference = reference
         self._amplitude: Array | None = None
-        self._phase = self.phase_row(reference if self.scales is None else reference / self.scales.states)
+        scaled = reference if self.scales is None else reference / self.scales.states
+        self._phase = self.phase_row(scaled)
+        self._target = float(self._phase[: self.state_size] @ scaled.ravel()) if self.rotates else 0.0
 
     # --- the discrete equations ----------------------------------------------------------------------------------
 
     def condition_values(self, x: Array) -> Array:
         """Return the phase condition, shape (1,)."""
-        return np.array([self._phase @ x])
+        return np.array([self._phase @ x - self._target])
 
     def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
         """Return the phase condition and its row."""
@@ -438,6 +489,20 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         other = self._with(mesh=mesh)
         other._set_reference(self._between(self.states(x), other.nodes))
         return other, self.carrier(other)
+
+
+def _turns(times: Array) -> Indices:
+    """Return how many parts lie between times and the unit interval, whose both ends belong to it."""
+    inside = not times.size or (times.min() >= 0 and times.max() <= 1)
+    return np.zeros(times.shape, dtype=int) if inside else np.floor(times).astype(int)
+
+
+def _gains(once: Array, symmetry: Array, order: int) -> Array:
+    """Return what angles have gained after 0, 1, ... parts with u(1) = S u(0) + once, shape (order + 1, n)."""
+    found = [np.zeros(once.size)]
+    for _ in range(order):
+        found.append(symmetry @ found[-1] + once)
+    return np.array(found)
 
 
 def is_opposite(frequency: float) -> bool:

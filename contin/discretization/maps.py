@@ -14,6 +14,7 @@ from contin.discretization.rounding import on_circle
 from contin.discretization.scales import Scales
 from contin.functions.batch import Batch
 from contin.linalg.periodic import log_eigenvalues
+from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.cycle import ROUNDS, rounds_of
 from contin.problems.map import MapProblem
 
@@ -39,7 +40,7 @@ class MapSystem(Algebraic):
                           [               ...    -1      ...  ]
                           [  -1                  A_k     B_k  ]
 
-    Columns are those of u_1; the norm is the root mean square over the cycle.
+    Angles gain whole rounds, u_(k+1) = u_1 + `gain`. Columns are those of u_1; the norm is the root mean square over the cycle.
 
     Raises
     ------
@@ -56,7 +57,11 @@ class MapSystem(Algebraic):
         scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, free, parameters)
-        self.rounds = rounds_of(self.free, dict(zip(problem.parameters, map(float, self.parameters))))
+        values = dict(zip(problem.parameters, map(float, self.parameters)))
+        self.rounds = rounds_of(self.free, values)
+        check_windings(problem.angles, self.free, values)
+        #: What the angles gain over the cycle, shape (n,).
+        self.gain = gain(problem.angles, problem.state_names, values)
         self._n = len(problem.state_names)
         self.state_size = self.equations = self._n * self.rounds
         self.size = self.state_size + len(self.free)
@@ -124,10 +129,55 @@ class MapSystem(Algebraic):
         images: Array = self.problem.batch("map").values(*self._arguments(x, states))
         return images
 
+    def _missed(self, x: Array, images: Array) -> Array:
+        """Return f(u_j) - u_(j+1), shape (equations,), of the images f(u_j); the last one gains whole rounds of angles."""
+        gaps = images - np.roll(self.states(x), -1, axis=0)
+        gaps[-1] -= self.gain
+        return gaps.ravel()
+
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that those of the first point are nearest to those of a reference."""
+        if not self.circles.any():
+            return x
+        moved = x.copy()
+        self.states(moved)[0] += whole_rounds(self.states(reference)[0] - self.states(x)[0], self.circles)
+        moved = self.continuous(moved)
+        # y' = y + ..., x' = x + y' of a standard map: one round more of y changes what x gains, and is another cycle here
+        return x if whole_rounds(self.gained(moved) - self.gain, self.circles).any() else moved
+
+    def moved(self, x: Array, shift: int) -> Array:
+        """Return a cycle that begins with a later point."""
+        moved = x.copy()
+        states = self.states(x)
+        self.states(moved)[:] = np.concatenate([states[shift:], states[:shift] + self.gain])
+        return moved
+
+    def continuous(self, x: Array) -> Array:
+        """Return x with angles moved by whole rounds, so that each point is nearest to the image of the one before."""
+        x = x.copy()
+        states = self.states(x)
+        for at in range(1, self.rounds):
+            states[at] += whole_rounds(self._images(x, states[at - 1 : at])[0] - states[at], self.circles)
+        return x
+
+    def with_rounds_of(self, x: Array, given: Mapping[str, float]) -> tuple[MapSystem, Array]:
+        """Return the system with the winding numbers that x has, unless they are given, and a continuous x."""
+        if not self.circles.any():
+            return self, x
+        x = self.continuous(x)
+        read = windings(self.problem.angles, self.problem.state_names, self.gained(x))
+        other = self.with_parameters({name: given.get(name, value) for name, value in read.items()})
+        assert isinstance(other, MapSystem)
+        return other, x
+
+    def gained(self, x: Array) -> Array:
+        """Return the image of the last point less the first one, shape (n,)."""
+        states = self.states(x)
+        return np.asarray(self._images(x, states[-1:])[0] - states[0])
+
     def residual(self, x: Array) -> Array:
         """Return f(u_j) - u_(j+1), shape (equations,)."""
-        states = self.states(x)
-        return (self._images(x, states) - np.roll(states, -1, axis=0)).ravel()
+        return self._missed(x, self._images(x, self.states(x)))
 
     def _derivatives(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
         """Return f at all points, (rounds, n), and its derivatives by states and these parameters."""
@@ -143,7 +193,7 @@ class MapSystem(Algebraic):
         """Return the residual, and its derivatives by the states and by these parameters."""
         n, k, size = self._n, self.rounds, self.state_size
         values, jacobians = self._derivatives(x, names)
-        residual = (values - np.roll(self.states(x), -1, axis=0)).ravel()
+        residual = self._missed(x, values)
         at = np.arange(size).reshape(k, n)
         following = np.roll(at, -1, axis=0)
         if not self.is_sparse:
@@ -242,14 +292,16 @@ class MapSystem(Algebraic):
         if self.rounds % 2:
             return False
         first, second = np.split(self.states(x), 2)
-        return bool(np.all(np.abs(second - first) <= _SHRUNK * (1 + np.abs(first))))
+        apart = second - first
+        apart = apart - whole_rounds(apart, self.circles)
+        return bool(np.all(np.abs(apart) <= _SHRUNK * (1 + np.abs(first))))
 
     def doubled(self, x: Array) -> tuple[MapSystem, Array]:
         """Return the same problem with twice the rounds, and x for it."""
-        other = self.with_parameters({ROUNDS: 2.0 * self.rounds})
-        assert isinstance(other, MapSystem)
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
-        return other, other.pack(np.tile(self.states(x), (2, 1)), values)
+        other, states = self.with_parameters({ROUNDS: 2.0 * self.rounds}), self.states(x)
+        assert isinstance(other, MapSystem)
+        return other.with_rounds_of(other.pack(np.concatenate([states, states + self.gain]), values), {})
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapSystem, Array]:
         """Return the same."""

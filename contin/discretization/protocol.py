@@ -87,6 +87,10 @@ class Discretization(Equations, Protocol):
         """Return what Newton's method or round-off has left, measured in the same way."""
         return 0.0
 
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return the same solution with its angles moved by whole rounds, so that they are nearest to those of a reference."""
+        return x
+
     @property
     def named_states(self) -> tuple[str, ...]:
         """Names of the states that are columns: those that are numbers, no functions of t."""

@@ -16,6 +16,7 @@ from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import ScaledBatch, Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
+from contin.problems.angles import periods_of
 from contin.problems.statement import Statement, with_multipliers
 
 
@@ -107,6 +108,12 @@ class System(Discretization):
             return np.ones(self.size)
         count = self.state_size // self.scales.states.size
         return np.concatenate([np.tile(self.scales.states, count), self.free_scales])
+
+    @functools.cached_property
+    def circles(self) -> Array:
+        """Periods of the states that are angles, divided by their sizes, and zero for the others, shape (n,)."""
+        periods = periods_of(self.problem)
+        return periods if self.scales is None else periods / self.scales.states
 
     def magnitudes(self, x: Array) -> Array:
         """Return the largest value of each state, and each free parameter, in the places of the unknowns, shape (size,)."""

@@ -16,6 +16,7 @@ from contin.arrays import Array, Function, Indices
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
+from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 
@@ -44,6 +45,9 @@ class AlgebraicProblem(Restated):
     pattern : sparse matrix, array of bool, or pair of arrays, optional
         Which equations depend on which states: a matrix (equations, states) whose entries that are not zero count, or the
         numbers of equations and of states, from 0. It is found by tracing the residual otherwise.
+    angles : sequence of str, or mapping of str to float, optional
+        States in which the residual is periodic, with the period 2 pi or, in a mapping, any other. Solutions that differ by
+        whole rounds are the same: a branch that comes back one round on is closed.
 
     A Jacobian or pattern is compared with differences of the residual once, near the first solution.
 
@@ -67,6 +71,7 @@ class AlgebraicProblem(Restated):
     count: int | None = None
     jacobian: Function | None = None
     pattern: Any = None
+    angles: Any = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
@@ -83,6 +88,12 @@ class AlgebraicProblem(Restated):
             _ = self._sparsity  # checked
         if self.dynamics and self.equation_size != len(self.state_names):
             object.__setattr__(self, "dynamics", False)
+        object.__setattr__(self, "angles", angle_periods(self.angles, self.state_names))
+        self._check_angles()
+
+    def _check_angles(self) -> None:
+        if self.angles:
+            check_periodic("residual", self.batch("residual"), self.angles, self.parameters)
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from contin.arrays import Function
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature
+from contin.problems.angles import Angles, angle_periods, check_periodic, winding_names
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
 from contin.problems.vector_field import check_field, found_elsewhere, returning, scaled
@@ -26,7 +27,8 @@ class ConnectionProblem(BoundaryValueProblem):
     is tangent to the stable manifold of the last one (projection conditions, Beyn 1990). A phase condition keeps it from
     sliding along itself. The equilibria are found along: their coordinates are the parameters ``from_`` + state and ``to_`` +
     state, which are free on every curve and need not be named. An orbit that returns to its equilibrium (homoclinic) has no
-    ``to_``.
+    ``to_``. Where it ends at the image of that equilibrium after whole rounds of an angle phi, their number is the parameter
+    ``winding_phi``, which is read off the guess, unless it is given.
 
     The error of cutting off is about the square of the column ``gap``, the largest distance of an end from its equilibrium
     divided by the size of the orbit. A longer ``time`` makes it smaller.
@@ -42,11 +44,13 @@ class ConnectionProblem(BoundaryValueProblem):
         Dimension of the unstable manifold of the first equilibrium.
     stable : int, optional
         Dimension of the stable manifold of the last equilibrium; without it the orbit is homoclinic.
+    angles : sequence of str, or mapping of str to float, optional
+        Of homoclinic orbits, states in which the field is periodic, with the period 2 pi or, in a mapping, any other.
 
     Raises
     ------
     ProblemError
-        A name, function or dimension that cannot be used.
+        A name, function or dimension that cannot be used; a field that is not periodic in an angle.
 
     Notes
     -----
@@ -72,10 +76,11 @@ class ConnectionProblem(BoundaryValueProblem):
     unstable: int
     stable: int
     homoclinic: bool
+    angles: Mapping[str, float]
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *, unstable: int,
-        stable: int | None = None,
+        stable: int | None = None, angles: Angles = (),
     ) -> None:  # fmt: skip
         names = check_statement(states, parameters, {})
         homoclinic, count = stable is None, len(names)
@@ -83,7 +88,10 @@ class ConnectionProblem(BoundaryValueProblem):
         if stable is not None:
             checks.whole("stable", stable, 1, count)
         first, last = ([kind + name for name in names] for kind in ("from_", "to_"))
-        own = [TIME, *first] if homoclinic else [TIME, *first, *last]
+        periods = angle_periods(angles, names)
+        if periods and not homoclinic:
+            raise ProblemError("angles: must be left out where stable is given, as both equilibria are known then")
+        own = [TIME, *first, *winding_names(periods)] if homoclinic else [TIME, *first, *last]
         for name in own:
             if name in parameters:
                 raise ProblemError(f"parameters: {name} is a parameter of every connection by itself")
@@ -92,11 +100,14 @@ class ConnectionProblem(BoundaryValueProblem):
         check_field(field, signature, "must be a function of (u, p)")
         object.__setattr__(self, "field", field)
         object.__setattr__(self, "homoclinic", homoclinic)
+        object.__setattr__(self, "angles", periods)
         object.__setattr__(self, "unstable", unstable)
         object.__setattr__(self, "stable", count - unstable if stable is None else stable)
         rhs, boundary = scaled(field, TIME), _at_rest(field, names, homoclinic)
         super().__init__(rhs, boundary, names, {**parameters, TIME: 1.0, **dict.fromkeys(own[1:], 0.0)})
         object.__setattr__(self, "functionals", {"gap": found_elsewhere})
+        if periods:
+            check_periodic("field", self.batch("vector field"), periods, self.parameters)
 
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""

@@ -16,8 +16,9 @@ from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature
 from contin.problems.algebraic import AlgebraicProblem
+from contin.problems.angles import WINDING, Angles, angle_periods, check_periodic, winding_names
 from contin.problems.boundary_value import BoundaryValueProblem
-from contin.problems.cycle_symmetry import averaged, check_equivariance, image, order_of, symmetry_matrix
+from contin.problems.cycle_symmetry import averaged, check_equivariance, check_lattice, image, order_of, symmetry_matrix
 from contin.problems.statement import check_statement
 from contin.problems.vector_field import check_field, found_elsewhere, of_parameters, returning, scaled
 
@@ -43,6 +44,10 @@ class CycleProblem(BoundaryValueProblem):
     Of a forced field there is no phase condition, and the period is a column: that of the forcing times the parameter
     ``rounds``, the number of periods of the forcing after which the cycle closes.
 
+    States that are angles may gain whole rounds: u(1) = u(0) + 2 pi k. The winding number k of the angle phi is the parameter
+    ``winding_phi``, which is read off the guess, unless it is given, and cannot be free. A constant guess goes round uniformly
+    as often as is given. The largest and smallest value of an angle that rotates are half a period and minus that.
+
     Parameters
     ----------
     field : callable
@@ -59,12 +64,16 @@ class CycleProblem(BoundaryValueProblem):
     symmetry : sequence of float or array, optional
         Of an autonomous field, a matrix S, or its diagonal, with F(S u) = S F(u) and S^n = 1: cycles with u(t + T/n) = S u(t)
         are looked for, n the smallest such number. One n-th of the cycle is computed, with u(1) = S u(0) on the unit interval
-        and the time T/n. Guesses, the period and all columns are those of the whole cycle.
+        and the time T/n. Guesses, the period and all columns are those of the whole cycle; winding numbers are those of the
+        part: u(1) = S u(0) + 2 pi k.
+    angles : sequence of str, or mapping of str to float, optional
+        States in which the field is periodic, with the period 2 pi or, in a mapping, any other. Functionals should be periodic
+        in them, too: the mean of another one depends on where the round begins.
 
     Raises
     ------
     ProblemError
-        A name, a period, a symmetry or a function that cannot be used.
+        A name, a period, a symmetry or a function that cannot be used; a field that is not periodic in an angle.
 
     Examples
     --------
@@ -88,6 +97,14 @@ class CycleProblem(BoundaryValueProblem):
     >>> problem = CycleProblem(forced, ["x", "v"], {"a": 3.0, "w": 2.0}, period=lambda p: 2 * math.pi / p.w)
     >>> print(round(contin.solve(problem, [0.0, 0.0], degree=7)["max_x"], 10))
     1.0
+
+    A pendulum with friction, driven by a constant torque: where it rotates, the torque balances the friction in the mean:
+
+    >>> pendulum = CycleProblem(lambda u, p: (u.v, p.torque - u.v - math.sin(u.phi)), ["phi", "v"], {"torque": 3.0},
+    ...                         functionals={"mean": lambda u, p: u.v}, angles=["phi"])
+    >>> rotation = contin.solve(pendulum, lambda t: (2 * math.pi * t, 3.0), {"period": 2.1})
+    >>> print(rotation["winding_phi"], round(rotation["mean"] * rotation["period"] / math.pi, 8))
+    1.0 2.0
     """
 
     field: Function
@@ -95,16 +112,20 @@ class CycleProblem(BoundaryValueProblem):
     period: Function | None
     symmetry: Array
     order: int
+    angles: Mapping[str, float]
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *,
         functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: Any = None,
+        angles: Angles = (),
     ) -> None:  # fmt: skip
         means = dict(checks.mapping("functionals", functionals or {}, "functions"))
         names = check_statement(states, parameters, means)
         forced = period is not None
+        periods = angle_periods(angles, names)
+        windings = dict.fromkeys(winding_names(periods), 0.0)
         extremes = [f"{kind}_{name}" for name in names for kind in ("max", "min")]
-        for name in (PERIOD, *extremes, *([ROUNDS] if forced else [])):
+        for name in (PERIOD, *extremes, *([ROUNDS] if forced else []), *windings):
             if name in parameters or name in means:
                 raise ProblemError(f"parameters: {name} is a column of every cycle by itself")
         signature = Signature(names, tuple(parameters), times=forced)
@@ -113,6 +134,7 @@ class CycleProblem(BoundaryValueProblem):
         count = len(names)
         turn = _turn(symmetry, forced, count)
         check_equivariance(field, turn, names, parameters)
+        check_lattice(turn, names, periods)
         found = None if period is None else of_parameters("period", period, parameters, positive=True)
         rhs = scaled(field, PERIOD, order_of(turn)) if found is None else _scaled_by_forcing(field, found)
         object.__setattr__(self, "field", field)
@@ -120,13 +142,17 @@ class CycleProblem(BoundaryValueProblem):
         object.__setattr__(self, "period", found)
         object.__setattr__(self, "symmetry", turn)
         object.__setattr__(self, "order", order_of(turn))
-        super().__init__(rhs, _periodic(turn), names, {**parameters, **({ROUNDS: 1.0} if forced else {PERIOD: 1.0})})
+        object.__setattr__(self, "angles", periods)
+        own = {**({ROUNDS: 1.0} if forced else {PERIOD: 1.0}), **windings}
+        super().__init__(rhs, _periodic(turn, names, periods), names, {**parameters, **own})
         columns = [*extremes, PERIOD] if forced else extremes
         object.__setattr__(self, "functionals", {**dict.fromkeys(columns, found_elsewhere), **means})
+        if periods:
+            check_periodic("field", self.batch("field"), periods, self.parameters)
 
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
-        states, own = self.state_names, (PERIOD, ROUNDS)
+        states, own = self.state_names, (PERIOD, ROUNDS, *winding_names(self.angles))
         parameters = tuple(name for name in self.parameters if name not in own)
         of_field = Signature(states, parameters, times=self.period is not None).arguments
         of_means = Signature(states, tuple(self.parameters), times=self.period is not None).arguments
@@ -145,7 +171,8 @@ class CycleProblem(BoundaryValueProblem):
         """
         found = _STATED.get(problem)
         if found is None:
-            found = cls(problem.residual, problem.state_names, problem.parameters, functionals=problem.functionals)
+            given = problem.residual, problem.state_names, problem.parameters
+            found = cls(*given, functionals=problem.functionals, angles=problem.angles)
             _STATED[problem] = found
         return found
 
@@ -162,9 +189,10 @@ class CycleProblem(BoundaryValueProblem):
         """
         if self.order == 1:
             return self
-        kept = {name: value for name, value in self.parameters.items() if name != PERIOD}
+        own = (PERIOD, *winding_names(self.angles))
+        kept = {name: value for name, value in self.parameters.items() if name not in own}
         symmetry = self.symmetry @ self.symmetry if self.order > 2 else None
-        return CycleProblem(self.field, self.state_names, kept, functionals=self.means, symmetry=symmetry)
+        return CycleProblem(self.field, self.state_names, kept, functionals=self.means, symmetry=symmetry, angles=self.angles)
 
     @property
     def multipliers(self) -> tuple[str, ...]:
@@ -258,12 +286,15 @@ def _scaled_by_forcing(field: Function, period: Function) -> Function:
     return rhs
 
 
-def _periodic(turn: Array) -> Function:
-    """Return the boundary conditions S u(0) - u(1) = 0."""
-    rows = turn.tolist()
+def _periodic(turn: Array, names: Sequence[str], angles: Mapping[str, float]) -> Function:
+    """Return the boundary conditions S u(0) - u(1) = 0; angles gain whole rounds."""
+    rows, rounds = turn.tolist(), [(names.index(name), WINDING + name, period) for name, period in angles.items()]
 
     def boundary(a: Any, b: Any, p: Any) -> Any:
-        return [turned - end for turned, end in zip(image(rows, a), b)]
+        gaps = [turned - end for turned, end in zip(image(rows, a), b)]
+        for place, winding, period in rounds:
+            gaps[place] = gaps[place] + period * getattr(p, winding)
+        return gaps
 
     return boundary
 

@@ -11,6 +11,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, Function
 from contin.errors import ProblemError
+from contin.problems.angles import whole_rounds
 
 #: The largest order of a symmetry: rings of more oscillators are rare, and one n-th of a cycle should be worth a mesh.
 _MOST = 60
@@ -80,6 +81,20 @@ def check_equivariance(field: Function, matrix: Array, names: Sequence[str], par
                 f"symmetry: the field does not have it; the rate of {names[int(gap.argmax())]} at S u differs by "
                 f"{gap.max():.3g} from that of S F(u) for u = {', '.join(f'{value:.3g}' for value in u)}"
             )
+
+
+def check_lattice(matrix: Array, names: Sequence[str], angles: Mapping[str, float]) -> None:
+    """Check that S changes states by whole rounds of angles where an angle goes round once.
+
+    Raises
+    ------
+    ProblemError
+    """
+    periods = np.array([angles.get(name, 0.0) for name in names])
+    for name, period in angles.items():
+        moved = period * matrix[:, names.index(name)]
+        if np.any(np.abs(moved - whole_rounds(moved, periods)) > _EQUAL):
+            raise ProblemError(f"symmetry: where {name} goes round once, S u must change by whole rounds of angles")
 
 
 def image(matrix: Sequence[Sequence[float]], u: Sequence[Any]) -> list[Any]:

@@ -162,7 +162,8 @@ class Point:
 
         At a Hopf point of equilibria it is the first Lyapunov coefficient, with a critical eigenvector of unit length; at a
         period doubling c and at a torus bifurcation Re d of `contin.detection.cycle_normal_forms`; at a fold of cycles |b|,
-        which is zero at a cusp. Its estimated error is ``details["normal_form_error"]``.
+        which is zero at a cusp. Those of maps are in `contin.detection.map_normal_forms`; the c of their period doublings is
+        positive where they are supercritical. Its estimated error is ``details["normal_form_error"]``.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
 

@@ -13,6 +13,7 @@ from contin.detection.floquet import floquet
 from contin.discretization.collocation import Collocation
 from contin.discretization.cycles import PeriodicCollocation
 from contin.errors import ProblemError
+from contin.problems.angles import periods_of, whole_rounds
 from contin.problems.segmented import SegmentedProblem
 from contin.results.axes import new_axes
 
@@ -107,7 +108,17 @@ def _course(point: Any, names: Sequence[str]) -> tuple[Array, Array]:
     t = np.unique(np.arange(system.order)[:, None] + once) if cycle else once
     which = [system.problem.state_names.index(name) for name in names]
     states = system.evaluate(point.x, t)[:, which]
-    return (t * system.unit_time(point.x) if cycle else t), states
+    t = t * system.unit_time(point.x) if cycle else t
+    return _on_circles(t, states, (periods_of(system.problem) * (system.gains[-1] != 0))[which]) if cycle else (t, states)
+
+
+def _on_circles(t: Array, states: Array, periods: Array) -> tuple[Array, Array]:
+    """Return times and states with those that have a period between minus and plus half of it; NaN where they jump back."""
+    states = states - whole_rounds(states, periods)
+    jumps = np.abs(np.diff(states, axis=0)) > np.where(periods > 0, periods / 2, np.inf)
+    after = np.flatnonzero(jumps.any(axis=1))
+    gaps = np.where(jumps[after], np.nan, states[after])
+    return np.insert(t, after + 1, t[after]), np.insert(states, after + 1, gaps, axis=0)
 
 
 def _portrait(point: Any, names: tuple[str, ...], axes: Any) -> None:
@@ -118,6 +129,7 @@ def _portrait(point: Any, names: tuple[str, ...], axes: Any) -> None:
         colour = _COLOURS[index % len(_COLOURS)]
         axes.plot(x, y, lw=1.5, color=colour, label=f"segment {index}")
         at = len(x) // 8
+        at -= 2 * bool(np.isnan(x[at : at + 2] + y[at : at + 2]).any())  # beside the gap of an angle
         axes.annotate(
             "", xy=(x[at + 1], y[at + 1]), xytext=(x[at], y[at]),
             arrowprops={"arrowstyle": "-|>", "color": colour, "mutation_scale": 18, "shrinkA": 0, "shrinkB": 0},

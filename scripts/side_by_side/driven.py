@@ -105,6 +105,59 @@ def brusselator_rest(kind: str):
     return contin.trace(contin.solve(problem, start), free=["length"], limits={"length": (0.4, end)})
 
 
+# --- coupled pendula --------------------------------------------------------------------------------------------------
+
+#: AUTO's columns of the pendula.
+CURRENT = {"PAR(3)": "current", "PERIOD": "period"}
+#: Shooting with SciPy's DOP853, tolerance 3e-14: the half of a round for cycles whose pendula are half a round apart, the
+#: determinant of the linearized map plus one for the points where a multiplier is critical.
+PENDULA = [
+    ("PD", {"PAR(3)": 0.17916377821826, "PERIOD": 3.70527211859}),
+    ("BP", {"PAR(3)": 0.33144524464473, "PERIOD": 9.72614401819}),
+    ("BP", {"PAR(3)": 0.17551171694048, "PERIOD": 13.438887036994}),
+    ("UZ", {"PAR(3)": 0.17314497411722, "PERIOD": 30.0}),
+    ("UZ", {"PAR(3)": 0.1599533234434, "PERIOD": 30.0}),
+    ("UZ", {"PAR(3)": 0.95729420624432, "PAR(2)": 0.98064095333096}),
+]
+#: AUTO ends its runs at the period 30.
+TO_30 = {"limits": {"current": (0, 1), "period": (0, 30.001)}, "zeros": {"period": [30.0]}}
+
+
+def pendula(u, p):
+    """An angle, the other one less that, and their velocities."""
+    pull = p.gamma * u.d
+    return (
+        u.v, u.w - u.v, -p.eps * u.v - math.sin(u.phi) + p.current + pull,
+        -p.eps * u.w - math.sin(u.phi + u.d) + p.current - pull,
+    )  # fmt: skip
+
+
+@functools.cache
+def pen_in_phase():
+    """Both rotate as one."""
+    values = {"gamma": single(0.175), "eps": single(0.1), "current": single(0.4)}
+    problem = contin.CycleProblem(pendula, ["phi", "d", "v", "w"], values, angles=["phi"])
+    start = contin.solve(problem, lambda t: (1.24 + 2 * math.pi * t, 0.0, 4.0, 4.0), {"period": 1.5738797205})
+    return contin.trace(start, free=["current"], direction=-1, **TO_30)
+
+
+@functools.cache
+def pen_out_of_phase():
+    """One is half a round ahead; the cycle goes round twice."""
+    return contin.trace(pen_in_phase().labelled("PD")[0], branch=1, **TO_30)
+
+
+def pen_further():
+    """The branches that leave from these."""
+    return [contin.trace(point, branch=1, **TO_30) for point in pen_out_of_phase().labelled("BP") if point.name != "start"]
+
+
+def pen_doublings():
+    """The period doublings in two parameters."""
+    start = pen_in_phase().labelled("PD")[0]
+    return [contin.curve(start, free=["current", "eps"], limits={"period": (0, 30.001)}, zeros={"period": [30.0]})]
+
+
 # --- food chain, reactor, circles -------------------------------------------------------------------------------------
 
 
@@ -137,6 +190,13 @@ def tfc_in_d2():
     """The cycle at d1 = 0.75 in the death rate of the top, which is not there."""
     point = tfc_cycles().labelled("UZ")[0]
     return [contin.trace(point, free=["d2"], limits={"d2": (0.005, 0.4735)}, zeros={"d2": [0.013]})]
+
+
+def tfc_of_given_period():
+    """The same cycle in d1 and a1, with its period held, to smaller cycles and to larger ones."""
+    (point,) = tfc_in_d2()[0].labelled("UZ")
+    options = {"hold": "period", "branch_points": True, "limits": {"d1": (0.7, 1.0277792)}}
+    return [contin.curve(point, free=["d1", "a1"], direction=way, **options) for way in (-1, 1)]
 
 
 def abcb_cycles():
@@ -223,8 +283,22 @@ def demos() -> list[Demo]:
             Part([0], lambda: [tfc_rest()], {"PAR(3)": "d1", "U(1)": "x", "U(2)": "y"}),
             Part([1], lambda: [tfc_cycles()], {"PAR(3)": "d1", "PERIOD": "period"}),
             Part([2], tfc_in_d2, {"PAR(6)": "d2", "PERIOD": "period"}),
-        ], note="Not compared: curves of branch points of cycles, and cycles of given period in two parameters, which "
-                "contin does not have."),
+            Part([7], tfc_of_given_period, {"PAR(3)": "d1", "PAR(1)": "a1"}, known=[
+                # the top's mean rate of growth is zero: shooting, SciPy's DOP853
+                ("BP", {"PAR(3)": 0.7706897642415, "PAR(1)": 5.661087883765}),
+            ]),
+        ], note="Beside the Hopf point at a1 = 4.4165, where contin's cycles of given period end, AUTO labels a BP, elsewhere "
+                "when finer. The curve of branch points labels only its turn at the Hopf point d1 = 0.83333, where contin's "
+                "ends. "
+                "Curves of branch points of a given period are not in contin."),
+        Demo("pen", "rotations of coupled pendula", [
+            Part([0], lambda: [pen_in_phase()], CURRENT, labels=("PD", "UZ"), known=PENDULA[:1]),
+            Part([1], lambda: [pen_out_of_phase()], CURRENT, labels=("BP", "UZ"), known=PENDULA[1:4]),
+            Part([2, 3], pen_further, CURRENT, labels=("UZ",), known=PENDULA[4:5]),
+            Part([5], pen_doublings, {"PAR(3)": "current", "PAR(2)": "eps"}, labels=("UZ",), known=PENDULA[5:]),
+        ], note="The state phi is an angle of contin; the other one is stated as the difference of both, in which the field is "
+                "not periodic. AUTO does not look for folds, and in runs 3 and 4 for nothing but the period 30. Third method: "
+                "shooting with SciPy's DOP853."),
         Demo("abcb", "branch points of cycles in a reactor", [
             Part([0], lambda: [abc_rest()], columns("d", period=False)),
             Part([1], abcb_cycles, {"PAR(1)": "d", "PERIOD": "period"}),

@@ -54,10 +54,6 @@ OTHERS = (
         "contin's connections join equilibria, not cycles (as `c2c`); one of the states is an angle.",
     ),
     (
-        "pen", "rotations of coupled pendula",
-        "The angles turn by whole rounds. contin's cycles close in all states.",
-    ),
-    (
         "rev", "homoclinic orbits of a reversible system",
         "The runs follow half an orbit, up to a plane of symmetry. `ConnectionProblem` has no symmetries.",
     ),

@@ -311,3 +311,36 @@ def test_a_stored_curve_of_cycles_goes_on(tmp_path):
     assert max(abs(point["b"] ** 2 + 4 * point["mu"]) for point in on) < 1e-10
     beside = contin.trace(loaded.points[-2], free=["mu"], direction=1, limits={"mu": (-1, 0.2), "max_x": (0, 2)})
     assert beside.points[-1]["b"] == loaded.points[-2]["b"]
+
+
+def test_hopf_points_from_a_zero_hopf_point_of_a_curve_of_folds():
+    """Folds at m = 0, Hopf points at m = -n^2: they touch at the zero-Hopf point, and the Hopf points go on both ways."""
+
+    def field(u, p):
+        square = u.y**2 + u.z**2
+        return p.m + u.x**2 - square, p.n * u.y - u.z + u.x * u.y, p.n * u.z + u.y + u.x * u.z
+
+    problem = contin.AlgebraicProblem(field, ["x", "y", "z"], {"m": -1.0, "n": 0.5})
+    line = contin.trace(contin.solve(problem, [1.0, 0, 0]), free=["m"], limits={"m": (-2, 1)})
+    folds = contin.curve(line.labelled("LP")[0], "n", limits={"n": (-1, 1)}, direction=-1)
+    (point,) = folds.labelled("ZH")
+    for direction in (1, -1):
+        hopfs = contin.curve(point, kind="HB", limits={"n": (-1, 1)}, direction=direction)
+        assert hopfs.points[0].label == "ZH" and hopfs.points[-1]["n"] == pytest.approx(direction, abs=1e-12)
+        assert max(abs(each["m"] + each["n"] ** 2) + abs(each["frequency"] - 1) for each in hopfs.points) < 1e-10
+
+
+def test_branches_that_cross_where_folds_meet_a_branch_point():
+    """b + a x - x^2: folds at a^2 = -4 b; at b = 0 the branches x = 0 and x = a cross."""
+    problem = contin.AlgebraicProblem(lambda u, p: (p.b + p.a * u.x - u.x**2,), ["x"], {"a": 1.0, "b": -0.2})
+    line = contin.trace(contin.solve(problem, [0.7]), free=["a"], limits={"a": (-2, 2)}, direction=-1)
+    folds = contin.curve(line.labelled("LP")[0], "b", limits={"b": (-1, 1)})
+    (point,) = folds.labelled("BP")
+    slopes = []
+    for branch in (0, 1):
+        for direction in (1, -1):
+            run = contin.trace(point, free=["a"], branch=branch, direction=direction, limits={"a": (-2, 2)})
+            assert run.points[0].label == "BP" and abs(abs(run.points[-1]["a"]) - 2) < 1e-12
+            slopes.append(round(run.points[-1]["x"] / run.points[-1]["a"], 6) + 0.0)
+    assert sorted(slopes) == [0, 0, 1, 1]
+    assert contin.trace(point, free=["b"], limits={"b": (-1, 0.5)}).points[-1]["b"] == pytest.approx(0.5)  # a fold in b
