@@ -23,9 +23,11 @@ from contin.curves.fold_curve import FoldCurve
 from contin.curves.hopf_curve import HopfCurve
 from contin.curves.map_curves import MapDoublingCurve, MapTorusCurve
 from contin.detection.branch_point import BranchPoint
+from contin.detection.homoclinic_points import test_of
 from contin.detection.lyapunov import critical_pair
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
+from contin.discretization.connections import ConnectionCollocation
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.maps import MapSystem
 from contin.discretization.system import System
@@ -47,7 +49,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     ----------
     start : Point
         A labelled point of a branch: LP, BP, HB (of equilibria), PD, TR, an extremum (EX), or where a column has a value (UZ,
-        EP). Or a labelled point of a curve, followed with one parameter more: an extremum of the curve's own column, the fold
+        EP); on a curve of homoclinic orbits also IFS, IFU, OFS, OFU, NCH, SH, NSS, ... (three parameters are free then). Or a labelled point of a curve, followed with one parameter more: an extremum of the curve's own column, the fold
         of a curve of folds with respect to its first parameter, a user zero, or a point of codimension two.
     second : str, optional
         The parameter that is free beside those of the branch.
@@ -259,6 +261,14 @@ def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
     return None
 
 
+def _of_homoclinic_orbits(start: Point, base: Any, x: Array) -> _First | None:
+    """A special point of a curve of homoclinic orbits, which has two free parameters already."""
+    if not isinstance(base, ConnectionCollocation) or not base.problem.homoclinic:
+        return None
+    test = test_of(start.label, base, x)
+    return None if test is None else (EventCurve(base, test.function), x)
+
+
 def _event(start: Point, base: Any, x: Array, event: TestFunction) -> _First:
     """A zero of a user's test function.
 
@@ -278,8 +288,9 @@ def _event(start: Point, base: Any, x: Array, event: TestFunction) -> _First:
 _LOCATED = 1e-6
 #: What a start may be, in words, and in the order in which it is asked.
 _STARTS = (
-    "one of LP, BP, HB (of equilibria), PD, TR, EX, or one where a column has a value (UZ, EP); "
+    "one of LP, BP, HB (of equilibria), PD, TR, EX, a special point of homoclinic orbits, or one where a column has a value "
+    "(UZ, EP); "
     "for one of your own test functions, give it as event"
 )
-_KINDS = (_branch_points, _folds, _hopf_points, _doublings, _tori, _extrema, _values)
+_KINDS = (_branch_points, _folds, _hopf_points, _doublings, _tori, _extrema, _values, _of_homoclinic_orbits)
 _KINDS_ON_CURVES = (_extrema_of_extrema, _values, _of_codimension_two)

@@ -11,7 +11,7 @@ and those of the manifold that it leaves, l1, l2, ... with the smallest first: t
     IFS, IFU        v.a(0), w.a(1)                           inclination flips: v, w are right eigenvectors of m1, l1
 
 a solves the adjoint equation; its values at the ends are the multipliers of the projection conditions in the left null vector
-of F_z, z all unknowns but two parameters. Eigenvectors and null vectors have the signs that they have at the reference of the
+of F_z, z all unknowns but the parameters of the user. Eigenvectors and null vectors have the signs that they have at the reference of the
 discretization.
 """
 
@@ -38,6 +38,8 @@ _NEUTRAL = 1e-9
 _TOO_NEAR = 1e-8
 #: With a larger gap the orbit is not close to a homoclinic one.
 _FAR = 0.2
+#: The labels of the test functions whose points `own_names` calls otherwise.
+_LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
 #: An eigenvalue with a smaller imaginary part, relative to its size, is real.
 _REAL = 1e-8
 
@@ -55,6 +57,16 @@ def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
         if counts[side] > 1:
             found += [_double(side), _divergent(side), _orbit_flip(side), _inclination_flip(side)]
     return found
+
+
+def test_of(label: str, system: ConnectionCollocation, x: Array) -> TestFunction | None:
+    """Return the test function that labels a special point x of a curve of homoclinic orbits so; None where none does.
+
+    Labels of `own_names` are those of the function that was located. Where two have the same label it is the one that vanishes.
+    """
+    trial, located = Trial.without_tangent(system, x), _LOCATED_AS.get(label, label)
+    found = [test for test in homoclinic_points(system) if test.label == located != "EP"]
+    return min(found, key=lambda test: abs(test.function(trial)), default=None)
 
 
 def _closeness(trial: Trial) -> float:
@@ -179,8 +191,8 @@ def _inclination_flip(side: int) -> TestFunction:
 def _left_null_vector(system: ConnectionCollocation, x: Array, border: Array | None) -> Array:
     """Return w with w F_z = 0, of unit length, and its product with the border (random without one) positive."""
     own = [name for name in system.free if name not in system.problem.multipliers]
-    held = np.zeros((2, system.size + 1))
-    held[[0, 1], [system.parameter_index(name) for name in own]] = 1.0
+    held = np.zeros((len(own), system.size + 1))
+    held[range(len(own)), [system.parameter_index(name) for name in own]] = 1.0
     column = np.random.default_rng(11).standard_normal(system.equations) if border is None else border
     _, factors = system.linearize(x, held, column[None])
     unit = np.zeros(system.size + 1)
