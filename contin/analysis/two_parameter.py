@@ -266,7 +266,7 @@ def _of_homoclinic_orbits(start: Point, base: Any, x: Array) -> _First | None:
     if not isinstance(base, ConnectionCollocation) or not base.problem.homoclinic:
         return None
     test = test_of(start.label, base, x)
-    return None if test is None else (EventCurve(base, test.function), x)
+    return None if test is None else (EventCurve(base, test.function, label=test.label), x)
 
 
 def _event(start: Point, base: Any, x: Array, event: TestFunction) -> _First:

@@ -14,7 +14,9 @@ columns of V, each times its row of Phi: k derivatives by differences, for any n
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,10 @@ from contin.arrays import Array
 from contin.curves.extended import FITS, Borders, Extended
 from contin.curves.fold_curve import shrinking
 from contin.detection.extrema import orthonormal
-from contin.detection.test_functions import own_test_functions
+from contin.detection.homoclinic_points import homoclinic_points, own_names
+from contin.detection.segment import SpecialPoint
+from contin.detection.test_functions import own_end, own_test_functions
+from contin.discretization.connections import ConnectionCollocation
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.differences import derivative
 from contin.linalg.factors import Factors
@@ -43,6 +48,8 @@ class EventCurve(Extended):
         ``gradient(system, x)`` returns the derivatives by x, shape (size,).
     borders : pair of ndarray, optional
         Of which only the second is used: the rows Phi.
+    label : str
+        That of the function.
     """
 
     def __init__(
@@ -51,15 +58,16 @@ class EventCurve(Extended):
         function: Callable[[Trial], float],
         gradient: Callable[[Any, Array], Array] | None = None,
         borders: Borders | None = None,
+        label: str = "",
     ) -> None:
         super().__init__(base, borders)
-        self.function, self._gradient = function, gradient
+        self.function, self._gradient, self.label = function, gradient, label
         self.equations = base.equations + 1
         self._known: tuple[bytes, Array, Array] | None = None
 
     def on(self, base: Any) -> EventCurve:
         """Return the extended system of another underlying one, with borders of its own."""
-        return EventCurve(base, self.function, self._gradient)
+        return EventCurve(base, self.function, self._gradient, label=self.label)
 
     def borders_fit(self, x: Array) -> bool:
         """Return whether the tangents, and null vectors of the underlying curve, have not turned away from their borders."""
@@ -121,5 +129,34 @@ class EventCurve(Extended):
 
 @own_test_functions.register
 def _of_event_curve(system: EventCurve) -> list[TestFunction]:
-    """Cycles may shrink onto an equilibrium."""
-    return shrinking(system.base) if isinstance(system.base, PeriodicCollocation) else []
+    """Cycles may shrink onto an equilibrium. Codimension three: homoclinic orbits that are special in another way, too."""
+    if isinstance(system.base, PeriodicCollocation):
+        return shrinking(system.base)
+    if not isinstance(system.base, ConnectionCollocation):
+        return []
+    others = [test for test in homoclinic_points(system.base) if test.label != system.label]
+    return [
+        dataclasses.replace(
+            test, function=partial(_inside, test.function), confirm=test.confirm and partial(_inside, test.confirm)
+        )
+        for test in others
+    ]
+
+
+def _inside(function: Callable[[Trial], Any], trial: Trial) -> Any:
+    """Return a function of the underlying solution of a point of a curve."""
+    return function(_solution(trial))
+
+
+def _solution(trial: Trial) -> Trial:
+    system: Any = trial.system
+    return Trial.without_tangent(system.base, trial.x[: system.base.size])
+
+
+@own_end.register
+def _of_points_of_homoclinic_orbits(system: EventCurve, point: SpecialPoint) -> SpecialPoint:
+    """Neutral saddles and the like, by which of the leading eigenvalues are complex."""
+    if not isinstance(system.base, ConnectionCollocation) or not point.is_located:
+        return point
+    names = own_names(dataclasses.replace(point, trial=_solution(point.trial)))
+    return point if names is None else dataclasses.replace(point, label=names[0], name=names[1])
