@@ -49,8 +49,9 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     ----------
     start : Point
         A labelled point of a branch: LP, BP, HB (of equilibria), PD, TR, an extremum (EX), or where a column has a value (UZ,
-        EP); on a curve of homoclinic orbits also IFS, IFU, OFS, OFU, NCH, SH, NSS, ... (three parameters are free then). Or a labelled point of a curve, followed with one parameter more: an extremum of the curve's own column, the fold
-        of a curve of folds with respect to its first parameter, a user zero, or a point of codimension two.
+        EP); on a curve of homoclinic orbits also IFS, OFS, NCH, ..., with three free parameters then. Or a labelled point of a
+        curve, followed with one parameter more: an extremum of the curve's own column, the fold of a curve of folds with
+        respect to its first parameter, a user zero, or a point of codimension two.
     second : str, optional
         The parameter that is free beside those of the branch.
     settings : Settings, optional

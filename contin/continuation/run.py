@@ -727,11 +727,13 @@ class Continuation:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.
 
         An error far below the tolerance may be round-off, which does not grow on coarser meshes: half of the intervals may do.
+        So they may where all of the error is round-off: short intervals make it larger, as where cycles shrink after canards.
         """
         control, now, error = self.settings.mesh, state.system.intervals, state.discretization_error
         if math.isnan(error) or not now:
             return control.min_intervals
-        count = now // 2 if error < _FAR_BELOW * control.tolerance else min(self._intervals_for(state.system, error), now)
+        half = error < _FAR_BELOW * control.tolerance or accuracy_of(self._end, 0.0).is_round_off
+        count = now // 2 if half else min(self._intervals_for(state.system, error), now)
         return max(control.min_intervals, min(count, control.max_intervals))
 
     def _move_to(self, adapted: tuple[Discretization, Carrier]) -> bool:

@@ -11,8 +11,8 @@ and those of the manifold that it leaves, l1, l2, ... with the smallest first: t
     IFS, IFU        v.a(0), w.a(1)                           inclination flips: v, w are right eigenvectors of m1, l1
 
 a solves the adjoint equation; its values at the ends are the multipliers of the projection conditions in the left null vector
-of F_z, z all unknowns but the parameters of the user. Eigenvectors and null vectors have the signs that they have at the reference of the
-discretization.
+of F_z, z all unknowns but the user's parameters. Eigenvectors and null vectors have the signs that they have at the reference
+of the discretization.
 """
 
 from __future__ import annotations

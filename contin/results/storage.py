@@ -24,6 +24,7 @@ from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.collocation import Collocation
+from contin.discretization.cycles import CycleCollocation
 from contin.discretization.kinds import algebraic, discretized
 from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
@@ -262,11 +263,17 @@ def _is_number(text: str, value: float) -> bool:
         return False
 
 
-def _with_reference(system: Discretization, x: Array) -> Discretization:
-    """Return a discretized problem with a stored point as the reference, if it has one."""
+def _with_reference(system: Discretization, x: Array, tangent: Array) -> Discretization:
+    """Return a discretized problem with a stored point as the reference, if it has one.
+
+    A cycle without a size, at a Hopf point, has the one beside it along the tangent, where that is known.
+    """
     if isinstance(system, Extended):
-        base: Any = _with_reference(system.base, x[: system.base.size])
+        size = system.base.size
+        base: Any = _with_reference(system.base, x[:size], tangent[:size])
         return system if base is system.base else system.on(base)
+    if isinstance(system, CycleCollocation) and not np.ptp(system.states(x), axis=0).any():
+        return system.with_reference(x + tangent / np.abs(tangent).max()) if np.all(np.isfinite(tangent)) else system
     return system.with_reference(x) if isinstance(system, Collocation) else system
 
 
@@ -274,7 +281,7 @@ def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array]
     x = arrays[f"x{number}"]
     if len(x) != system.size:
         raise ProblemError("the file is of an earlier version, which kept one point of a map's cycle only: follow it again")
-    system = _with_reference(system, x)
+    system = _with_reference(system, x, arrays[f"tangent{number}"])
     details: BranchPoint | MultiplePoint | dict[str, float] | None = row.get("details")
     if row["imperfection"] is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}
