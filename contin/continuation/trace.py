@@ -10,6 +10,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.continuation.connection_starts import from_non_central, leaves_saddle_node
 from contin.continuation.cycle_starts import switched, switches
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
@@ -45,7 +46,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         there). With ``branch=1`` at HB and PD, those of the new branch.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
-        the opposite way. By default the one that it was found on, with ``direction`` that of the primary parameter.
+        the opposite way. At NCH, 1 is the curve of homoclinic orbits to the saddle-node or, from that, to the saddle. By default
+        the one that it was found on, with ``direction`` that of the primary parameter.
     progress : bool, optional
         Show one line on standard error while the run is under way: by default where standard error is a terminal.
 
@@ -74,6 +76,9 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if branch == 1 and switches(start):
         cycles, x, tangent = switched(start, free)
         return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
+    if branch == 1 and leaves_saddle_node(start):
+        orbits, x, tangent = from_non_central(start)
+        return follow_until_interrupted(Continuation(orbits, x, settings, settings.direction * tangent, singular=False), shown)
     if free is not None and checks.names("free", free) != system.free:
         system, x = system.with_free(free, x)
     if branch is None:

@@ -10,7 +10,13 @@ and those of the manifold that it leaves, l1, l2, ... with the smallest first: t
     OFS, OFU        p.(u(1) - e), q.(u(0) - e)               orbit flips: p, q are left eigenvectors of m1, l1
     IFS, IFU        v.a(0), w.a(1)                           inclination flips: v, w are right eigenvectors of m1, l1
 
-a solves the adjoint equation; its values at the ends are the multipliers of the projection conditions in the left null vector
+On curves of homoclinic orbits to saddle-nodes, whose slow motion is c' = a c^2, with c = p.(u - e):
+
+    NCH             a c / |a| at u(0), where it is positive, and at u(1), where it is negative: the orbit leaves, or comes back,
+                    along another direction than the eigenvector of the eigenvalue zero, and a curve to saddles begins
+    CP, BT, ZH      a, a second eigenvalue, or a pair, is zero, or imaginary
+
+In IFS and IFU a solves the adjoint equation; its values at the ends are the multipliers of the projection conditions in the left null vector
 of F_z, z all unknowns but the user's parameters. Eigenvectors and null vectors have the signs that they have at the reference
 of the discretization.
 """
@@ -38,6 +44,8 @@ _NEUTRAL = 1e-9
 _TOO_NEAR = 1e-8
 #: With a larger gap the orbit is not close to a homoclinic one.
 _FAR = 0.2
+#: An eigenvalue whose real part is below this part of the largest one lies on the axis; a double zero is known to 1e-5.
+_ON_AXIS = 1e-3
 #: The labels of the test functions whose points `own_names` calls otherwise.
 _LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
 #: An eigenvalue with a smaller imaginary part, relative to its size, is real.
@@ -48,8 +56,12 @@ def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
     """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
     n, unstable = len(system.problem.state_names), system.problem.unstable
     counts = n - unstable, unstable
+    near = TestFunction("EP", "the ends of the orbit are far from the saddle: it needs a longer time", _closeness, terminal=True)
+    if system.problem.saddle_node:
+        others = [_second_zero(side) for side in (0, 1) if (unstable if side else n - 1 - unstable)]
+        return [near, _NON_CENTRAL[0], _NON_CENTRAL[1], _CUSP, *others]
     found = [
-        TestFunction("EP", "the ends of the orbit are far from the saddle: it needs a longer time", _closeness, terminal=True),
+        near,
         TestFunction("NSS", "neutral saddle", lambda trial: _total(_leading(trial, 0)[0].real, _leading(trial, 1)[0].real)),
         *(_ends(side) for side in (0, 1)),
     ]
@@ -73,10 +85,67 @@ def _closeness(trial: Trial) -> float:
     return _FAR - trial["gap"]
 
 
+def _slow_component(trial: Trial, end: int) -> float:
+    """Return c at an end of an orbit to a saddle-node, with the sign of a: positive where the slow motion leaves."""
+    p, bend = _system(trial).slow_motion(trial.x)
+    return float(np.sign(bend) * (p @ _system(trial).apart(trial.x)[end]))
+
+
+#: The test functions of the first and of the last end of an orbit to a saddle-node, positive where it is a central one.
+_NON_CENTRAL = tuple(
+    TestFunction(
+        "NCH", "non-central homoclinic orbit to a saddle-node",
+        (lambda trial: -_slow_component(trial, 1)) if end else (lambda trial: _slow_component(trial, 0)), terminal=True,
+    )  # fmt: skip
+    for end in (0, 1)
+)
+
+
+def _bend(trial: Trial) -> float:
+    """Return a, positive at the reference of the discretization: its sign is that of the eigenvector."""
+    system = _system(trial)
+    return float(system.slow_motion(trial.x)[1] * np.sign(system.slow_motion(system.reference)[1]))
+
+
+_CUSP = TestFunction("CP", "cusp: the saddle-node meets a third equilibrium", _bend, terminal=True)
+
+
+def _second_zero(side: int) -> TestFunction:
+    """Return the test function of a second eigenvalue zero, a stable (0) or unstable one; zero itself is one of two that meet."""
+
+    def total(trial: Trial) -> float:
+        system = _system(trial)
+        rates = -np.sort(-np.linalg.eigvals(system.saddle_jacobian(trial.x)).real)
+        first = system.problem.unstable - side
+        return float(rates[first] + rates[first + 1]) * (1 if side else -1)
+
+    return TestFunction("BT", "Bogdanov-Takens: the saddle-node has two eigenvalues zero", total, terminal=True)
+
+
+def crossing(point: Any) -> tuple[bool, int]:
+    """Return, for a point labelled NCH, whether the orbit is then one to a saddle, and the end or side that it is about.
+
+    Of an orbit to a saddle-node, the end that is non-central; of one to a saddle, the side of the eigenvalue that is zero.
+    """
+    trial = Trial.without_tangent(point.system, point.x)
+    if point.system.problem.saddle_node:
+        return False, int(np.argmin([abs(test.function(trial)) for test in _NON_CENTRAL]))
+    return True, int(np.argmin([abs(_leading(trial, side)[0].real) for side in (0, 1)]))
+
+
+def ending(system: ConnectionCollocation, side: int) -> TestFunction:
+    """Return the test function NCH of an end (of orbits to a saddle-node) or side; it is positive on the curve."""
+    return _NON_CENTRAL[side] if system.problem.saddle_node else _ends(side)
+
+
 def own_names(point: SpecialPoint) -> tuple[str, str] | None:
     """Return label and name of a neutral saddle, or of the end of a curve, whose leading eigenvalue is complex; else None."""
-    if point.label not in ("NSS", "NCH") or not point.is_located:
+    if point.label not in ("NSS", "NCH", "BT") or not point.is_located:
         return None
+    if _system(point.trial).problem.saddle_node:
+        values = np.linalg.eigvals(_system(point.trial).saddle_jacobian(point.trial.x))
+        critical = np.count_nonzero(np.abs(values.real) < _ON_AXIS * np.abs(values).max())
+        return ("ZH", "zero-Hopf: the saddle-node has a pair, too") if point.label == "BT" and critical > 2 else None
     kinds = [_is_complex(_leading(point.trial, side)[0]) for side in (0, 1)]
     if point.label == "NSS" and any(kinds):
         return ("NFF", "neutral bifocus") if all(kinds) else ("NSF", "neutral saddle-focus")

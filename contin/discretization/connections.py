@@ -31,9 +31,14 @@ class ConnectionCollocation(Conditioned):
         [ F(e) = 0, F(e') = 0      ]        stable, so u(0) - e lies in the tangent plane of its unstable manifold; L' spans
         [ L (u(0) - e)             ]        those of the last equilibrium e' whose eigenvalues are unstable.
         [ L' (u(1) - e')           ]
+        [ g(e)                     ]        of orbits to a saddle-node only; L and L' leave out its eigenvalue zero
         [ integral of (u - v) . v' ]        v is an earlier orbit of the run.
 
-    L is normalized to L Q^T = I, with an orthonormal basis Q of an earlier L, so that it changes smoothly.
+    L is normalized to L Q^T = I, with an orthonormal basis Q of an earlier L, so that it changes smoothly. With the Jacobian A
+    at e, and the singular vectors b, c of the smallest singular value of an earlier one,
+
+        [ A    b ] [ y ]   [ 0 ]
+        [ c^T  0 ] [ g ] = [ 1 ],        which makes g zero where A is singular.
 
     Attributes
     ----------
@@ -49,7 +54,7 @@ class ConnectionCollocation(Conditioned):
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         check_windings(problem.angles, self.free, dict(zip(problem.parameters, map(float, self.parameters))))
-        self._further = sum(problem.conditions) + 1
+        self._further = sum(problem.conditions) + problem.saddle_node + 1
         self.equations = self._conditions + self._further
         self.reference: Array = np.empty(0)
 
@@ -60,11 +65,14 @@ class ConnectionCollocation(Conditioned):
         other._phase = other.phase_row(other._scaled_states(x))
         other._target = float(other._phase @ x)
         other._bases = tuple(_orthonormal(left) for left in other._left_vectors(other.all_parameters(x)))
+        left, _, right = np.linalg.svd(other.saddle_jacobian(x))
+        other._borders = left[:, -1], right[-1]
         return other
 
     _phase: Array
     _target: float
     _bases: Any
+    _borders: tuple[Array, Array]
 
     # --- the conditions at the ends ------------------------------------------------------------------------------
 
@@ -107,17 +115,10 @@ class ConnectionCollocation(Conditioned):
         from scipy.linalg import null_space, solve_sylvester  # type: ignore[import-untyped]  # .1 s; only this needs it
 
         found: list[dict[Numbers, Array]] = []
-        n, sizes, numbers = self._n, self._sizes, subsets(len(directions))
-        batch, none = self.problem.batch("vector field"), np.empty((0, self._n))
-        for end, place in enumerate(self._places(p[None])):
-            moves = [np.append(self._places(v[None])[end][0], v)[None] for v in directions]
-            given = np.zeros(1), place, none, p, batch.columns([])
-            field: dict[Numbers, Array] = {
-                chosen: batch.jacobian_along(*given, [moves[i] for i in chosen])[0, :, :n] * sizes / sizes[:, None]
-                for chosen in numbers[1:]
-            }
-            A = field[()] = self._jacobian_at(place[0], p)
-            Q = self._bases[end]
+        n, numbers = self._n, subsets(len(directions))
+        for end in (0, 1):
+            field = self._jacobians_along(p, directions, end)
+            A, Q = field[()], self._bases[end]
             left = _left_subspace(A, self.problem.conditions[end], stable=end == 0)
             L = _normalized(left, Q)
             known: dict[Numbers, Array] = {(): L}
@@ -132,17 +133,51 @@ class ConnectionCollocation(Conditioned):
             found.append(known if len(Q) else dict.fromkeys(numbers, L))
         return found
 
+    def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
+        """Return the Jacobian at the equilibrium of an end, and its derivatives along all subsets of the directions."""
+        batch, sizes = self.problem.batch("vector field"), self._sizes
+        place = self._places(p[None])[end]
+        moves = [np.append(self._places(v[None])[end][0], v)[None] for v in directions]
+        given = np.zeros(1), place, np.empty((0, self._n)), p, batch.columns([])
+        found = {
+            chosen: batch.jacobian_along(*given, [moves[i] for i in chosen])[0, :, : self._n] * sizes / sizes[:, None]
+            for chosen in subsets(len(directions))[1:]
+        }
+        return {(): self._jacobian_at(place[0], p), **found}
+
+    def _fold_along(self, p: Array, directions: Sequence[Array]) -> dict[Numbers, Array]:
+        """Return g, shape (1,), with its derivatives along all subsets of the directions; of a saddle, shape (0,)."""
+        numbers = subsets(len(directions))
+        if not self.problem.saddle_node:
+            return dict.fromkeys(numbers, np.empty(0))
+        known = self._fold_vectors(self._jacobians_along(p, directions, 0), numbers)
+        return {chosen: vector[-1:] for chosen, vector in known.items()}
+
+    def _fold_vectors(self, field: dict[Numbers, Array], numbers: Sequence[Numbers]) -> dict[Numbers, Array]:
+        """Return (y, g), shape (n + 1,), with derivatives."""
+        n, (b, c) = self._n, self._borders
+        matrix = np.block([[field[()], b[:, None]], [c[None], np.zeros((1, 1))]])
+        known: dict[Numbers, Array] = {}
+        for chosen in numbers:
+            right: Array = np.zeros(n + 1)
+            right[n] = not chosen
+            for u, v in shares(chosen, 2):
+                right[:n] -= field[u] @ known[v][:n] if u else 0.0
+            known[chosen] = np.linalg.solve(matrix, right)
+        return known
+
     def _conditions_at_ends(self, x: Array, names: Sequence[str]) -> tuple[Array, Array, Array]:
-        """Return the projection and phase conditions, their derivatives by the states, and by parameters."""
+        """Return the projection, fold and phase conditions, their derivatives by the states, and by parameters."""
         p, places = self.all_parameters(x), self._indices(names)
         values, by_states = [], np.zeros((self._further, self.state_size))
         by_parameters = np.zeros((self._further, len(names)))
         for place, row in enumerate(self._unit_directions(places)):
             moved = self._end_rows(x, self._subspaces_along(p, [row]), [np.zeros(self.state_size)], [row])
-            by_parameters[:-1, place] = moved
+            by_parameters[:-1, place] = np.append(moved, self._fold_along(p, [row])[0,])
         for end, (here, at, L) in enumerate(self._end_places(self._subspaces_along(p, []))):
             values.append(L[()] @ self.apart(x)[end])
             by_states[here, at : at + self._n] = L[()]
+        values.append(self._fold_along(p, [])[()])
         values.append(np.array([self._phase @ x - self._target]))
         by_states[-1] = self._phase[: self.state_size]
         return np.concatenate(values), by_states, by_parameters
@@ -180,8 +215,9 @@ class ConnectionCollocation(Conditioned):
     def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of these conditions along several directions; the phase condition is linear."""
         states, parameters = zip(*(self._directions_of(v) for v in directions))
-        subspaces = self._subspaces_along(self.all_parameters(x), parameters)
-        return np.append(self._end_rows(x, subspaces, states, parameters), 0.0)
+        p, every = self.all_parameters(x), tuple(range(len(directions)))
+        rows = self._end_rows(x, self._subspaces_along(p, parameters), states, parameters)
+        return np.concatenate([rows, self._fold_along(p, parameters)[every], [0.0]])
 
     def conditions_bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(their derivative along v) by x: by the states at the ends, and by each free parameter."""
@@ -192,11 +228,11 @@ class ConnectionCollocation(Conditioned):
         for place, unit in enumerate(self._unit_directions(self._free)):
             own = unit * self.free_scales[place]
             rows = self._end_rows(x, self._subspaces_along(p, [along, own]), [states, still], [along, own])
-            result[self.state_size + place] = w[:-1] @ rows
+            result[self.state_size + place] = w[:-1] @ np.append(rows, self._fold_along(p, [along, own])[0, 1])
         return result
 
     def condition_values(self, x: Array) -> Array:
-        """Return the projection and phase conditions."""
+        """Return the projection, fold and phase conditions."""
         return self._conditions_at_ends(x, ())[0]
 
     def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
@@ -215,6 +251,22 @@ class ConnectionCollocation(Conditioned):
         """Return the derivatives of the field by the states at the first equilibrium, scaled, shape (n, n)."""
         p = self.all_parameters(x)
         return self._jacobian_at(self._places(p[None])[0][0], p)
+
+    def slow_motion(self, x: Array) -> tuple[Array, float]:
+        """Return p and a of a saddle-node: its slow motion is c' = a c^2, with c = p.(u - e) and p.q = 1, |q| = 1.
+
+        p and q are the left and right eigenvectors of the eigenvalue zero.
+        """
+        values, (b, c) = self.all_parameters(x), self._borders
+        jacobian = self.saddle_jacobian(x)
+        bordered = np.block([[jacobian, b[:, None]], [c[None], np.zeros((1, 1))]])
+        unit = np.append(np.zeros(self._n), 1.0)
+        q, p = (np.linalg.solve(matrix, unit)[:-1] for matrix in (bordered, bordered.T))
+        q /= np.linalg.norm(q)
+        direction = np.zeros(len(self.parameters))
+        direction[self._indices(self.problem.multipliers)] = q * self._sizes
+        bent = self._jacobians_along(values, [direction], 0)[0,] @ q
+        return p / (p @ q), float(p @ bent / (p @ q)) / 2
 
     def apart(self, x: Array) -> tuple[Array, Array]:
         """Return u(0) - e and u(1) - e', scaled."""

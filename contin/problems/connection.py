@@ -46,6 +46,9 @@ class ConnectionProblem(BoundaryValueProblem):
         Dimension of the stable manifold of the last equilibrium; without it the orbit is homoclinic.
     angles : sequence of str, or mapping of str to float, optional
         Of homoclinic orbits, states in which the field is periodic, with the period 2 pi or, in a mapping, any other.
+    saddle_node : bool
+        The orbit is homoclinic to a saddle-node: one eigenvalue is zero, and neither counted in ``unstable`` nor stable. The
+        orbit may leave and come back along its eigenvector.
 
     Raises
     ------
@@ -54,7 +57,8 @@ class ConnectionProblem(BoundaryValueProblem):
 
     Notes
     -----
-    A curve needs n - unstable - stable + 2 free parameters besides the equilibria: two for homoclinic orbits.
+    A curve needs n - unstable - stable + 2 free parameters besides the equilibria: two for homoclinic orbits, also to
+    saddle-nodes. Near a saddle-node an orbit is as slow as 1 / t: the error of cutting off falls like the square of 1 / time.
 
     Examples
     --------
@@ -77,14 +81,18 @@ class ConnectionProblem(BoundaryValueProblem):
     stable: int
     homoclinic: bool
     angles: Mapping[str, float]
+    saddle_node: bool
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *, unstable: int,
-        stable: int | None = None, angles: Angles = (),
+        stable: int | None = None, angles: Angles = (), saddle_node: bool = False,
     ) -> None:  # fmt: skip
         names = check_statement(states, parameters, {})
         homoclinic, count = stable is None, len(names)
-        checks.whole("unstable", unstable, 1, count - 1 if homoclinic else count)
+        checks.instance("saddle_node", saddle_node, bool, "True or False")
+        if saddle_node and not homoclinic:
+            raise ProblemError("saddle_node: orbits to a saddle-node are homoclinic; leave out stable")
+        checks.whole("unstable", unstable, 0 if saddle_node else 1, count - 1 if homoclinic else count)
         if stable is not None:
             checks.whole("stable", stable, 1, count)
         first, last = ([kind + name for name in names] for kind in ("from_", "to_"))
@@ -102,7 +110,8 @@ class ConnectionProblem(BoundaryValueProblem):
         object.__setattr__(self, "homoclinic", homoclinic)
         object.__setattr__(self, "angles", periods)
         object.__setattr__(self, "unstable", unstable)
-        object.__setattr__(self, "stable", count - unstable if stable is None else stable)
+        object.__setattr__(self, "saddle_node", saddle_node)
+        object.__setattr__(self, "stable", count - unstable - saddle_node if stable is None else stable)
         rhs, boundary = scaled(field, TIME), _at_rest(field, names, homoclinic)
         super().__init__(rhs, boundary, names, {**parameters, TIME: 1.0, **dict.fromkeys(own[1:], 0.0)})
         object.__setattr__(self, "functionals", {"gap": found_elsewhere})
@@ -127,12 +136,13 @@ class ConnectionProblem(BoundaryValueProblem):
     @property
     def conditions(self) -> tuple[int, int]:
         """Numbers of projection conditions at the first and at the last end."""
-        return len(self.state_names) - self.unstable, len(self.state_names) - self.stable
+        count = len(self.state_names) - self.saddle_node
+        return count - self.unstable, count - self.stable
 
     @property
     def free_size(self) -> int:
         """Number of free parameters on a curve: as many as conditions, less the states, and one."""
-        return self.boundary_size + sum(self.conditions) + 1 - len(self.state_names) + 1
+        return self.boundary_size + sum(self.conditions) + self.saddle_node + 1 - len(self.state_names) + 1
 
     def _compiled(self, name: str) -> Batch:
         if name == "vector field":
