@@ -82,6 +82,9 @@ _STEEP = 0.3
 _ASIDE = (0.01, 0.1, 0.5)
 #: A start this far outside a limit (relative to 1 + its size) still lies on it: it was located there, to round-off.
 _SLACK = 1e-9
+#: A curve that begins where a test function that ends runs is zero has it positive this far along its tangent: what is known to
+#: 1e-10 is then told from round-off, and no regular start lies so near to an end.
+_ENTERS = 1e-6
 #: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
 _SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
 #: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
@@ -341,9 +344,15 @@ class Continuation:
         return None
 
     def _out_of_domain(self, trial: Trial) -> Stop | None:
-        """Return the reason to stop at the first point: a test function of the kind of problem that ends runs is negative."""
-        ends = [test for test in self._own if test.terminal]
-        return next((Stop("event", f"{test.name} at the first point") for test in ends if trial.value(test) < 0), None)
+        """Return the reason to stop at the first point: a test function of the kind of problem that ends runs is negative.
+
+        At a point where a curve begins it is zero up to round-off, and positive a little further on.
+        """
+        beside = Trial.without_tangent(trial.system, trial.x + _ENTERS * trial.tangent)
+        for test in self._own:
+            if test.terminal and trial.value(test) < 0 and (self.state.singular or not test.function(beside) > 0):
+                return Stop("event", f"{test.name} at the first point")
+        return None
 
     def _advance(self) -> Iterator[Point]:
         """Make one step: yield the labelled points inside it, then the point at its end."""
@@ -736,6 +745,15 @@ class Continuation:
         count = now // 2 if half else min(self._intervals_for(state.system, error), now)
         return max(control.min_intervals, min(count, control.max_intervals))
 
+    def _serves(self, end: Trial) -> bool:
+        """Return whether the state's point is as good on a mesh of fewer intervals as it should be, or as it was.
+
+        Round-off does not grow there. Where canards amplify it, they amplify errors of the mesh, too, and these do.
+        """
+        accuracy = self._accuracy_of(end)
+        wanted = self.settings.mesh.tolerance
+        return not self._is_poor(accuracy) and not accuracy.error > max(wanted, self.state.discretization_error)
+
     def _move_to(self, adapted: tuple[Discretization, Carrier]) -> bool:
         """Correct the state's point on another mesh, or with other sizes, and return whether the run goes on from there.
 
@@ -764,7 +782,7 @@ class Continuation:
             return False
         if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, self.settings.newton):
             return False
-        if system.intervals < state.system.intervals and self._is_poor(accuracy_of(end)):
+        if system.intervals < state.system.intervals and not self._serves(end):
             return False
         self._end = end
         self.state = dataclasses.replace(
