@@ -34,8 +34,8 @@ _STEPS = 10_000
 _LONGEST = 500.0
 #: The orbit has turned back where it is closest for the first time, if it is closer than this part of its largest distance.
 _BACK = 0.95
-#: Values of the parameter on both sides that are looked at, the closer the nearer to that of the start, where the saddle may end;
-#: halvings of the interval between two of them.
+#: Values of the parameter on both sides that are looked at, closer to each other near that of the start, as the saddle may end
+#: there; halvings of the interval between two of them.
 _VALUES, _HALVINGS = 24, 60
 #: The interval is halved until the orbit comes back to this part of its largest distance; with the second it is no jump of m.
 _CLOSE, _JUMP = 1e-3, 0.05

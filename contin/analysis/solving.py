@@ -21,6 +21,7 @@ from contin.errors import ConvergenceError, ProblemError
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.angles import winding_names
 from contin.problems.boundary_value import BoundaryValueProblem
+from contin.problems.connection import ConnectionProblem
 from contin.problems.cycle import PERIOD, CycleProblem
 from contin.problems.statement import forget_changed, with_multipliers
 from contin.problems.variational import VariationalProblem
@@ -30,6 +31,8 @@ from contin.stepping.settling import ROUNDS
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 4
+#: Equilibria that are nearer to each other than this part of the orbit's size are one.
+_SAME = 1e-6
 
 
 def solve(
@@ -91,7 +94,10 @@ def solve(
     system, x = first_guess(problem, guess, options)
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
-    return solved(system, x, control, newton, others, held)
+    found = solved(system, x, control, newton, others, held)
+    if isinstance(problem, ConnectionProblem):
+        _check_ends(problem, found)
+    return found
 
 
 def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
@@ -187,6 +193,25 @@ def _check_options(problem: object, intervals: object, degree: object, control: 
         checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
     checks.instance("mesh", control, MeshControl, "a MeshControl")
     checks.instance("newton", newton, Newton, "a Newton")
+
+
+def _check_ends(problem: ConnectionProblem, found: Point) -> None:
+    """Check that an orbit between two equilibria does not return to the first one.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if problem.homoclinic:
+        return
+    count, names = len(problem.state_names), problem.multipliers
+    first, last = (np.array([found[name] for name in part]) for part in (names[:count], names[count:]))
+    if np.abs(first - last).max() <= _SAME * float(np.ptp(found.system.states(found.x), axis=0).max()):
+        place = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(problem.state_names, first))
+        raise ProblemError(
+            f"stable: both ends of the orbit are at the equilibrium {place}; leave out stable for a homoclinic orbit, or give "
+            f"a guess of the last equilibrium ({', '.join(names[count:])})"
+        )
 
 
 def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:

@@ -26,9 +26,9 @@ def leaves_saddle_node(point: Point) -> bool:
 def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]:
     """Return the system of the other curve that meets a non-central orbit, the orbit in it, and the tangent there.
 
-    From a curve of orbits to a saddle it is that of central orbits to the saddle-node, and the other way round. The orbit solves
-    the equations of both: its component along the eigenvector is zero at one end. The tangent leads to central orbits, or to
-    those of a saddle.
+    From a curve of orbits to a saddle it is that of central orbits to the saddle-node, and the other way round. The orbit
+    solves the equations of both: its component along the eigenvector is zero at one end. The tangent leads to central orbits,
+    or to those of a saddle.
 
     Raises
     ------
@@ -44,7 +44,8 @@ def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]
     values = dict(point.parameters)
     given = {name: value for name, value in values.items() if name not in (*old.multipliers, TIME)}
     problem = ConnectionProblem(old.field, old.state_names, given, unstable=unstable, saddle_node=to_saddle)
-    other = ConnectionCollocation(problem, system.mesh, system.degree, system.free, values, system.scales).with_reference(point.x)
+    other = ConnectionCollocation(problem, system.mesh, system.degree, system.free, values, system.scales)
+    other = other.with_reference(point.x)
     row = np.zeros(other.size)
     row[other.parameter_index(system.free[0])] = 1.0
     tangent = linearization(other, point.x, row).tangent

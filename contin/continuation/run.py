@@ -107,6 +107,9 @@ _STANDING = 6
 _MARGIN = 0.1
 #: Part of the tolerance below which an error may be round-off: at the usual tolerance it is some 1e-14.
 _FAR_BELOW = 0.03
+#: Intervals, as a multiple of those that the density asks for, that may make round-off larger: 25 before a Hopf point behind
+#: canards. Ten times smaller, meshes in explosions become coarser, where round-off and errors of the mesh are told apart badly.
+_FAR_TOO_MANY = 4
 #: Times that a step is made on finer and finer meshes, and the factor by which the number of intervals grows at most each time:
 #: where the error is large, its estimate is no guide to how many are needed.
 _ATTEMPTS, _GROWTH = 4, 4
@@ -736,12 +739,13 @@ class Continuation:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.
 
         An error far below the tolerance may be round-off, which does not grow on coarser meshes: half of the intervals may do.
-        So they may where all of the error is round-off: short intervals make it larger, as where cycles shrink after canards.
+        So they may where an error above the tolerance is round-off: short intervals make it larger, as where cycles shrink
+        after canards.
         """
         control, now, error = self.settings.mesh, state.system.intervals, state.discretization_error
         if math.isnan(error) or not now:
             return control.min_intervals
-        half = error < _FAR_BELOW * control.tolerance or accuracy_of(self._end, 0.0).is_round_off
+        half = error < _FAR_BELOW * control.tolerance or self._is_too_fine(state)
         count = now // 2 if half else min(self._intervals_for(state.system, error), now)
         return max(control.min_intervals, min(count, control.max_intervals))
 
@@ -750,9 +754,16 @@ class Continuation:
 
         Round-off does not grow there. Where canards amplify it, they amplify errors of the mesh, too, and these do.
         """
-        accuracy = self._accuracy_of(end)
-        wanted = self.settings.mesh.tolerance
-        return not self._is_poor(accuracy) and not accuracy.error > max(wanted, self.state.discretization_error)
+        accuracy, before = self._accuracy_of(end), self.state.discretization_error
+        return not self._is_poor(accuracy) and not (before > self.settings.mesh.tolerance and accuracy.error > before)
+
+    def _is_too_fine(self, state: State) -> bool:
+        """Return whether the state's error is round-off above the tolerance, on far more intervals than its density asks for."""
+        control, end = self.settings.mesh, self._end
+        if end is None or not state.discretization_error > control.tolerance or not self._accuracy_of(end).is_round_off:
+            return False
+        wanted = state.system.adapted(state.x, control)
+        return wanted is not None and wanted[0].intervals * _FAR_TOO_MANY <= state.system.intervals
 
     def _move_to(self, adapted: tuple[Discretization, Carrier]) -> bool:
         """Correct the state's point on another mesh, or with other sizes, and return whether the run goes on from there.

@@ -46,8 +46,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         there). With ``branch=1`` at HB and PD, those of the new branch.
     branch : int, optional
         Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
-        the opposite way. At NCH, 1 is the curve of homoclinic orbits to the saddle-node or, from that, to the saddle. By default
-        the one that it was found on, with ``direction`` that of the primary parameter.
+        the opposite way. At NCH, 1 is the curve of homoclinic orbits to the saddle-node or, from there, to the saddle. By
+        default the one that it was found on, with ``direction`` that of the primary parameter.
     progress : bool, optional
         Show one line on standard error while the run is under way: by default where standard error is a terminal.
 

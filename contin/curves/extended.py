@@ -117,6 +117,11 @@ class Extended(Discretization):
         size = self.base.size
         return np.append(self.base.lifted(x[:size], reference[:size]), x[size:])
 
+    def cut_off_errors(self, x: Array, factors: Factors) -> Array:
+        """Return those of the underlying system, along the curve's own equations."""
+        inside: Any = _Inside(factors, self)
+        return self.base.cut_off_errors(x[: self.base.size], inside)
+
     def states(self, x: Array) -> Array:
         """Return the states of the underlying system."""
         return self.base.states(x[: self.base.size])
@@ -192,9 +197,10 @@ class _Inside:
 
     def solve(self, b: Array) -> Array:
         """Return the unknowns of the underlying system."""
-        wide, base = np.zeros(self._system.equations + 1), self._system.base
-        wide[: base.equations], wide[-1] = b[:-1], b[-1]
-        found: Array = self._factors.solve(wide)[: base.size]
+        base = self._system.base
+        wide = np.zeros((*b.shape[:-1], self._system.equations + 1))
+        wide[..., : base.equations], wide[..., -1] = b[..., :-1], b[..., -1]
+        found: Array = self._factors.solve(wide)[..., : base.size]
         return found
 
 

@@ -16,9 +16,9 @@ On curves of homoclinic orbits to saddle-nodes, whose slow motion is c' = a c^2,
                     along another direction than the eigenvector of the eigenvalue zero, and a curve to saddles begins
     CP, BT, ZH      a, a second eigenvalue, or a pair, is zero, or imaginary
 
-In IFS and IFU a solves the adjoint equation; its values at the ends are the multipliers of the projection conditions in the left null vector
-of F_z, z all unknowns but the user's parameters. Eigenvectors and null vectors have the signs that they have at the reference
-of the discretization.
+In IFS and IFU a solves the adjoint equation; its values at the ends are the multipliers of the projection conditions in the
+left null vector of F_z, z all unknowns but the user's parameters. Eigenvectors and null vectors have the signs that they have
+at the reference of the discretization.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
     """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
     n, unstable = len(system.problem.state_names), system.problem.unstable
     counts = n - unstable, unstable
-    near = TestFunction("EP", "the ends of the orbit are far from the saddle: it needs a longer time", _closeness, terminal=True)
+    why = "the ends of the orbit are far from the saddle: it needs a longer time"
+    near = TestFunction("EP", why, _closeness, terminal=True)
     if system.problem.saddle_node:
         others = [_second_zero(side) for side in (0, 1) if (unstable if side else n - 1 - unstable)]
         return [near, _NON_CENTRAL[0], _NON_CENTRAL[1], _CUSP, *others]
@@ -94,8 +95,10 @@ def _slow_component(trial: Trial, end: int) -> float:
 #: The test functions of the first and of the last end of an orbit to a saddle-node, positive where it is a central one.
 _NON_CENTRAL = tuple(
     TestFunction(
-        "NCH", "non-central homoclinic orbit to a saddle-node",
-        (lambda trial: -_slow_component(trial, 1)) if end else (lambda trial: _slow_component(trial, 0)), terminal=True,
+        "NCH",
+        "non-central homoclinic orbit to a saddle-node",
+        (lambda trial: -_slow_component(trial, 1)) if end else (lambda trial: _slow_component(trial, 0)),
+        terminal=True,
     )  # fmt: skip
     for end in (0, 1)
 )
@@ -111,7 +114,7 @@ _CUSP = TestFunction("CP", "cusp: the saddle-node meets a third equilibrium", _b
 
 
 def _second_zero(side: int) -> TestFunction:
-    """Return the test function of a second eigenvalue zero, a stable (0) or unstable one; zero itself is one of two that meet."""
+    """Return the test function of a second eigenvalue zero, a stable (0) or unstable one: the sum of both that meet."""
 
     def total(trial: Trial) -> float:
         system = _system(trial)

@@ -34,6 +34,8 @@ _HALVINGS = 4
 _UNITS = 16
 #: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
 _FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
+#: Largest change of an unknown over which the slope of a test function is taken: the cube root of round-off.
+_ASIDE = 1e-5
 #: Rates of a parameter below this on both sides of a fold are round-off: on a plateau it changes by 1e-15 on the first step.
 _FLAT = 1e-12
 #: A step of it that leads further than this from the point of the coarser mesh, in units of the arclength, ends it, too.
@@ -98,7 +100,36 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         trial, details = better, found
         if np.all(steps <= settings.mesh.tolerance * size):
             break
-    return Refined(trial, errors, details)
+    return Refined(trial, _with_cut_off(errors, trial, point.test, settings), details)
+
+
+def _with_cut_off(errors: dict[str, float], trial: Trial, test: TestFunction | None, settings: Settings) -> dict[str, float]:
+    """Return the errors of the free parameters, and what cutting off an infinite time adds to them.
+
+    A special point moves along the branch, too, to where its test function vanishes again, a first point to where the primary
+    parameter has its value; a fold stays where it is.
+    """
+    system, along = trial.system, trial.tangent
+    moves = system.cut_off_errors(trial.x, trial.factors) if np.all(np.isfinite(along)) else np.empty((0, system.size))
+    if not len(moves) or not np.all(np.isfinite(moves)):
+        return errors
+    if test is None:
+        primary = settings.primary or system.free[0]
+        test = TestFunction("EP", "start", lambda trial: trial[primary])
+    if test.label != "LP":
+        size = float(np.abs(along).max())
+        slope = _change(test, trial, along * (_ASIDE / size)) * size
+        for move in moves:
+            largest = float(np.abs(move).max())
+            move -= along * (_change(test, trial, move * (_ASIDE / largest)) * largest / slope if largest and slope else 0.0)
+    added = np.abs(moves[:, system.state_size :]).sum(axis=0)[: len(system.free)] * system.free_scales
+    return {name: error + float(more) for (name, error), more in zip(errors.items(), added)}
+
+
+def _change(test: TestFunction, trial: Trial, move: Array) -> float:
+    """Return by how much a test function changes from a point to one beside it, over the distance of differences."""
+    ends = [test.function(Trial.without_tangent(trial.system, trial.x + way * move)) for way in (1, -1)]
+    return (ends[0] - ends[1]) / (2 * _ASIDE)
 
 
 def _is_bent(trial: Trial, better: Trial) -> bool:

@@ -15,6 +15,7 @@ from contin.discretization.multilinear import Numbers, shares, subsets
 from contin.discretization.protocol import Carrier
 from contin.discretization.scales import Scales
 from contin.errors import ConvergenceError
+from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
 from contin.problems.connection import ConnectionProblem
 
@@ -263,10 +264,44 @@ class ConnectionCollocation(Conditioned):
         unit = np.append(np.zeros(self._n), 1.0)
         q, p = (np.linalg.solve(matrix, unit)[:-1] for matrix in (bordered, bordered.T))
         q /= np.linalg.norm(q)
-        direction = np.zeros(len(self.parameters))
-        direction[self._indices(self.problem.multipliers)] = q * self._sizes
-        bent = self._jacobians_along(values, [direction], 0)[0,] @ q
+        bent = self._bent_jacobian(values, q, 0) @ q
         return p / (p @ q), float(p @ bent / (p @ q)) / 2
+
+    def cut_off_errors(self, x: Array, factors: Factors) -> Array:
+        """Return what the ends on tangent planes, in place of the manifolds, change, a row for each projection condition.
+
+        In the plane N z at an end the manifold is L (u - e) = H (z, z) + ..., with
+
+            H (K x I + I x K) - M H = L B(N, N) / 2,        A N = N K,  L A = M L,
+
+        B the second derivatives. Each condition is changed by that, and by an estimate of the next term, which is not known:
+        the third power of the distance, over the square of the orbit's size.
+        """
+        from scipy.linalg import null_space, solve_sylvester  # .1 s; only this needs it
+
+        p, size = self.all_parameters(x), float(np.ptp(self._scaled_states(x), axis=0).max()) or 1.0
+        amounts: list[float] = []
+        for end, (L, apart) in enumerate(zip(self._left_vectors(p), self.apart(x))):
+            if not len(L):
+                continue
+            A, L, N = self._jacobian_at(self._places(p[None])[end][0], p), _normalized(L, self._bases[end]), null_space(L)
+            K, M, unit = N.T @ A @ N, L @ A @ self._bases[end].T, np.eye(N.shape[1])
+            bent = np.hstack([L @ self._bent_jacobian(p, direction, end) @ N for direction in N.T]) / 2
+            H = solve_sylvester(-M, np.kron(K, unit) + np.kron(unit, K), bent)
+            z = N.T @ apart
+            amounts += [*(np.abs(H @ np.kron(z, z)) + float(np.linalg.norm(apart)) ** 3 / size**2)]
+        right_sides = np.zeros((len(amounts), self.equations + 1))
+        right_sides[range(len(amounts)), range(self._conditions, self._conditions + len(amounts))] = amounts
+        solved: Array = factors.solve(right_sides)
+        return solved
+
+    def _bent_jacobian(self, p: Array, direction: Array, end: int) -> Array:
+        """Return the derivative of the Jacobian at an equilibrium along a direction of the states, both scaled."""
+        moved = np.zeros(len(self.parameters))
+        names = self.problem.multipliers
+        own = names[: self._n] if end == 0 or self.problem.homoclinic else names[self._n :]
+        moved[self._indices(own)] = direction * self._sizes
+        return self._jacobians_along(p, [moved], end)[0,]
 
     def apart(self, x: Array) -> tuple[Array, Array]:
         """Return u(0) - e and u(1) - e', scaled."""

@@ -91,6 +91,13 @@ class Discretization(Equations, Protocol):
         """Return the same solution with its angles moved by whole rounds, so that they are nearest to those of a reference."""
         return x
 
+    def cut_off_errors(self, x: Array, factors: Factors) -> Array:
+        """Return by how much x is off because an infinite interval is cut off, a row for each condition there, (k, size).
+
+        All may have either sign. Most systems have none.
+        """
+        return np.empty((0, self.size))
+
     @property
     def named_states(self) -> tuple[str, ...]:
         """Names of the states that are columns: those that are numbers, no functions of t."""
