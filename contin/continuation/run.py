@@ -758,7 +758,7 @@ class Continuation:
         return not self._is_poor(accuracy) and not (before > self.settings.mesh.tolerance and accuracy.error > before)
 
     def _is_too_fine(self, state: State) -> bool:
-        """Return whether the state's error is round-off above the tolerance, on far more intervals than its density asks for."""
+        """Return whether the error is round-off above the tolerance, on far more intervals than the density asks for."""
         control, end = self.settings.mesh, self._end
         if end is None or not state.discretization_error > control.tolerance or not self._accuracy_of(end).is_round_off:
             return False

@@ -78,6 +78,8 @@ def test_of(label: str, system: ConnectionCollocation, x: Array) -> TestFunction
     Labels of `own_names` are those of the function that was located. Where two have the same label it is the one that vanishes.
     """
     trial, located = Trial.without_tangent(system, x), _LOCATED_AS.get(label, label)
+    if label in ("IFS", "IFU"):
+        return _inclination_flip("SU".index(label[-1]), known=True)
     found = [test for test in homoclinic_points(system) if test.label == located != "EP"]
     return min(found, key=lambda test: abs(test.function(trial)), default=None)
 
@@ -249,13 +251,19 @@ def _orbit_flip(side: int) -> TestFunction:
     return _flip("OFU" if side else "OFS", "orbit flip", side, component)
 
 
-def _inclination_flip(side: int) -> TestFunction:
+def _inclination_flip(side: int, known: bool = False) -> TestFunction:
+    """Return the test function of an inclination flip; of one that is ``known`` it is followed below round-off, too.
+
+    Right at a flip a(0), or a(1), is as small as its second exponential.
+    """
+
     def component(system: ConnectionCollocation, x: Array) -> float:
-        known = _left_null_vector(system, system.reference, None)
-        if not np.linalg.norm(system.adjoint_at_ends(x, known)[side]) > _NOTHING:
+        border = _left_null_vector(system, system.reference, None)
+        if not known and not np.linalg.norm(system.adjoint_at_ends(x, border)[side]) > _NOTHING:
             return float("nan")
-        adjoint = system.adjoint_at_ends(x, _left_null_vector(system, x, known))[side]
-        return _component(_leading_vectors(system, x, side)[0], adjoint)
+        adjoint = system.adjoint_at_ends(x, _left_null_vector(system, x, border))[side]
+        unit = _leading_vectors(system, x, side)[0]
+        return float(unit @ adjoint) if known else _component(unit, adjoint)
 
     return _flip("IFU" if side else "IFS", "inclination flip", side, component)
 

@@ -45,6 +45,35 @@ def test_the_error_of_cutting_off_is_about_the_square_of_the_gap():
         assert 0.01 * found["gap"] ** 2 < abs(found["c"] - speed(0.25)) < 2 * found["gap"] ** 2
 
 
+@pytest.mark.parametrize("length", [10.0, 15.0, 20.0, 25.0])
+def test_the_error_covers_the_time_that_is_cut_off(length):
+    """The exact speed, at a first point and at a limit: the estimate is right to a third, and never too small."""
+    for point in trace(front(length), free=["a", "c"], limits={"a": (0.2, 0.3)}).labelled("EP"):
+        off = abs(point["c"] - speed(point["a"]))
+        assert off < point.errors["c"] < 1.35 * off
+
+
+def test_the_error_of_a_located_value_covers_the_time_that_is_cut_off():
+    """Where c = .3, a is wrong by what c is wrong, over the slope of the exact speed."""
+    branch = trace(front(15.0), free=["a", "c"], zeros={"c": [0.3]}, limits={"a": (0.2, 0.4)})
+    (point,) = branch.labelled("UZ")
+    off = abs(point["a"] - (1 - 0.3 * math.sqrt(2)) / 2)
+    assert off < point.errors["a"] < 1.35 * off and point.errors["c"] < 1e-12
+
+
+def test_a_homoclinic_orbit_stated_as_one_between_two_equilibria():
+    problem = ConnectionProblem(loop, ["x", "y"], {"d": 0.01, "b": 0.0}, unstable=1, stable=1)
+
+    def guess(t):
+        x = 1.4 / math.cosh(18 * (t - 0.5)) ** 2
+        return x, -x * math.tanh(18 * (t - 0.5))
+
+    with pytest.raises(
+        ProblemError, match="stable: both ends of the orbit are at the equilibrium x = 0, y = 0; leave out stable"
+    ):
+        solve(problem, guess, {"time": 36}, free=["d"])
+
+
 def test_a_curve_of_fronts():
     branch = trace(front(), free=["a", "c"], limits={"a": (0.05, 0.45)})
     assert str(branch.stop) == "reached a = 0.45" and len(branch.points) > 3
@@ -156,7 +185,7 @@ def test_what_cannot_be_is_said():
         ConnectionProblem(nagumo, ["u", "v"], {"a": 0.25, "c": 0.3}, unstable=2)
     with pytest.raises(ProblemError, match="time is a parameter of every connection"):
         ConnectionProblem(nagumo, ["u", "v"], {"a": 0.25, "c": 0.3, "time": 1}, unstable=1)
-    with pytest.raises(ProblemError, match="must be a point of a CycleProblem"):
+    with pytest.raises(ProblemError, match="start: must be a point of a CycleProblem"):
         homoclinic(front(), free=["c"])
 
     def circle(u, p):

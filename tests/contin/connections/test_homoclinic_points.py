@@ -166,3 +166,48 @@ def test_no_orbit_flip_where_the_orbit_ends_too_near_to_the_saddle():
 def test_a_space_that_turned_by_a_right_angle_is_an_error_of_the_step():
     with pytest.raises(contin.ConvergenceError, match="turned by 90 degrees"):
         connections._normalized(np.array([[0.0, 0, 0.6, 0.8]]), np.array([[1.0, 0, 0, 0]]))
+
+
+def shifting(u, p):
+    """The orbit flip of `flipping` at mu = 1 - c^2; with a, the eigenvalues a + 1 and a - 1."""
+    x, y = sandstede(u, p)
+    return x + 0.3 * u.z * u.x, y, -u.z / 2 + (p.mu + p.c**2 - 1) * u.x
+
+
+@pytest.mark.full
+def test_orbit_flips_in_three_parameters():
+    """Closed form: z = 0 where mu = 1 - c^2, and the orbit comes in along the strong direction."""
+    problem = ConnectionProblem(shifting, ["x", "y", "z"], {"a": 0.0, "nu": 0.0, "mu": 0.0, "c": 1.0}, unstable=1)
+    orbit = contin.solve(problem, lambda t: (*leaf(40)(t), 0.0), {"time": 40}, free=["nu"], intervals=40)
+    start = contin.trace(orbit, free=["mu", "nu"], direction=-1, limits={"mu": (-0.1, 1)}).points[-1]
+    (flip,) = contin.trace(start, free=["mu", "nu"], limits={"mu": (-0.2, 0.1)}).labelled("OFS")
+    flips = contin.curve(flip, "c", limits={"c": (0.5, 2)})
+    assert str(flips.stop) == "reached c = 2"
+    assert np.abs(flips.column("mu") - 1 + flips.column("c") ** 2).max() < 1e-9
+    assert np.abs(flips.column("nu")).max() < 1e-9
+
+
+#: AUTO-07p's demo ``kpr``, runs 10 and 11, with NTST=200 and EPSL=EPSU=1e-8: l and k of inclination flips at 1/e = 5.
+AUTO_FLIPS = [(-1.6118809855, -0.39574479296), (-1.1867433258, -0.84447251569)]
+
+
+@pytest.mark.full
+def test_flips_and_saddle_nodes_of_koper_in_three_parameters():
+    """AUTO's curves of inclination flips; the second parameter of an end, l and k of a saddle-node, in closed form.
+
+    The orbit of AUTO takes a time of 60: its inclination flips are known to 3e-7.
+    """
+    problem = AlgebraicProblem(koper, ["x", "y", "z"], {"l": -1.85, "k": -0.15, "e": 10.0})
+    saddle = contin.solve(problem, [-0.95, -0.95, -0.95])
+    orbit = contin.homoclinic(saddle, free=["l"], limits={"l": (-1.852, -1.85)}, direction=-1)
+    assert orbit["l"] == pytest.approx(NOTES["kpr"]["adjoint"][0]["second"], abs=2e-10)
+    orbit = contin.trace(orbit, free=["l", "time"], primary="time", limits={"time": (0, 60)}).points[-1]
+    branch = contin.trace(orbit, free=["l", "k"], primary="k", direction=-1, limits={"k": (-3, 3)})
+    for flip, known in zip(branch.labelled("IFS"), AUTO_FLIPS, strict=True):
+        (point,) = contin.curve(flip, "e", direction=-1, limits={"e": (4.9, 12)}, zeros={"e": [5.0]}).labelled("UZ")
+        assert (point["l"], point["k"]) == pytest.approx(known, abs=3e-7)
+    ends = contin.curve(branch.points[-1], "e", direction=-1, limits={"e": (4.0, 12)})
+    assert str(ends.stop) == "reached e = 4"
+    s = ends.column("from_x")
+    assert np.abs(ends.column("k") - 3 * s * s + 3).max() < 1e-10
+    assert np.abs(ends.column("l") - 2 * s**3).max() < 1e-10
