@@ -38,9 +38,8 @@ def homoclinic(
     The cycle is cut where it comes closest to the saddle, and corrected as a `ConnectionProblem`. Its time is the period of
     the cycle. Follow the result with two free parameters, or with ``time`` and one to make the column ``gap`` smaller.
 
-    From a saddle with a single unstable eigenvalue an orbit that leaves along its eigenvector is followed until it comes back,
-    for values of the parameter within ``limits`` from the present one on, until one comes back to the saddle. With a single
-    stable eigenvalue this is done backwards in time.
+    From a saddle with a single unstable (or stable) eigenvalue, orbits that leave (or enter) along its eigenvector are followed
+    to where they come back, for values of the parameter from the present one on.
 
     Parameters
     ----------
@@ -58,8 +57,7 @@ def homoclinic(
     Raises
     ------
     ProblemError
-        The start is no cycle and no equilibrium, or the equilibrium is no saddle or, to grow an orbit from, has several
-        unstable and several stable eigenvalues.
+        The start is no cycle and no saddle, or a saddle with several unstable and several stable eigenvalues.
     ConvergenceError
         No homoclinic orbit is found near the cycle, or within the limits.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -94,10 +95,7 @@ def solve(
     system, x = first_guess(problem, guess, options)
     if not np.all(np.isfinite(x)):
         raise ProblemError("guess: its values must be finite numbers")
-    found = solved(system, x, control, newton, others, held)
-    if isinstance(problem, ConnectionProblem):
-        _check_ends(problem, found)
-    return found
+    return _leading_on(solved(system, x, control, newton, others, held))
 
 
 def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
@@ -195,15 +193,16 @@ def _check_options(problem: object, intervals: object, degree: object, control: 
     checks.instance("newton", newton, Newton, "a Newton")
 
 
-def _check_ends(problem: ConnectionProblem, found: Point) -> None:
-    """Check that an orbit between two equilibria does not return to the first one.
+def _leading_on(found: Point) -> Point:
+    """Return a solution; check that an orbit between two equilibria does not return to the first one.
 
     Raises
     ------
     ProblemError
     """
-    if problem.homoclinic:
-        return
+    problem: Any = found.system.problem
+    if not isinstance(problem, ConnectionProblem) or problem.homoclinic:
+        return found
     count, names = len(problem.state_names), problem.multipliers
     first, last = (np.array([found[name] for name in part]) for part in (names[:count], names[count:]))
     if np.abs(first - last).max() <= _SAME * float(np.ptp(found.system.states(found.x), axis=0).max()):
@@ -212,6 +211,7 @@ def _check_ends(problem: ConnectionProblem, found: Point) -> None:
             f"stable: both ends of the orbit are at the equilibrium {place}; leave out stable for a homoclinic orbit, or give "
             f"a guess of the last equilibrium ({', '.join(names[count:])})"
         )
+    return found
 
 
 def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:

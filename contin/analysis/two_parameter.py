@@ -23,7 +23,7 @@ from contin.curves.fold_curve import FoldCurve
 from contin.curves.hopf_curve import HopfCurve
 from contin.curves.map_curves import MapDoublingCurve, MapTorusCurve
 from contin.detection.branch_point import BranchPoint
-from contin.detection.homoclinic_points import test_of
+from contin.detection.homoclinic_points import own_test_of
 from contin.detection.lyapunov import critical_pair
 from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
@@ -49,9 +49,8 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     ----------
     start : Point
         A labelled point of a branch: LP, BP, HB (of equilibria), PD, TR, an extremum (EX), or where a column has a value (UZ,
-        EP); on a curve of homoclinic orbits also IFS, OFS, NCH, ..., with three free parameters then. Or a labelled point of a
-        curve, followed with one parameter more: an extremum of the curve's own column, the fold of a curve of folds with
-        respect to its first parameter, a user zero, or a point of codimension two.
+        EP); of homoclinic orbits IFS, OFS, NCH, ..., too. Or one of a curve, followed with one parameter more: an extremum of
+        its own column, the fold of a curve of folds with respect to its first parameter, a user zero, or of codimension two.
     second : str, optional
         The parameter that is free beside those of the branch.
     settings : Settings, optional
@@ -266,7 +265,7 @@ def _of_homoclinic_orbits(start: Point, base: Any, x: Array) -> _First | None:
     """A special point of a curve of homoclinic orbits, which has two free parameters already."""
     if not isinstance(base, ConnectionCollocation) or not base.problem.homoclinic:
         return None
-    test = test_of(start.label, base, x)
+    test = own_test_of(start.label, base, x)
     return None if test is None else (EventCurve(base, test.function, label=test.label), x)
 
 

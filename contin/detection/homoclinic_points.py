@@ -72,7 +72,7 @@ def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
     return found
 
 
-def test_of(label: str, system: ConnectionCollocation, x: Array) -> TestFunction | None:
+def own_test_of(label: str, system: ConnectionCollocation, x: Array) -> TestFunction | None:
     """Return the test function that labels a special point x of a curve of homoclinic orbits so; None where none does.
 
     Labels of `own_names` are those of the function that was located. Where two have the same label it is the one that vanishes.
@@ -112,6 +112,7 @@ def _bend(trial: Trial) -> float:
     return float(system.slow_motion(trial.x)[1] * np.sign(system.slow_motion(system.reference)[1]))
 
 
+#: The test function of a cusp.
 _CUSP = TestFunction("CP", "cusp: the saddle-node meets a third equilibrium", _bend, terminal=True)
 
 

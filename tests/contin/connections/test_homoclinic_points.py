@@ -195,7 +195,8 @@ AUTO_FLIPS = [(-1.6118809855, -0.39574479296), (-1.1867433258, -0.84447251569)]
 def test_flips_and_saddle_nodes_of_koper_in_three_parameters():
     """AUTO's curves of inclination flips; the second parameter of an end, l and k of a saddle-node, in closed form.
 
-    The orbit of AUTO takes a time of 60: its inclination flips are known to 3e-7.
+    The orbit of AUTO takes a time of 60: its inclination flips are known to 3e-7. A minute: each value of the function of a
+    flip takes two factored matrices.
     """
     problem = AlgebraicProblem(koper, ["x", "y", "z"], {"l": -1.85, "k": -0.15, "e": 10.0})
     saddle = contin.solve(problem, [-0.95, -0.95, -0.95])

@@ -233,3 +233,20 @@ def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
     branch = contin.trace(hopf, branch=1, limits={"r": (16, 25)}, errors=False)
     assert branch.points[-1].name == "r = 16" and not branch.labelled("PD") and not branch.labelled("TR")
     assert len(calls) < 2 * len(branch)
+
+
+def test_a_branch_that_begins_at_a_hopf_point_is_read_back(tmp_path):
+    """Its first point is a cycle without a size; from there, and from others, the branch is followed again."""
+
+    def circle(u, p):
+        square = u.x**2 + u.y**2
+        return p.mu * u.x - u.y - u.x * square, u.x + p.mu * u.y - u.y * square
+
+    rest = contin.solve(contin.AlgebraicProblem(circle, ["x", "y"], {"mu": -0.5}), [0.0, 0.0])
+    (hopf,) = contin.trace(rest, free=["mu"], limits={"mu": (-1, 1)}).labelled("HB")
+    branch = contin.trace(hopf, branch=1, limits={"mu": (-1, 0.5)})
+    contin.save(branch, tmp_path / "cycles.npz")
+    again = contin.load(branch.points[0].system.problem, tmp_path / "cycles.npz")
+    assert [point.label for point in again] == [point.label for point in branch]
+    further = contin.trace(again.points[-1], limits={"mu": (-1, 1)})
+    assert further.points[-1]["max_x"] == pytest.approx(1, abs=1e-9)
