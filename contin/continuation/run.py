@@ -108,8 +108,8 @@ _MARGIN = 0.1
 #: Part of the tolerance below which an error may be round-off: at the usual tolerance it is some 1e-14.
 _FAR_BELOW = 0.03
 #: Intervals, as a multiple of those that the density asks for, that may make round-off larger: 25 before a Hopf point behind
-#: canards. Ten times smaller, meshes in explosions become coarser, where round-off and errors of the mesh are told apart badly.
-_FAR_TOO_MANY = 4
+#: canards. Ten times smaller, meshes before explosions become coarser, where errors of the mesh are taken for round-off.
+_FAR_TOO_MANY = 8
 #: Times that a step is made on finer and finer meshes, and the factor by which the number of intervals grows at most each time:
 #: where the error is large, its estimate is no guide to how many are needed.
 _ATTEMPTS, _GROWTH = 4, 4
@@ -724,10 +724,13 @@ class Continuation:
         due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
         if state.singular or not due or state.accepted % due:
             return
-        control = dataclasses.replace(control, min_intervals=self._fewest_intervals(state))
-        adapted = state.system.adapted(state.x, control) or outgrown(state.system, state.x)
-        if adapted is not None:
-            self._move_to(adapted)
+        fewest = self._fewest_intervals(state)
+        half = max(control.min_intervals, state.system.intervals // 2)
+        for count in (half, fewest) if self._is_too_fine(state) else (fewest,):
+            adapted = state.system.adapted(state.x, dataclasses.replace(control, min_intervals=count))
+            adapted = adapted or outgrown(state.system, state.x)
+            if adapted is not None and self._move_to(adapted):
+                return
 
     def _intervals_for(self, system: Discretization, error: float) -> int:
         """Return the number of intervals with which a point of this error, of the order h^(2 d), is within the tolerance."""
@@ -739,14 +742,11 @@ class Continuation:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.
 
         An error far below the tolerance may be round-off, which does not grow on coarser meshes: half of the intervals may do.
-        So they may where an error above the tolerance is round-off: short intervals make it larger, as where cycles shrink
-        after canards.
         """
         control, now, error = self.settings.mesh, state.system.intervals, state.discretization_error
         if math.isnan(error) or not now:
             return control.min_intervals
-        half = error < _FAR_BELOW * control.tolerance or self._is_too_fine(state)
-        count = now // 2 if half else min(self._intervals_for(state.system, error), now)
+        count = now // 2 if error < _FAR_BELOW * control.tolerance else min(self._intervals_for(state.system, error), now)
         return max(control.min_intervals, min(count, control.max_intervals))
 
     def _serves(self, end: Trial) -> bool:
@@ -758,12 +758,18 @@ class Continuation:
         return not self._is_poor(accuracy) and not (before > self.settings.mesh.tolerance and accuracy.error > before)
 
     def _is_too_fine(self, state: State) -> bool:
-        """Return whether the error is round-off above the tolerance, on far more intervals than the density asks for."""
+        """Return whether the error is round-off above the tolerance, on far more intervals than the density asks for.
+
+        Half of them may do then: short intervals make it larger, as where cycles shrink after canards. Where the parameter
+        stands still, in an explosion, errors of the mesh are taken for round-off.
+        """
         control, end = self.settings.mesh, self._end
         if end is None or not state.discretization_error > control.tolerance or not self._accuracy_of(end).is_round_off:
             return False
         wanted = state.system.adapted(state.x, control)
-        return wanted is not None and wanted[0].intervals * _FAR_TOO_MANY <= state.system.intervals
+        if wanted is None or wanted[0].intervals * _FAR_TOO_MANY > state.system.intervals:
+            return False
+        return bool(self._sense(end))
 
     def _move_to(self, adapted: tuple[Discretization, Carrier]) -> bool:
         """Correct the state's point on another mesh, or with other sizes, and return whether the run goes on from there.
