@@ -109,7 +109,7 @@ _MARGIN = 0.1
 _FAR_BELOW = 0.03
 #: Intervals, as a multiple of those that the density asks for, that may make round-off larger: 25 before a Hopf point behind
 #: canards. Ten times smaller, meshes before explosions become coarser, where errors of the mesh are taken for round-off.
-_FAR_TOO_MANY = 8
+_FAR_TOO_MANY = 4
 #: Times that a step is made on finer and finer meshes, and the factor by which the number of intervals grows at most each time:
 #: where the error is large, its estimate is no guide to how many are needed.
 _ATTEMPTS, _GROWTH = 4, 4
