@@ -77,6 +77,8 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
         cycles, x, tangent = switched(start, free)
         return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
     if branch == 1 and leaves_saddle_node(start):
+        if free is not None:
+            raise ProblemError("free: the curve that leaves at NCH has the parameters of the one it was found on; leave it out")
         orbits, x, tangent = from_non_central(start)
         return follow_until_interrupted(Continuation(orbits, x, settings, settings.direction * tangent, singular=False), shown)
     if free is not None and checks.names("free", free) != system.free:

@@ -118,6 +118,8 @@ def test_curves_to_saddles_leave_and_come_back(direction, known):
     end = curve(direction).points[-1]
     saddles = contin.trace(end, branch=1, limits={"K": (1, 20), "G": (0.01, known[1])})
     assert not saddles.points[0].system.problem.saddle_node
+    with pytest.raises(ProblemError, match="free: the curve that leaves at NCH has the parameters"):
+        contin.trace(end, branch=1, free=["K", "D"])
     assert saddles.points[-1]["G"] == pytest.approx(known[1], abs=1e-9)
     assert saddles.points[-1]["K"] == pytest.approx(known[0], abs=2e-4)  # six digits in AUTO's output
     back = contin.trace(saddles.points[-1], direction=-1, limits={"K": (1, 20)}) if direction == 1 else None
