@@ -754,7 +754,7 @@ class Continuation:
 
         Round-off does not grow there. Where canards amplify it, they amplify errors of the mesh, too, and these do.
         """
-        accuracy, before = self._accuracy_of(end), self.state.discretization_error
+        accuracy, before = accuracy_of(end), self.state.discretization_error
         return not self._is_poor(accuracy) and not (before > self.settings.mesh.tolerance and accuracy.error > before)
 
     def _is_too_fine(self, state: State) -> bool:
@@ -764,7 +764,7 @@ class Continuation:
         stands still, in an explosion, errors of the mesh are taken for round-off.
         """
         control, end = self.settings.mesh, self._end
-        if end is None or not state.discretization_error > control.tolerance or not self._accuracy_of(end).is_round_off:
+        if end is None or not state.discretization_error > control.tolerance or not accuracy_of(end).is_round_off:
             return False
         wanted = state.system.adapted(state.x, control)
         if wanted is None or wanted[0].intervals * _FAR_TOO_MANY > state.system.intervals:
