@@ -10,6 +10,7 @@ from contin.arrays import Array
 from contin.detection.homoclinic_points import crossing, ending
 from contin.discretization.connections import ConnectionCollocation
 from contin.errors import ProblemError
+from contin.problems.angles import winding_names
 from contin.problems.connection import TIME, ConnectionProblem
 from contin.results.point import Point
 from contin.stepping.trial import Trial, linearization
@@ -42,8 +43,9 @@ def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]
     to_saddle, side = crossing(point)
     unstable = old.unstable - side if to_saddle else old.unstable + side
     values = dict(point.parameters)
-    given = {name: value for name, value in values.items() if name not in (*old.multipliers, TIME)}
-    problem = ConnectionProblem(old.field, old.state_names, given, unstable=unstable, saddle_node=to_saddle)
+    own = (*old.multipliers, TIME, *winding_names(old.angles))
+    given = {name: value for name, value in values.items() if name not in own}
+    problem = ConnectionProblem(old.field, old.state_names, given, unstable=unstable, angles=old.angles, saddle_node=to_saddle)
     other = ConnectionCollocation(problem, system.mesh, system.degree, system.free, values, system.scales)
     other = other.with_reference(point.x)
     row = np.zeros(other.size)
