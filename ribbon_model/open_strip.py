@@ -297,17 +297,14 @@ class OpenStrip:
     def check_determined(self, point: Point) -> None:
         """Raise ProblemError where something can move without a change of energy, or reactions are not determined."""
         try:
-            found = point.second_variation()
+            sizes = np.abs(point.second_variation().eigenvalues)
+            if not sizes.size or sizes.min() > _ZERO * sizes.max():
+                return
         except ProblemError as error:
-            raise ProblemError(self._reason(error)) from error
-        sizes = np.abs(found.eigenvalues)
-        if not sizes.size or sizes.min() > _ZERO * sizes.max():
-            return
-        if self._rigid_freedom(point):
-            raise ProblemError(
-                "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
-            )
-        raise ProblemError(UNHELD)
+            reason = self._reason(error)
+            if reason != UNHELD:
+                raise ProblemError(reason) from error
+        raise ProblemError(RIGID if self._rigid_freedom(point) else UNHELD)
 
     def _rigid_freedom(self, point: Point) -> bool:
         """Return whether a rigid motion violates no condition at the ends."""
@@ -371,6 +368,7 @@ class OpenStrip:
 
 
 #: Why a state is not determined.
+RIGID = "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
 UNHELD = (
     "ends: the strip can move, turn about itself or change its shape without a change of energy, so nothing determines its "
     "state; hold more, or give one of the phases " + ", ".join(map(repr, PHASES))

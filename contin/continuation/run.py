@@ -262,7 +262,7 @@ class Continuation:
         else:
             system, x, row = self._first_on_switches(system, x)
         linear = linearization(system, x, row)
-        rescaled, z = scaled(system, x, linear, self.primary, settings)
+        rescaled, z = scaled(system, x, row, linear, self.primary, settings)
         if rescaled is not system:
             x, row = self._first_correction(rescaled, z)
             system, linear = rescaled, linearization(rescaled, x, row)

@@ -17,6 +17,7 @@ from one count (`contin.discretization.scales`).
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -60,9 +61,11 @@ _HIGHEST = 5
 
 
 def scaled(
-    system: Discretization, x: Array, linear: Linearization, primary: str, settings: Settings
+    system: Discretization, x: Array, row: Array, linear: Linearization, primary: str, settings: Settings
 ) -> tuple[Discretization, Array]:
     """Return the system with sizes of states and parameters taken from a first point, and x for it.
+
+    ``linear`` is the linearization at x, bordered by ``row``.
 
     Unchanged where it has sizes already, or where all are of order one.
     """
@@ -72,7 +75,7 @@ def scaled(
     names, stated = [*states, *system.free], settings.scales
     sizes, held = system.largest(x), dict(zip(problem.parameters, np.abs(system.parameters)))
     if np.any(sizes < USUAL[0]) or any(0 < size < USUAL[0] for size in held.values()):
-        first = _FirstPoint(system, x, linear, primary, settings.newton)
+        first = _FirstPoint(system, x, row, linear, primary, settings.newton)
         sizes = first.sizes(np.array([stated.get(name, 0.0) for name in names]), _said(primary, settings))
         held = {name: size * first.counts(name, size, sizes) for name, size in held.items()}
     alike: Mapping[str, str] = getattr(problem, "alike", {})
@@ -102,8 +105,8 @@ class _FirstPoint:
     Arrays by name have the shape (states + free parameters,): the largest value of each state, and each free parameter.
     """
 
-    def __init__(self, system: System, x: Array, linear: Linearization, primary: str, newton: Newton) -> None:
-        self.system, self.x, self.linear, self._newton = system, x, linear, newton
+    def __init__(self, system: System, x: Array, row: Array, linear: Linearization, primary: str, newton: Newton) -> None:
+        self.system, self.x, self.row, self.linear, self._newton = system, x, row, linear, newton
         self._factors: Any = linear.factors
         self.place = system.parameter_index(primary)
         self.at = len(system.problem.states) + system.free.index(primary)
@@ -154,6 +157,11 @@ class _FirstPoint:
         nothing = found < _FAINT * np.max(found[guessed], initial=0.0)
         return np.where(guessed & ((found > _FAR) | nothing), np.where(nothing, 0.0, np.maximum(found, 1.0)), found)
 
+    @functools.cached_property
+    def _factors_beside(self) -> Any:
+        """Factors where x differs by one unit in the last place: solves with both differ by round-off of the elimination."""
+        return self.system.linearize(self._rounded(self.x), (self.row,))[1]
+
     def counts(self, name: str, size: float, sizes: Array) -> bool:
         """Return whether a small value of a parameter is more than nothing: without it, a state would change."""
         if size >= USUAL[0] or not size:
@@ -175,8 +183,8 @@ class _FirstPoint:
         """Return F_x^-1 of the derivative of F along directions, zero in states where that is nothing but round-off."""
         with np.errstate(all="ignore"):
             right = np.append(self.system.along(self.x, directions), 0.0)
-            both = np.stack([right, self._rounded(right)])
-            found, other = self._factors.solve(both) if right.any() else np.zeros_like(both)
+            found = self._factors.solve(right)
+            other = self._factors_beside.solve(self._rounded(right))
         if not np.all(np.isfinite(found)):
             return np.zeros_like(found)
         return self._kept(found, self.system.largest(found) > UNITS * self.system.largest(found - other))

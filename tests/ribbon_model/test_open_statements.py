@@ -97,7 +97,7 @@ SIDEWAYS = (WIDTH, NORMAL)
 #: Strips that nothing determines, with a part of the sentence.
 REJECTED = {
     "straight, flat, held sideways": (MATERIALS[1], CLAMP, End(held=SIDEWAYS), {"force_tangent": 0.1}, UNDETERMINED),
-    "loose": (ROD, End("free", held=()), End("free", held=()), {}, "without a change of energy"),
+    "loose": (ROD, End("free", held=()), End("free", held=()), {}, "rigid body"),
     "taut, under its weight": (MATERIALS[2], CLAMP, End("joint", TANGENT, 1, (NORMAL, TANGENT)), {"weight": 0.1}, UNDETERMINED),
     "under too much weight": (MATERIALS[0], CLAMP, End("free", held=()), {"weight": 1e4}, "with smaller loads (weight)"),
     "on one hinge": (ROD, hinge(), End("free", held=()), {}, "rigid body"),
