@@ -249,7 +249,14 @@ class OpenStrip:
             unloaded = {name: 0.0 for name in LOADS if name in self.numbers}
             if unloaded and str(error).startswith(_NO_CONVERGENCE):
                 self._check_unloaded(guess, {**(values or {}), **unloaded}, options)
-            raise ProblemError(self._reason(error)) from error
+            reason = self._reason(error)
+            if (
+                reason == UNHELD
+                and isinstance(guess, tuple)
+                and self._rigid_freedom(guess[1], self.parameters | (values or {}))
+            ):
+                reason = RIGID  # round-off decides whether the solver or the index notices
+            raise ProblemError(reason) from error
         self.check_determined(point)
         return point
 
@@ -304,15 +311,16 @@ class OpenStrip:
             reason = self._reason(error)
             if reason != UNHELD:
                 raise ProblemError(reason) from error
-        raise ProblemError(RIGID if self._rigid_freedom(point) else UNHELD)
+        raise ProblemError(RIGID if self._rigid_freedom(point.system.states(point.x), point.parameters) else UNHELD)
 
-    def _rigid_freedom(self, point: Point) -> bool:
-        """Return whether a rigid motion violates no condition at the ends."""
-        problem, states = self.problem, point.system.states(point.x)
+    def _rigid_freedom(self, known: np.ndarray, values: Mapping[str, float]) -> bool:
+        """Return whether a rigid motion violates no condition at the ends of states (K, ...), in the problem's order."""
+        problem = self.problem
         n, batch = problem.dimension, problem.batch("boundary")
-        jacobian = batch.jacobian(
-            np.zeros(1), states[:1], states[-1:], point.system.all_parameters(point.x), batch.columns([])
-        )[1][0]
+        states = np.zeros((2, len(batch.signature.states)))
+        states[:, : known.shape[1]] = known[[0, -1]]
+        p = np.array([float(values.get(name, value)) for name, value in problem.parameters.items()])
+        jacobian = batch.jacobian(np.zeros(1), states[:1], states[1:], p, batch.columns([]))[1][0]
         count = len(problem.canonical.fixed[0]) + len(problem.canonical.fixed[1]) + problem.canonical.sigmas
         by_ends = np.concatenate([jacobian[:count, :n], jacobian[:count, 2 * n : 3 * n]], axis=1)
         motions = np.array([np.concatenate([_moved(states[i, :7], k, n) for i in (0, -1)]) for k in range(6)])
