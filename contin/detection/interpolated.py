@@ -77,6 +77,9 @@ class InterpolatedZero:
         x at the nodes.
     functions : sequence of callable
         The first one has its zero there.
+    newton_error : float
+        Largest error that Newton's method has left of a point, relative to 1 + |x|: so near to a singular point, zeros on two
+        meshes may agree better.
     """
 
     trial: Trial
@@ -84,6 +87,7 @@ class InterpolatedZero:
     window: Window
     points: Array
     functions: Functions
+    newton_error: float
 
     def again(self, system: Discretization, carry: Carrier, newton: Newton) -> InterpolatedZero:
         """Return the same zero on another mesh, with another number of nodes: the change is the error of both.
@@ -162,7 +166,7 @@ def _interpolated(window: Window, points: Sequence[Trial], functions: Functions)
     along, system = through(at, 1), window.state.system
     tangent = np.asarray(along, dtype=float) / float(np.sqrt(inner(system, along, along)))
     trial = Trial(system, through(at), Linearization(tangent, np.nan))
-    return InterpolatedZero(trial, at, window, unknowns, functions)
+    return InterpolatedZero(trial, at, window, unknowns, functions, max(point.newton_error for point in points))
 
 
 def _polynomial(window: Window, rows: Array) -> Callable[..., Array]:

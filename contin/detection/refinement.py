@@ -165,7 +165,12 @@ def _on_switches(point: SpecialPoint, trial: Trial, details: Any, newton: Newton
 
 
 def _split(details: Any, system: Discretization) -> Any:
-    """Return by how much free parameters differ between a multiple point and the simple ones that it may consist of."""
+    """Return by how much free parameters differ between a multiple point and the simple ones that it may consist of.
+
+    Of a zero that was interpolated: the error that Newton's method has left of the points around it.
+    """
+    if isinstance(details, InterpolatedZero):
+        return details.newton_error * (1 + np.abs(details.trial.x[system.state_size :]))
     if not isinstance(details, MultiplePoint):
         return 0.0
     return details.spread * np.abs(details.tangents[0][system.state_size :])
