@@ -19,7 +19,7 @@ from contin.discretization.degree import usual_degree
 from contin.discretization.mesh import MeshControl
 from contin.errors import ProblemError
 from contin.linalg.orientation import first_least
-from contin.problems.angles import periods_of, whole_rounds, winding_names
+from contin.problems.angles import periods_of, whole_rounds, winding_names, windings
 from contin.problems.connection import TIME, ConnectionProblem
 from contin.problems.cycle import PERIOD
 from contin.results.point import Point
@@ -113,15 +113,18 @@ def _from_saddle(
     if direction not in (1, -1):
         raise ProblemError(f"direction: {checks.shown(direction)} must be 1 or -1")
     orbit, unstable = grown_orbit(start, name, (low, high), direction)
-    problem = ConnectionProblem(system.problem.residual, system.problem.state_names, start.parameters, unstable=unstable)
-    values = {**start.parameters, name: orbit.value, TIME: float(orbit.times[-1]), **dict(zip(problem.multipliers, orbit.rest))}
+    states, angles = system.problem.state_names, system.problem.angles
+    problem = ConnectionProblem(system.problem.residual, states, start.parameters, unstable=unstable, angles=angles)
+    rounds = windings(angles, states, orbit.states[-1] - orbit.states[0])
+    rest = orbit.rest + whole_rounds(orbit.states[0] - orbit.rest, periods_of(system.problem))
+    values = {**start.parameters, name: orbit.value, TIME: float(orbit.times[-1]), **rounds}
+    values |= dict(zip(problem.multipliers, rest))
     times = orbit.times / orbit.times[-1]
-    degree = usual_degree(len(system.problem.state_names), options[0].tolerance)
+    degree = usual_degree(len(states), options[0].tolerance)
     every = max(1, len(times) // _INTERVALS)
     points = np.append(times[:-1:every], 1.0)
     started = ConnectionCollocation(problem, points, degree, names, values)
-    states = np.stack([np.interp(started.nodes, times, column) for column in orbit.states.T], axis=1)
-    x = started.pack(states, values)
+    x = started.pack(np.stack([np.interp(started.nodes, times, column) for column in orbit.states.T], axis=1), values)
     return solved(started.with_reference(x), x, *options)
 
 

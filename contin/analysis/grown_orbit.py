@@ -22,6 +22,7 @@ from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.linalg.orientation import oriented
+from contin.problems.angles import periods_of, whole_rounds
 from contin.results.point import Point
 
 #: Distance from the saddle at which an orbit begins, relative to 1 + the states: its square, the error, is round-off.
@@ -83,7 +84,7 @@ class _Saddle:
     def __init__(self, point: Point, name: str) -> None:
         system: Any = point.system
         self.problem, self.name = system.problem, name
-        self.values = dict(point.parameters)
+        self.values, self.periods = dict(point.parameters), periods_of(system.problem)
         self.first: Array = system.states(point.x)[0]
         rates = np.linalg.eigvals(self._algebraic(self.values).jacobian(self.first)).real
         unstable, stable = int(np.count_nonzero(rates > 0)), int(np.count_nonzero(rates < 0))
@@ -95,6 +96,11 @@ class _Saddle:
                 "with a single unstable, or a single stable one"
             )
         self.unstable, self.sense = unstable, 1.0 if unstable == 1 else -1.0
+
+    def apart(self, states: Array, rest: Array) -> Array:
+        """Return by how much states (..., n) differ from the saddle, or from the same one whole rounds of its angles on."""
+        gap = states - rest
+        return gap - whole_rounds(gap, self.periods)
 
     def _algebraic(self, values: dict[str, float]) -> Algebraic:
         return Algebraic(self.problem, (), values)
@@ -200,26 +206,31 @@ def _followed(saddle: _Saddle, value: float, guess: Array, direction: int) -> Gr
     """
     rest, right, left, rate = saddle.at(value, guess)
     start = rest + direction * _BEGIN * (1 + np.abs(rest).max()) * right / np.abs(right).max()
-    found = _until_return(saddle.field(value), rest, start, _LONGEST / rate)
+    found = _until_return(saddle, value, rest, start, _LONGEST / rate)
     if found is None:
         return None
     times, states = found
-    far = np.linalg.norm(states - rest, axis=1)
+    far = np.linalg.norm(saddle.apart(states, rest), axis=1)
     away = int(np.argmax(far > _CUT * far.max()))
     times, states = times[away:] - times[away], states[away:]
-    missed = float(left @ (states[-1] - rest) / (np.linalg.norm(left) * far.max()))
+    missed = float(left @ saddle.apart(states[-1], rest) / (np.linalg.norm(left) * far.max()))
     if saddle.sense < 0:
         times, states = times[-1] - times[::-1], states[::-1]
     return GrownOrbit(value, rest, times, states, missed, float(far[-1] / far.max()))
 
 
-def _until_return(field: Any, rest: Array, start: Array, longest: float) -> tuple[Array, Array] | None:
+def _until_return(saddle: _Saddle, value: float, rest: Array, start: Array, longest: float) -> tuple[Array, Array] | None:
     """Return times (K,) and states (K, n) of an orbit up to where it is closest to the saddle again; None without a return."""
     from scipy.integrate import LSODA  # type: ignore[import-untyped]  # .3 s; only this needs it
     from scipy.optimize import brentq  # type: ignore[import-untyped]
 
+    field = saddle.field(value)
+
     def approach(t: float, u: Array) -> float:
-        return float((u - rest) @ field(t, u))
+        return float(saddle.apart(u, rest) @ field(t, u))
+
+    def distance(u: Array) -> float:
+        return float(np.linalg.norm(saddle.apart(u, rest)))
 
     solver = LSODA(field, 0.0, start, longest, rtol=_ACCURATE, atol=_ACCURATE)
     times, states, farthest, last = [0.0], [start], 0.0, 1.0
@@ -229,10 +240,10 @@ def _until_return(field: Any, rest: Array, start: Array, longest: float) -> tupl
         if solver.status == "failed" or not np.abs(u - rest).max() < _LOST * (1 + np.abs(rest).max()):
             return None
         last, between = approach(solver.t, u), solver.dense_output()
-        farthest = max(farthest, float(np.linalg.norm(u - rest)))
+        farthest = max(farthest, distance(u))
         if before < 0 <= last and approach(times[-1], between(times[-1])) < 0 < approach(solver.t, between(solver.t)):
             t = float(brentq(lambda t, between=between: approach(t, between(t)), times[-1], solver.t))
-            if np.linalg.norm(between(t) - rest) < _BACK * farthest:
+            if distance(between(t)) < _BACK * farthest:
                 return np.array([*times, t]), np.array([*states, between(t)])
         times.append(float(solver.t))
         states.append(u)

@@ -102,6 +102,17 @@ def test_the_homoclinic_orbit_is_found_from_a_guess():
     assert again["winding_phi"] == 1 and abs(again["current"] - first["current"]) < 1e-10
 
 
+def test_the_homoclinic_orbit_is_grown_from_its_saddle():
+    """The orbit comes back to the saddle one round further on; shooting along its manifolds as above."""
+    rest = contin.AlgebraicProblem(junction, ["phi", "v"], {"current": 0.6, "beta": 2.0}, angles=["phi"])
+    saddle = contin.solve(rest, [np.pi - 0.6, 0.0])
+    orbit = contin.homoclinic(saddle, free=["current"], limits={"current": (0.5, 0.95)})
+    assert orbit["winding_phi"] == 1
+    longer = contin.trace(orbit, free=["time", "current"], limits={"time": (0, 40)}).points[-1]
+    known = brentq(lambda current: apart_of_manifolds(current, 2.0), 0.77, 0.81, xtol=1e-13)
+    assert longer["current"] == pytest.approx(known, abs=1e-9)
+
+
 def pendulum(u, p):
     return u.v, -math.sin(u.phi) - p.damping * u.v
 
