@@ -151,8 +151,8 @@ def _from_cycle(cycle: Point, free: Sequence[str], options: tuple[MeshControl, N
     mesh_points = np.concatenate([system.mesh[cut:], 1 + system.mesh[1 : cut + 1]]) - system.mesh[cut]
     mesh_points[-1] = 1.0
     turned = np.concatenate([states[cut * degree :], states[1 : cut * degree + 1] + system.gains[-1]])
-    windings = {name: cycle.parameters[name] for name in winding_names(angles)}
-    values = {**parameters, **windings, TIME: cycle.parameters[PERIOD], **dict(zip(problem.multipliers, rest))}
+    rounds = {name: cycle.parameters[name] for name in winding_names(angles)}
+    values = {**parameters, **rounds, TIME: cycle.parameters[PERIOD], **dict(zip(problem.multipliers, rest))}
     started = ConnectionCollocation(problem, mesh_points, degree, tuple(free), values)
     x = started.pack(turned, values)
     return solved(started.with_reference(x), x, *options)
