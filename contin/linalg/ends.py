@@ -22,6 +22,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Stack
+from contin.linalg.singular import orthonormalize_row
 
 
 @kernel
@@ -38,29 +39,9 @@ def orthonormal_rows(chain: Stack, relations: Stack) -> float:
         for i in range(n):
             pivot = 1.0 / abs(block[i, i])  # inverse triangles are kept
             least, total = min(least, pivot), total + pivot
-            largest = 0.0
             for b in range(width):
                 rows[i, b] = block[n + i, n + b]
-                largest = max(largest, abs(rows[i, b]))
-            for b in range(width):
-                rows[i, b] /= largest
-            square = 0.0
-            for b in range(width):
-                square += rows[i, b] * rows[i, b]
-            for _ in range(2):
-                before, square = square, 0.0
-                for other in range(i):
-                    product = 0.0
-                    for b in range(width):
-                        product += relations[j, other, b] * rows[i, b]
-                    for b in range(width):
-                        rows[i, b] -= product * relations[j, other, b]
-                for b in range(width):
-                    square += rows[i, b] * rows[i, b]
-                if square >= 0.5 * before:  # where little of a row is left, that is round-off: once more
-                    break
-            for b in range(width):
-                rows[i, b] /= math.sqrt(square)
+            orthonormalize_row(rows, i)
     return float(least * points * n / total)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix
+from contin.functions.kernel_parts import Matrix, helper
 from contin.linalg.factors import Factors
 
 
@@ -20,23 +20,37 @@ def random_rows(count: int, size: int) -> Array:
     return block
 
 
-@kernel
-def orthonormalize(rows: Matrix, first: int) -> None:
-    """Make the rows from ``first`` on orthonormal, and orthogonal to those before, which are: in place, Gram-Schmidt, twice."""
-    count, size = rows.shape
-    for i in range(first, count):
-        largest = 0.0
-        for k in range(size):
-            largest = max(largest, abs(rows[i, k]))
-        for k in range(size):  # near a bifurcation solutions are huge
-            rows[i, k] /= largest
-        for turn in range(2 * i + 1):
-            j = turn % i if turn < 2 * i else i
+@helper
+def orthonormalize_row(rows, i):
+    """Make a row orthonormal to those before, which are orthonormal: Gram-Schmidt, twice where little of the row is left."""
+    size = rows.shape[1]
+    largest, square = 0.0, 0.0
+    for k in range(size):
+        largest = max(largest, abs(rows[i, k]))
+    for k in range(size):  # near a bifurcation solutions are huge
+        rows[i, k] /= largest
+        square += rows[i, k] * rows[i, k]
+    for _ in range(2):
+        before, square = square, 0.0
+        for j in range(i):
             product = 0.0
             for k in range(size):
                 product += rows[j, k] * rows[i, k]
             for k in range(size):
-                rows[i, k] = rows[i, k] - product * rows[j, k] if j < i else rows[i, k] / np.sqrt(product)
+                rows[i, k] -= product * rows[j, k]
+        for k in range(size):
+            square += rows[i, k] * rows[i, k]
+        if square >= 0.5 * before:  # otherwise what is left is partly round-off
+            break
+    for k in range(size):
+        rows[i, k] /= np.sqrt(square)
+
+
+@kernel
+def orthonormalize(rows: Matrix, first: int) -> None:
+    """Make the rows from ``first`` on orthonormal, and orthogonal to those before, which are: in place."""
+    for i in range(first, rows.shape[0]):
+        orthonormalize_row(rows, i)
 
 
 @kernel
