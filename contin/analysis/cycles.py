@@ -80,7 +80,7 @@ def cycle(
 
 def _numbers(start: Any, count: int) -> Array:
     array = np.asarray(start, dtype=float).ravel()
-    if array.size != count or not np.all(np.isfinite(array)):
+    if array.size != count or not np.isfinite(array).all():
         raise ProblemError(f"start: {checks.shown(start)} must be {count} finite numbers, the states")
     return array
 
@@ -99,7 +99,7 @@ def _integrated(field: Any, start: Array, time: float, **options: Any) -> Any:
     from scipy.integrate import solve_ivp  # type: ignore[import-untyped]  # .3 s; only this needs it
 
     done = solve_ivp(field, (0.0, time), start, method="LSODA", rtol=_ACCURATE, atol=_ACCURATE, **options)
-    if not done.success or not np.all(np.isfinite(done.y)):
+    if not done.success or not np.isfinite(done.y).all():
         raise ProblemError(f"start: the motion from there has no finite value after t = {done.t[-1]:.6g}")
     return done
 

@@ -67,7 +67,7 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
     """Return the multipliers after damped Gauss-Newton steps, all but the rates of the states weighted by ``share``."""
     lam, multipliers = start
     residual, gradient, normal = _equations(system, states, lam, multipliers, share)
-    if not np.all(np.isfinite(residual)):
+    if not np.isfinite(residual).all():
         raise ProblemError("guess: the equations have no finite value there (look for what divides by zero, or at `starts`)")
     for _ in range(_STEPS):
         if not np.any(normal):
@@ -79,7 +79,7 @@ def _settled(system: Collocation, states: Array, start: tuple[Array, Array], sha
             new_lam = lam + part * step[: lam.size].reshape(lam.shape)
             new_multipliers = multipliers + part * step[lam.size :]
             new = _equations(system, states, new_lam, new_multipliers, share)
-            if np.all(np.isfinite(new[2])) and np.linalg.norm(new[0]) <= np.linalg.norm(residual):
+            if np.isfinite(new[2]).all() and np.linalg.norm(new[0]) <= np.linalg.norm(residual):
                 break
             part /= 2
         else:
@@ -129,7 +129,7 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
     field, by = field.reshape(count, d, -1), by.reshape(count, d, field.shape[-1], -1)
     weights = np.sqrt(h[:, None] * basis.weights)
     residual = (rates - field[:, :, : 2 * n]) * weights[:, :, None]
-    residual[:, :, n:] *= share if np.all(np.isfinite(residual)) else 1.0
+    residual[:, :, n:] *= share if np.isfinite(residual).all() else 1.0
     rows = -np.einsum("eirk,ij->eirjk", by[:, :, : 2 * n, n : 2 * n], basis.value)
     rows[:, :, n:] += np.einsum("rk,ij,e->eirjk", np.eye(n), basis.slope, 1 / h)
     rows = np.concatenate([rows.reshape(count, d, 2 * n, -1), -by[:, :, : 2 * n, 2 * n :]], axis=-1)

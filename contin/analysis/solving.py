@@ -93,7 +93,7 @@ def solve(
     held = _check_count(problem, free)
     options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))
     system, x = first_guess(problem, guess, options)
-    if not np.all(np.isfinite(x)):
+    if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
     return _leading_on(solved(system, x, control, newton, others, held))
 

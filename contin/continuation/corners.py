@@ -12,7 +12,7 @@ from contin.stepping.trial import Trial
 def jump(trial: Trial, primary: str) -> str:
     """Return a note if the equations jump at some place of a solution; "" otherwise."""
     found = trial.system.switching(trial.x)
-    if not found.jumps.any():
+    if not (found.places.size and found.jumps.any()):
         return ""
     where = _where(found, int(np.argmax(found.jumps)), trial, primary)
     return (
@@ -24,7 +24,7 @@ def jump(trial: Trial, primary: str) -> str:
 def unsettled(trial: Trial, tolerance: float, primary: str) -> str:
     """Return a note if conditions switch inside intervals of the mesh, and that matters; "" otherwise."""
     found = trial.system.switching(trial.x)
-    if not (found.costs > tolerance).any():
+    if not (found.places.size and (found.costs > tolerance).any()):
         return ""
     where = _where(found, int(np.argmax(found.costs)), trial, primary)
     return f"no mesh has a point where {where}: from there on the points are as exact as discretization_error says"

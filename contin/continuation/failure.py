@@ -12,7 +12,7 @@ from contin.errors import ConvergenceError
 from contin.names import exact_text
 from contin.stepping.settings import Settings
 from contin.stepping.state import State, Stop
-from contin.stepping.step import corrected, predict, turn
+from contin.stepping.step import corrected, judged, predict
 from contin.stepping.trial import Trial
 
 #: Shorter steps that are tried, as parts of ``min_step``: the largest that goes on is told.
@@ -35,7 +35,7 @@ _LIKE = 0.05
 def no_convergence(state: State, settings: Settings, error: ConvergenceError) -> Stop:
     """Return the reason why no step from a state succeeds, the last of which failed with an error."""
     least = exact_text(settings.min_step)
-    if not np.all(np.isfinite(state.system.residual(predict(state, settings.min_step)))):
+    if not np.isfinite(state.system.residual(predict(state, settings.min_step))).all():
         return Stop(
             "no convergence", f"the equations have no finite value a step of min_step = {least} further on",
             "look for what they divide by, or take a root or logarithm of: their domain ends there",
@@ -156,9 +156,10 @@ def _goes_on(state: State, settings: Settings, way: float) -> bool:
 
 def _next(state: State, step: float, settings: Settings) -> Trial | None:
     """Return the point at the end of a step; None where it is not found, or the tangent turns too far."""
+    guess = predict(state, step)
     try:
-        trial = corrected(state, predict(state, step), step, settings.newton)
+        trial = corrected(state, guess, step, settings.newton)
     except ConvergenceError:
         return None
-    finite = np.all(np.isfinite(trial.system.residual(trial.x))) and np.isfinite(inner(state.system, trial.x, trial.x))
-    return trial if finite and turn(state, trial) <= settings.angle else None
+    finite = np.isfinite(trial.system.residual(trial.x)).all() and np.isfinite(inner(state.system, trial.x, trial.x))
+    return trial if finite and judged(state, guess, trial).turn <= settings.angle else None

@@ -57,14 +57,14 @@ from contin.stepping.settings import Settings
 from contin.stepping.settling import ROUNDS, settled
 from contin.stepping.state import State, Stop, standing_at
 from contin.stepping.step import (
+    Judgement,
     corrected,
-    hidden_turn,
+    judged,
     located,
     predict,
     sharpened,
     tangent_error,
     trial_of,
-    turn,
     up_to_limits,
 )
 from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
@@ -77,6 +77,12 @@ _ASTRAY = 2.5
 _DOUBT = 0.2
 #: A component above this is never in doubt: tangents are better known than that.
 _STEEP = 0.3
+#: Nor is one in doubt where the tangent was taken so near that solutions which bend by this much per unit of length leave it as
+#: it is: more than that they bend closer than 1e-4 to a branch point.
+_BENT = 1e4
+#: Nor is one that differs by less than this part of itself from what the parameter's own values say. Ten times larger, folds
+#: on both sides of a pitchfork are seen where there are none.
+_EVEN = 0.02
 #: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
 #: The next one is taken where the equations are still too nearly singular for Newton's method.
 _ASIDE = (0.01, 0.1, 0.5)
@@ -139,15 +145,14 @@ class Step(NamedTuple):
     ----------
     segment : Segment
     inspection : Inspection
-    distance : float
-        From prediction to corrected point.
+    judgement : Judgement
     doubt : str
         What is left of it where the step cannot be halved any more.
     """
 
     segment: Segment
     inspection: Inspection
-    distance: float
+    judgement: Judgement
     doubt: str
 
     @property
@@ -387,7 +392,7 @@ class Continuation:
             yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return
-        self.state = self._accept(segment, step.distance, inspection.turns)
+        self.state = self._accept(segment, step.judgement, inspection.turns)
         self._stand_at(step.end)
         self._note_corners(step.end)
         if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
@@ -509,13 +514,13 @@ class Continuation:
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
-                segment, distance = self._attempt(state, step)
+                segment, judgement = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
                 doubt = inspection.doubt() or self._contradiction(segment, inspection) or self._lost_end(segment, inspection)
                 doubt = doubt or self._moved_past(segment.trial)
                 if step < 2 * finest or not doubt:
                     inspection.special_points(self._tests)  # where points inside cannot be found the step is halved
-                    return Step(segment, inspection, distance, doubt)
+                    return Step(segment, inspection, judgement, doubt)
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
@@ -525,7 +530,7 @@ class Continuation:
             if step < settings.min_step:
                 raise problem
 
-    def _attempt(self, state: State, step: float) -> tuple[Segment, float]:
+    def _attempt(self, state: State, step: float) -> tuple[Segment, Judgement]:
         """Make one step of a given length, as far as it can be believed by itself.
 
         Raises
@@ -539,16 +544,15 @@ class Continuation:
             raise ConvergenceError("the equations are not finite at the corrected point")
         if collapsed(state.system, state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
-        gap = guess - trial.x
-        distance = np.sqrt(inner(state.system, gap, gap))
-        angle = turn(state, trial)
-        if not (angle <= settings.angle and distance <= _ASTRAY * settings.accuracy * step):
+        judgement = judged(state, guess, trial)
+        if not (judgement.turn <= settings.angle and judgement.missed <= _ASTRAY * settings.accuracy * step):
             raise ConvergenceError(
-                f"tangents turn by {angle:.2f} rad in one step, the prediction is off by {distance / step:.2f} of it"
+                f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
+                f"{judgement.missed / step:.2f} of it"
             )
-        if hidden_turn(state, trial) > settings.angle:
+        if judgement.hidden_turn > settings.angle:
             raise ConvergenceError("the corrected point does not lie where the tangents at both ends lead")
-        if self._fold is not None and self._may_turn(trial):
+        if self._fold is not None and self._may_turn(state, trial, step):
             trial = sharpened(state, trial)
         if self._fold is not None and self._jumped(state, guess, trial, step):
             raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
@@ -556,7 +560,7 @@ class Continuation:
         self._stay_off_trivial(state, before, trial)
         if settings.mesh.every:
             trial = settled(trial, state.tangent, settings.newton)
-        return Segment(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), distance
+        return Segment(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), judgement
 
     def _stay_off_trivial(self, state: State, before: Trial, trial: Trial) -> None:
         """Raise ConvergenceError where the corrected point lies on the trivial branch, or where the first step passes it."""
@@ -585,8 +589,9 @@ class Continuation:
         problem = ConvergenceError("another branch was met right beside the branch point")
         for share in _ASIDE:
             try:
-                aside = located(state, state.x + share * step * state.tangent, share * step, self.settings.newton)
-                if turn(state, aside) <= self.settings.angle:
+                guess = state.x + share * step * state.tangent
+                aside = located(state, guess, share * step, self.settings.newton)
+                if judged(state, guess, aside).turn <= self.settings.angle:
                     return share * step, aside
             except ConvergenceError as error:
                 problem = error
@@ -596,13 +601,21 @@ class Continuation:
         """Return whether the equations are finite at a point: they are where its discretization error is."""
         if trial.system.intervals and np.isfinite(trial.discretization_error):
             return True
-        return bool(np.all(np.isfinite(trial.system.residual(trial.x))))
+        return bool(np.isfinite(trial.system.residual(trial.x)).all())
 
-    def _may_turn(self, trial: Trial) -> bool:
-        """Return whether the primary parameter is so near to a fold that an approximate tangent may have the wrong sign."""
+    def _may_turn(self, state: State, trial: Trial, step: float) -> bool:
+        """Return whether the primary parameter is so near to a fold that an approximate tangent may have the wrong sign.
+
+        It has not where the parameter itself says the same: at the end of a step its rate is twice the mean rate less that at
+        the beginning, if it changes evenly.
+        """
         at = trial.system.parameter_index(self.primary)
         component = abs(trial.tangent[at])
-        if component >= _STEEP:
+        if component >= _STEEP or _BENT * trial.linear.moved < _DOUBT * component:
+            return False
+        rate = trial.tangent[at] / inner(state.system, state.tangent, trial.tangent)
+        expected = 2 * (trial.x[at] - state.x[at]) / step - state.tangent[at]
+        if abs(rate - expected) < _EVEN * abs(rate):
             return False
         return not abs(tangent_error(trial, trial.system.residual(trial.x))[at]) < _DOUBT * component
 
@@ -619,10 +632,10 @@ class Continuation:
         jumped = missed > _MISSED * change and missed > noise * (1 + abs(trial.x[at]))
         return bool(jumped and self._sense(trial))
 
-    def _has_moved(self, gone: Array, trial: Trial) -> bool:
+    def _has_moved(self, start: Array, trial: Trial) -> bool:
         """Return whether a step has moved the primary parameter by more than round-off: tangents are blurred at Hopf points."""
         at = trial.system.parameter_index(self.primary)
-        return bool(abs(gone[at]) > STANDS * (1 + abs(trial.x[at])))
+        return bool(abs(trial.x[at] - start[at]) > STANDS * (1 + abs(trial.x[at])))
 
     def _sense(self, trial: Trial) -> float:
         """Return the sense in which the primary parameter goes; zero where that cannot be told, or is not wanted."""
@@ -631,9 +644,9 @@ class Continuation:
     def _exact_tangent(self, state: State) -> Array:
         """Return the tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""
         tangent = linearization(state.system, state.x, state.row).tangent
-        return tangent if np.all(np.isfinite(tangent)) else state.tangent
+        return tangent if np.isfinite(tangent).all() else state.tangent
 
-    def _accept(self, segment: Segment, distance: float, turned: bool) -> State:
+    def _accept(self, segment: Segment, judgement: Judgement, turned: bool) -> State:
         """Return the next state, its step chosen so that the predictor's error is ``accuracy`` of it.
 
         ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
@@ -641,18 +654,18 @@ class Continuation:
         settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
         order = 2 if state.previous_tangent is None else 3
         aim = settings.accuracy * step
-        factor = _LONGER if distance == 0 else (aim / distance) ** (1 / order)
-        factor = min(factor, _AIM * settings.angle / max(turn(state, trial), _NO_ANGLE))
-        p, rate = trial.x[state.system.state_size :], trial.tangent[state.system.state_size :]
-        longest = min(settings.max_step, settings.change * float(np.min((1 + np.abs(p)) / (np.abs(rate) + _NO_RATE))))
-        longer = step * np.clip(factor, _SHORTER, _LONGER)
-        following = float(np.clip(longer, settings.min_step, max(longest, settings.min_step)))
-        gone = trial.x - state.x
-        way = self._sense(trial) if turned or self._has_moved(gone, trial) else 0.0
+        factor = _LONGER if judgement.missed == 0 else (aim / judgement.missed) ** (1 / order)
+        factor = min(factor, _AIM * settings.angle / max(judgement.turn, _NO_ANGLE))
+        free = slice(state.system.state_size, None)
+        rates = zip(trial.x[free].tolist(), trial.tangent[free].tolist())
+        longest = min(settings.max_step, *[settings.change * (1 + abs(p)) / (abs(rate) + _NO_RATE) for p, rate in rates])
+        longer = step * min(max(factor, _SHORTER), _LONGER)
+        following = min(max(longer, settings.min_step), max(longest, settings.min_step))
+        way = self._sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
         way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
         return State(
             state.system, trial.x, trial.tangent, None if state.singular else state.tangent, step, following, trial.sign,
-            state.arclength + np.sqrt(inner(state.system, gone, gone)), state.accepted + 1, False,
+            state.arclength + judgement.length, state.accepted + 1, False,
             way or state.sense, free_values(trial) if way else state.sensed, trial.discretization_error,
         )  # fmt: skip
 
@@ -727,7 +740,8 @@ class Continuation:
         fewest = self._fewest_intervals(state)
         half = max(control.min_intervals, state.system.intervals // 2)
         for count in (half, fewest) if self._is_too_fine(state) else (fewest,):
-            adapted = state.system.adapted(state.x, dataclasses.replace(control, min_intervals=count))
+            wanted = control if count == control.min_intervals else dataclasses.replace(control, min_intervals=count)
+            adapted = state.system.adapted(state.x, wanted)
             adapted = adapted or outgrown(state.system, state.x)
             if adapted is not None and self._move_to(adapted):
                 return
@@ -812,7 +826,9 @@ class Continuation:
 
     def _located(self, found: SpecialPoint) -> SpecialPoint:
         """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
-        labelled = found.label not in ("", "MX") and found.name != "closed"  # closed: the first point once more
+        if not found.label:
+            return found  # a regular point
+        labelled = found.label != "MX" and found.name != "closed"  # closed: the first point once more
         coarse = own_normal_form(found.trial.system, found)
         if found.errors is None and labelled and self.settings.errors:
             again = refined(found.same_as or found, self.settings)
@@ -831,7 +847,7 @@ class Continuation:
         """Return the point of a branch; its accuracy is estimated where it is not known."""
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
-        if accuracy is None and found.name != "closed" and np.all(np.isfinite(trial.tangent)):
+        if accuracy is None and found.name != "closed" and np.isfinite(trial.tangent).all():
             accuracy = accuracy_of(trial)
         elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on no finer mesh
             accuracy = self._accuracy

@@ -185,7 +185,7 @@ class _FirstPoint:
             right = np.append(self.system.along(self.x, directions), 0.0)
             found = self._factors.solve(right)
             other = self._factors_beside.solve(self._rounded(right))
-        if not np.all(np.isfinite(found)):
+        if not np.isfinite(found).all():
             return np.zeros_like(found)
         return self._kept(found, self.system.largest(found) > UNITS * self.system.largest(found - other))
 
@@ -387,6 +387,8 @@ def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier]
     """Return the system with larger sizes where unknowns have outgrown theirs, and the carrier; None where there is no need."""
     if not isinstance(system, System):
         return None
+    if not np.abs(x).max() > USUAL[1]:
+        return None  # most steps
     names, count = list(system.problem.parameters), len(system.problem.states)
     states, parameters = np.ones(count), np.ones(len(names))
     if system.scales is not None:

@@ -60,7 +60,7 @@ class BorderedMatrix:
     def is_regular(self) -> bool:
         """Return whether M is regular. It is singular where the kernel of F_x has more than two dimensions."""
         response = smallest_directions(self.factors, self._system.size + 1, 2)[2]
-        if not np.all(np.isfinite(response)):
+        if not np.isfinite(response).all():
             return False
         largest, second = np.linalg.svd(response, compute_uv=False)
         return bool(second > _REGULAR * largest)

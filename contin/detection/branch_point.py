@@ -149,7 +149,7 @@ class _Search:
         psi = random.standard_normal(system.equations) / np.sqrt(system.equations)
         # borders of random numbers first, then of the kernel itself: the best conditioned
         matrix = BorderedMatrix(system, x, phi, psi)
-        if not np.all(np.isfinite(matrix.kernel)):
+        if not np.isfinite(matrix.kernel).all():
             raise ConvergenceError("no branch point near by: the bordered matrix is singular")
         self._borders = _orthonormal(system, matrix.kernel), matrix.left()
         self._hessian: Array | None = None
@@ -166,7 +166,7 @@ class _Search:
         elif np.any(self._drop):  # Broyden's update
             missed = self._gradient - matrix.g - self._slope @ self._drop
             self._slope = self._slope + np.outer(missed, self._drop / (self._drop @ self._drop))
-        if not (np.all(np.isfinite(self._hessian)) and np.all(np.isfinite(matrix.g))):
+        if not (np.isfinite(self._hessian).all() and np.isfinite(matrix.g).all()):
             return False
         correction = matrix.factors.solve(np.concatenate([matrix.residual + self.beta * self._borders[1], [0.0, 0.0]]))
         drop: Any = np.linalg.lstsq(self._slope, matrix.g, rcond=_FLAT)[0]
@@ -199,7 +199,7 @@ class _Search:
         if np.max(np.abs(self.x - self._origin)) > _MOVED:
             matrix = BorderedMatrix(system, self.x, *self._borders)
             hessian = matrix.hessian(self.x)
-        if not (np.all(np.isfinite(matrix.kernel)) and np.all(np.isfinite(hessian)) and matrix.is_regular()):
+        if not (np.isfinite(matrix.kernel).all() and np.isfinite(hessian).all() and matrix.is_regular()):
             raise ConvergenceError("no simple branch point near by: the kernel has more than two dimensions")
         tangents = [a @ matrix.kernel for a in _null_directions(hessian)]
         tangents = [oriented(tangent / np.sqrt(inner(system, tangent, tangent))) for tangent in tangents]

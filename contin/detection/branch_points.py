@@ -87,7 +87,7 @@ class BranchPointSearch:
         segment, system = self.segment, self.segment.state.system
         size, unit = system.size, np.zeros(system.size + 1)
         right, left, response = smallest_directions(segment.trial.factors, size, 2)
-        inverses = np.sort(np.linalg.svd(response, compute_uv=False)) if np.all(np.isfinite(response)) else np.ones(2)
+        inverses = np.sort(np.linalg.svd(response, compute_uv=False)) if np.isfinite(response).all() else np.ones(2)
         if inverses[1] < _BY_FAR * inverses[0]:
             return False
         rows, unit[-1] = np.zeros((2, size + 1)), 1.0
@@ -95,7 +95,7 @@ class BranchPointSearch:
         column = left[:1, : system.equations]
         first, last = (system.linearize(end.x, rows, column)[1] for end in (segment.before, segment.trial))
         g = [factors.solve(unit)[-1] for factors in (first, last)]
-        if not np.all(np.isfinite(g)) or (g[0] * g[1] < 0) != self.sign_changes:
+        if not np.isfinite(g).all() or (g[0] * g[1] < 0) != self.sign_changes:
             return False
         return crossings(quotients(first, last, size + 1)) == (0, True)
 

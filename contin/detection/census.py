@@ -18,7 +18,6 @@ from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
-from contin.linalg.dense import eigenvalues
 from contin.stepping.trial import TestFunction, Trial
 
 #: Real part of an eigenvalue, relative to the largest eigenvalue, below which its side of zero is not known, and nothing is
@@ -47,18 +46,15 @@ def _of_maps(system: MapSystem) -> None:
 
 def _count(trial: Trial) -> float:
     system: Any = trial.system
-    matrix = system.jacobian(trial.x)
-    if not np.all(np.isfinite(matrix)):
-        return np.nan
-    if np.abs(matrix - matrix.T).max() <= _SYMMETRIC * np.abs(matrix).max():
-        values = np.linalg.eigvalsh(matrix)
-    elif system.problem.dynamics:
-        values = eigenvalues(matrix)
+    if system.problem.dynamics:
+        values = system.computed_eigenvalues(trial.x)
     else:
-        return np.nan
-    if np.any(np.abs(values.real) <= _UNDECIDED * np.abs(values).max()):
-        return np.nan
-    return float(np.count_nonzero(values.real > 0))
+        matrix = system.jacobian(trial.x)
+        if not (np.abs(matrix - matrix.T).max() <= _SYMMETRIC * np.abs(matrix).max() < np.inf):
+            return np.nan
+        values = np.linalg.eigvalsh(matrix)
+    decided = np.abs(values.real).min() > _UNDECIDED * np.abs(values).max()
+    return float(np.count_nonzero(values.real > 0)) if decided else np.nan
 
 
 #: One object, so that a trial counts once.

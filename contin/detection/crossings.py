@@ -21,8 +21,8 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Mask
 from contin.linalg.condensation import Factorization
-from contin.linalg.dense import eigenvalues
-from contin.linalg.ends import compared
+from contin.linalg.dense import DenseFactors, eigenvalues
+from contin.linalg.ends import compared, is_near_one
 from contin.linalg.factors import Factors
 from contin.linalg.singular import fill_products, orthonormalize, random_rows
 
@@ -92,14 +92,8 @@ def _condensed(before: Factors, after: Factors) -> Array | None:
         return None
     if not min(before.ends.least_pivot, after.ends.least_pivot) > _PIVOT:
         return None
-    one, other, turn = compared(before.ends, after.ends)
-    if not (turn < _TURN and np.all(np.isfinite(one)) and np.all(np.isfinite(other))):
-        return None
-    try:
-        quotient: Any = np.linalg.solve(other, one)
-    except np.linalg.LinAlgError:
-        return None
-    return np.asarray(quotient)
+    quotient, turn = compared(before.ends, after.ends)
+    return quotient if turn < _TURN and np.isfinite(quotient).all() else None
 
 
 def _finite_eigenvalues(matrix: Array) -> ComplexArray:
@@ -111,10 +105,12 @@ def _finite_eigenvalues(matrix: Array) -> ComplexArray:
 
 def _all(before: Factors, after: Factors, size: int) -> ComplexArray:
     """Return all eigenvalues of the quotient."""
+    if isinstance(before, DenseFactors) and isinstance(after, DenseFactors):
+        return _finite_eigenvalues(after.solve(before.matrix.T))
     with np.errstate(all="ignore"):
         unit = np.eye(size)
         earlier, later = before.solve(unit).T, after.solve(unit).T
-        if not (np.all(np.isfinite(later)) and np.all(np.isfinite(earlier))):
+        if not (np.isfinite(later).all() and np.isfinite(earlier).all()):
             return np.full(size, np.nan, dtype=complex)
         try:
             quotient: Any = np.linalg.solve(earlier, later)
@@ -127,7 +123,7 @@ def _watched(before: Factors, after: Factors, size: int) -> ComplexArray | None:
     """Return the eigenvalues in those directions in which the inverses differ most; None where these are too many."""
     watch = _Watch(before, after, size)
     while watch.grows():
-        if not np.all(np.isfinite(watch.values)):
+        if not np.isfinite(watch.values).all():
             return watch.values
         decided = watch.decided()
         if decided is not None:
@@ -198,7 +194,7 @@ class _Watch:
 
 def _eigenvalues(earlier: Array, later: Array) -> tuple[ComplexArray, ComplexArray]:
     """Return the eigenvalues of earlier^-1 later, and its eigenvectors as columns of unit length; NaN where it is singular."""
-    if np.all(np.isfinite(later)) and np.all(np.isfinite(earlier)):
+    if np.isfinite(later).all() and np.isfinite(earlier).all():
         try:
             values, vectors = np.linalg.eig(np.linalg.solve(earlier, later))
             return values.astype(complex, copy=False), vectors.astype(complex, copy=False)
@@ -214,15 +210,16 @@ def _is_steady(values: ComplexArray) -> Mask:
 
 def calm(before: Factors, after: Factors, size: int) -> bool:
     """Return whether no singular value comes anywhere near zero between two points, be it from approximate factors."""
+    if size <= _SMALL and isinstance(before, DenseFactors) and isinstance(after, DenseFactors):
+        return _is_near_one(after.solve(before.matrix.T))
     condensed = _condensed(before, after)
     if condensed is not None:
-        apart = condensed - np.eye(len(condensed))
-        return bool(np.vdot(apart, apart) < _NEAR_ONE**2) or _is_calm(_finite_eigenvalues(condensed))
+        return _is_near_one(condensed)
     if size <= _SMALL:
         return _is_calm(_all(before, after, size))
     watch = _Watch(before, after, size)
     for number in range(_GLANCES):
-        if not watch.grows() or not np.all(np.isfinite(watch.values)):
+        if not watch.grows() or not np.isfinite(watch.values).all():
             return False
         if number == 0 and _is_calm(watch.values):
             return True
@@ -230,6 +227,14 @@ def calm(before: Factors, after: Factors, size: int) -> bool:
         if decided is not None:
             return _is_calm(decided)
     return False
+
+
+def _is_near_one(quotient: Array) -> bool:
+    """Return whether a quotient is so near to the identity, or its eigenvalues so near to one, that nothing comes near zero."""
+    quotient = np.ascontiguousarray(quotient)
+    if is_near_one(quotient, _NEAR_ONE, _CALM, np.empty(quotient.shape)):
+        return True
+    return _is_calm(_finite_eigenvalues(quotient))
 
 
 def _is_calm(values: ComplexArray) -> bool:

@@ -125,7 +125,7 @@ def _by_place(system: Any, x: Array, tangent: Array, errors: Mapping[str, float]
     """
     known = [(errors[name] / size, tangent[system.parameter_index(name)])
              for name, size in zip(system.free, system.free_scales) if errors.get(name, 0.0) > 0]  # fmt: skip
-    if not known or not np.all(np.isfinite(known)):
+    if not known or not np.isfinite(known).all():
         return 0.0
     error, rate = np.linalg.norm(known, axis=0)
     cycles, beside = _cycles(system), x + _ASIDE * tangent
@@ -142,7 +142,7 @@ def _corrected(system: Discretization, x: Array, tangent: Array) -> Array:
     """Return a cycle corrected; as it is where F_x is singular there and no tangent is known."""
     if system.size == system.equations:
         return correct(system, x).x
-    if not np.all(np.isfinite(tangent)):
+    if not np.isfinite(tangent).all():
         return x
     row = system.weights * tangent
     return correct(system, x, row, row @ x).x
@@ -219,7 +219,7 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     inside = [segment.step * part for part in _LOOKS]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
     values = [trial.value(test) for _, trial in looked]
-    if not np.all(np.isfinite(values)) or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
+    if not np.isfinite(values).all() or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
         return []
     knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda place: place[0])
     knots = sorted([*knots, *_below(segment, knots, test)], key=lambda place: place[0])
@@ -231,13 +231,19 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
 
 def _comes_near(segment: Segment, distances: Callable[[Sequence[complex]], list[float]]) -> bool:
     """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
-    ends = [_without_trivial(trial) for trial in (segment.before, segment.trial)]
-    changes = [[_CHANGES * abs(_difference(here, there)) for there in ends[1]] for here in ends[0]]
-    for values, moves in ((ends[0], changes), (ends[1], zip(*changes))):
-        for distance, several in zip(distances(values), moves):
-            if not (distance > _NEAR and any(move < distance for move in several)):
+    for values, moves in _moves(segment):
+        for distance, move in zip(distances(values), moves):
+            if not (distance > _NEAR and _CHANGES * move < distance):
                 return True
     return False
+
+
+@functools.lru_cache(maxsize=1)
+def _moves(segment: Segment) -> list[tuple[tuple[complex, ...], list[float]]]:
+    """Return the logarithms at both ends of a step, and how far each is from the nearest at the other end."""
+    first, last = _without_trivial(segment.before), _without_trivial(segment.trial)
+    gaps = [[abs(_difference(here, there)) for there in last] for here in first]
+    return [(first, list(map(min, gaps))), (last, list(map(min, zip(*gaps))))]
 
 
 @functools.lru_cache(maxsize=4)
@@ -373,6 +379,4 @@ def _doubtful(point: SpecialPoint) -> SpecialPoint:
 
 def _passes(segment: Segment, point: SpecialPoint) -> bool:
     """Return whether the pair of a torus bifurcation lies inside the circle on one side of it, and outside on the other."""
-    if not point.is_located or point.test is None:
-        return True
-    return passes(segment, point.at, point.test)
+    return not point.is_located or passes(segment, point.at, point.details["frequency"])

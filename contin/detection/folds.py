@@ -9,8 +9,9 @@ is found or r stays away from zero.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +40,7 @@ _OUTSIDE = 1e-6
 _BESIDE = 0.05
 
 
-@dataclass(frozen=True)
-class _Parabola:
+class _Parabola(NamedTuple):
     """The rate between two places: first + linear z + square z^2, z from 0 to 1."""
 
     first: float
@@ -86,8 +86,8 @@ class FoldSearch:
         found = self.between(left, right)
         while segment.state.singular and found and not self._differs(left[1], found[0].trial):
             del found[0]  # the first point itself: beside it tangents are blurred
-        clear = max(abs(trial.value(self.fold)) for _, trial in (left, right)) >= _ROUND_OFF
-        if not (clear and segment.trial.newton_error <= segment.newton.tolerance):
+        clear = max(abs(left[1].value(self.fold)), abs(right[1].value(self.fold))) >= _ROUND_OFF
+        if found and not (clear and segment.trial.newton_error <= segment.newton.tolerance):
             self._drop_round_off(found, left, right)
         return found or passed_before(segment, self.fold)
 
@@ -111,8 +111,8 @@ class FoldSearch:
 
     def between(self, left: Place, right: Place) -> list[SpecialPoint]:
         """Return the places between two where the rate changes its sign, in order."""
-        ends = [trial.value(self.fold) for _, trial in (left, right)]
-        if max(map(abs, ends)) < _ROUND_OFF and not self._differs(left[1], right[1]):
+        ends = left[1].value(self.fold), right[1].value(self.fold)
+        if max(abs(ends[0]), abs(ends[1])) < _ROUND_OFF and not self._differs(left[1], right[1]):
             return []
         fork = self.pitchfork()
         if fork is not None and left[0] - self._outside <= fork.at <= right[0] + self._outside:
@@ -178,9 +178,13 @@ class FoldSearch:
 
     def _dip(self, left: Place, right: Place) -> Place | None:
         """Return a place between two of equal rates where the rate has the other sign; None if there is none."""
-        sense = float(np.sign(self.rate(left[1])) or np.sign(self.rate(right[1])))
-        place, square = self._suspect(left, right, sense)
-        lowest, flat = np.inf, _FLAT * max(abs(self.rate(left[1])), abs(self.rate(right[1])))
+        parabola = self._parabola(left, right)
+        first, last = parabola.first, parabola.last
+        if not (first or last):
+            return None
+        sense = math.copysign(1.0, first or last)
+        place, square = self._suspect(left, right, parabola if sense > 0 else parabola.times(sense))
+        lowest, flat = np.inf, _FLAT * max(abs(first), abs(last))
         while place is not None:
             value = sense * self.rate(place[1])
             if value < -flat:
@@ -204,13 +208,13 @@ class FoldSearch:
             place = (s, self.segment.at(s)) if left[0] < s < right[0] else None
         return None
 
-    def _suspect(self, left: Place, right: Place, sense: float) -> tuple[Place | None, float]:
+    def _suspect(self, left: Place, right: Place, parabola: _Parabola) -> tuple[Place | None, float]:
         """Return a place between two where the rate could come near zero, or None, and half its second derivative.
 
-        That is the parabola's vertex. Where it lies outside, but the rate at one end is close to zero already: that end.
+        That is the vertex of the parabola, which is positive at both ends. Where it lies outside, but the rate at one end is
+        close to zero already: that end.
         """
         a, width = left[0], right[0] - left[0]
-        parabola = self._parabola(left, right).times(sense)
         first, last, linear, square = parabola.first, parabola.last, parabola.linear, parabola.square
         smaller = min(first, last)
         if 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * smaller:

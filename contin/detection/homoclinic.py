@@ -147,7 +147,7 @@ def _fold_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArra
         ahead[at] += step
         slope = (system.rates(ahead, states[None])[0] - rates) / step
         matrix = np.column_stack([system.rates_by_states(y, states[None])[0], slope])
-        if not np.all(np.isfinite(matrix)):
+        if not np.isfinite(matrix).all():
             return None
         update = np.linalg.lstsq(matrix, -rates)[0]
         states += update[:-1]

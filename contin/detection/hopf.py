@@ -85,12 +85,27 @@ def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
         return []  # all eigenvalues are real
     inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda knot: knot[0])
+    if _stay_apart(looked):
+        return []
     if any(_passes_as_pair(left[1], right[1]) for left, right in itertools.pairwise(looked)):
         knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda knot: knot[0])
     found: list[SpecialPoint] = []
     for left, right in itertools.pairwise(knots):
         found += _between(segment, left, right, 0)
     return _joined(sorted(found, key=lambda point: point.at), segment)
+
+
+def _stay_apart(places: list[Place]) -> bool:
+    """Return whether all eigenvalues move less, from one place to the next, than they are from the imaginary axis.
+
+    Each is then nearer to one on its own side of the axis than to any on the other: none has changed the side.
+    """
+    system: Any = places[0][1].system
+    values = system.eigenvalues_at([trial.x for _, trial in places])
+    if not values[0].size or any(len(each) != len(values[0]) for each in values):
+        return False
+    along = np.sort(np.array(values), axis=1)
+    return bool(np.abs(along[1:] - along[:-1]).max() < np.abs(along.real).min())
 
 
 def _passes_as_pair(left: Trial, right: Trial) -> bool:
@@ -115,7 +130,7 @@ def _matched(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
     """
     system: Any = left.system
     first, last = system.eigenvalues(left.x), system.eigenvalues(right.x)
-    if not (np.all(np.isfinite(first)) and np.all(np.isfinite(last))):
+    if not (np.isfinite(first).all() and np.isfinite(last).all()):
         return np.empty(0, complex), np.empty(0, complex)
     rows, columns = _nearest_pairs(np.abs(first[:, None] - last))
     ahead = [z for i, z in enumerate(first) if i not in rows and z.real > 0]
@@ -186,15 +201,23 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
         return None
     label, name = crossing
     test = _nearest(1j * frequency)
-    if not lost and 0.0 in (first.real, last.real) and not passes(segment, at, test):
+    if not lost and 0.0 in (first.real, last.real) and not passes(segment, at, frequency):
         return None  # the pair lies on the axis before
     return SpecialPoint(at, label, lost + name, there, None, {"frequency": frequency, "pairs": 1}, test)
 
 
-def passes(segment: Segment, at: float, test: TestFunction) -> bool:
-    """Return whether a test function has different signs before and behind a place."""
-    before, behind = (test.function(segment.near(at + way * _BESIDE * segment.step)) for way in (-1, 1))
-    return bool(before * behind < 0)
+def passes(segment: Segment, at: float, frequency: float) -> bool:
+    """Return whether the pair of this frequency lies on different sides of the axis before and behind a place.
+
+    One that is on the axis up to round-off at either place does not.
+    """
+    sides = []
+    for s in (at - _BESIDE * segment.step, at + _BESIDE * segment.step):
+        trial = segment.near(s)
+        system: Any = trial.system
+        values = system.eigenvalues(trial.x)
+        sides.append(values[np.argmin(np.abs(values - 1j * frequency))].real)
+    return bool(sides[0] * sides[1] < 0)
 
 
 def _pairs_at(point: SpecialPoint) -> int:

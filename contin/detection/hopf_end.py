@@ -137,7 +137,7 @@ def _critical(system: CycleCollocation, x: Array, states: Array, expected: compl
         except np.linalg.LinAlgError:
             break
         here = here - update
-        if not np.all(np.isfinite(here)):
+        if not np.isfinite(here).all():
             break
         if np.abs(update).max() <= _CONVERGED * (1 + np.abs(here).max()):
             states[:] = here

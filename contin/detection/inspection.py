@@ -128,9 +128,9 @@ class Inspection:
         before, trial = self.segment.before, self.segment.trial
         if not all(senses(self.segment, self.fold)):
             return True  # it stands still as far as can be told
-        knots = [before, *(fold.trial for fold in self._folds), trial]
+        knots = [before, *[fold.trial for fold in self._folds], trial]
         at = trial.system.parameter_index(self.fold.name)
-        sense = np.sign(before.value(self.fold))
+        sense = math.copysign(1.0, before.value(self.fold))
         noise = _STANDS + 2 * trial.newton_error
         for left, right in itertools.pairwise(knots):
             if sense * (right.x[at] - left.x[at]) < -noise * (1 + abs(right.x[at])):
@@ -211,7 +211,7 @@ class Inspection:
     def _zeros(self, test: TestFunction, crossings: list[SpecialPoint]) -> list[SpecialPoint]:
         """Return the zeros of a test function, looked for between the folds. At a fold or branch point they lie right there."""
         if test.search is not None:
-            points: list[SpecialPoint] | None = test.search(self.segment, self._knots())
+            points: list[SpecialPoint] | None = test.search(self.segment, self._knots)
             if points is not None:
                 return points
         state = self.segment.state
@@ -253,7 +253,7 @@ class Inspection:
     def _pieces(self, test: TestFunction, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
         """Return the pieces of the step between the folds, without what is right beside some special points."""
         segment, aside = self.segment, _BESIDE * self.segment.step
-        between = self._looked_at(test, self._knots())
+        between = self._looked_at(test, self._knots) if test.looks else self._knots
         if not same:
             return list(itertools.pairwise(between))
         knots, cut = [], [point.at for point in same]
@@ -268,8 +268,6 @@ class Inspection:
     def _looked_at(self, test: TestFunction, knots: list[Place]) -> list[Place]:
         """Return the knots and, where a test function changes its sign inside the step more than once, places between them."""
         inside = [self.segment.step * part / (test.looks + 1) for part in range(1, test.looks + 1)]
-        if not inside:
-            return knots
         known = [
             *((s, trial.value(test)) for s, trial in knots),
             *((s, test.function(self.segment.guessed(s))) for s in inside),
@@ -279,11 +277,12 @@ class Inspection:
             return knots
         return sorted([*knots, *((s, self.segment.near(s)) for s in inside)], key=lambda place: place[0])
 
+    @functools.cached_property
     def _knots(self) -> list[Place]:
         """Return places between which a test function has one zero at most, as far as can be told."""
         segment = self.segment
         first = segment.beginning()
-        return [(0.0, first), *((fold.at, fold.trial) for fold in self._folds), (segment.step, segment.trial)]
+        return [(0.0, first), *[(fold.at, fold.trial) for fold in self._folds], (segment.step, segment.trial)]
 
     # --- ends ----------------------------------------------------------------------------------------------------
 
@@ -365,8 +364,11 @@ class Inspection:
         segment, system = self.segment, self.segment.trial.system
         if home.scales is not system.scales:
             return False
-        first, ends = lasting(home, x), (lasting(system, end) for end in (segment.state.x, segment.trial.x))
-        return sum(math.dist(first, end) for end in ends) > _REACH * segment.step
+        first, size = x[home.state_size :].tolist(), system.state_size
+        if sum(math.dist(first, end[size:].tolist()) for end in (segment.state.x, segment.trial.x)) > _REACH * segment.step:
+            return True  # the free parameters are
+        kept, ends = lasting(home, x), (lasting(system, end) for end in (segment.state.x, segment.trial.x))
+        return sum(math.dist(kept, end) for end in ends) > _REACH * segment.step
 
     def _same_place(self, fold: SpecialPoint, found: list[SpecialPoint]) -> bool:
         """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.

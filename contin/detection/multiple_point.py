@@ -186,7 +186,7 @@ def locate_multiple_point(
             jacobian = np.vstack([G, slopes.reshape(-1, 1 + dimension)])
             update = np.linalg.lstsq(jacobian, residual, rcond=1e-8)[0]
             s = s - update
-            if not np.all(np.isfinite(s)) or np.max(np.abs(s)) > 1:
+            if not np.isfinite(s).all() or np.max(np.abs(s)) > 1:
                 break
             if np.max(np.abs(update)) < _ROUND_OFF:
                 if np.max(np.abs(residual)) > _CONSISTENT:
@@ -199,9 +199,9 @@ def _bordered(system: Discretization, x: Array, row: Array, dimension: int, newt
     """Return the manifold with borders made of the null vectors at x; right beside x where the matrix is exactly singular."""
     for at in (x, x + _ASIDE * row / system.weights):
         right, left, response = smallest_directions(system.linearize(at, (row,))[1], system.size, dimension + 1, 3)
-        if np.all(np.isfinite(response)):
+        if np.isfinite(response).all():
             break
-    if len(right) < dimension or not np.all(np.isfinite(response)):
+    if len(right) < dimension or not np.isfinite(response).all():
         raise ConvergenceError("the matrix is singular")
     u, _, vh = np.linalg.svd(response)
     phi = [row / system.weights, *canonical_basis(u[:, :dimension].T @ right, system.weights)]

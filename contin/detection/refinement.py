@@ -110,8 +110,8 @@ def _with_cut_off(errors: dict[str, float], trial: Trial, test: TestFunction | N
     parameter has its value; a fold stays where it is.
     """
     system, along = trial.system, trial.tangent
-    moves = system.cut_off_errors(trial.x, trial.factors) if np.all(np.isfinite(along)) else np.empty((0, system.size))
-    if not len(moves) or not np.all(np.isfinite(moves)):
+    moves = system.cut_off_errors(trial.x, trial.factors) if np.isfinite(along).all() else np.empty((0, system.size))
+    if not len(moves) or not np.isfinite(moves).all():
         return errors
     if test is None:
         primary = settings.primary or system.free[0]

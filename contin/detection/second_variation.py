@@ -165,7 +165,7 @@ def legendre() -> TestFunction:
 
 def _convexity(hll: Array) -> float:
     """Return a number that is positive where H_ll (K, n, n) is positive semidefinite everywhere."""
-    if not np.all(np.isfinite(hll)):
+    if not np.isfinite(hll).all():
         return np.nan
     values = np.linalg.eigvalsh((hll + hll.swapaxes(1, 2)) / 2)
     largest = np.abs(values).max(axis=1)
@@ -175,7 +175,7 @@ def _convexity(hll: Array) -> float:
 def degeneracy(system: Collocation, x: Array) -> str:
     """Return what makes the equations of a variational problem singular at x, as a sentence; "" where nothing is found."""
     try:
-        if not np.all(np.isfinite(system.functionals(x))):
+        if not np.isfinite(system.functionals(x)).all():
             return "energy: it has no finite value there"
         found = second_variation(system, x)
     except ProblemError as error:
@@ -330,7 +330,7 @@ def _jacobian(system: Collocation, x: Array) -> Array:
 def _roots(hll: Array) -> tuple[Array, Array] | None:
     """Return C (N, d, n, k) with C C^T = H_ll, and what takes v to multipliers, (N, d, n, k); None unless H_ll >= 0."""
     values, vectors = np.linalg.eigh(hll)
-    if not np.all(np.isfinite(values)):
+    if not np.isfinite(values).all():
         return None
     largest = values.max(axis=2)
     if np.any(values < -_NO_CONTROL * largest[:, :, None]) or np.any(largest <= 0):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -120,12 +121,18 @@ class Segment:
 
     def guess(self, distance: float) -> Array:
         """Return the cubic through both ends and their tangents at a distance, shape (size,)."""
+        s = distance / self.step
+        found: Array = np.array([1.0, s, s * s, s * s * s]) @ self._cubic
+        return found
+
+    @functools.cached_property
+    def _cubic(self) -> Array:
+        """The coefficients of the cubic by powers of the part of the step, shape (4, size)."""
         state, trial, step = self.state, self.trial, self.step
-        s = distance / step
         ahead = trial.x - state.x
         rate = step / max(inner(state.system, state.tangent, trial.tangent), _LEAST_COSINE)
         a, b = state.tangent * step, trial.tangent * rate
-        return state.x + s * a + s**2 * (3 * ahead - 2 * a - b) + s**3 * (a + b - 2 * ahead)
+        return np.array([state.x, a, 3 * ahead - 2 * a - b, a + b - 2 * ahead])
 
     def distance(self, x: Array, at: float) -> float:
         """Return how far x is from the cubic at a distance along the state's tangent."""

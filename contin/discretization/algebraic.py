@@ -12,10 +12,10 @@ from contin.arrays import Array, ComplexArray
 from contin.discretization.given import check_given
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
-from contin.discretization.rounding import off_axis
+from contin.discretization.rounding import may_be_on_axis, off_axis
 from contin.discretization.scales import Scales, usual
 from contin.discretization.system import System
-from contin.functions.batch import Batch
+from contin.functions.batch import Batch, Columns
 from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.linalg.factors import Factors
 from contin.linalg.rightmost import nearest, rightmost
@@ -59,7 +59,8 @@ class Algebraic(System):
         self.size = self.state_size + len(self.free)
         self.equations = problem.equation_size
         self.weights = np.ones(self.size)
-        self._found: dict[bytes, ComplexArray] = {}
+        self._found: dict[bytes, tuple[ComplexArray, ComplexArray]] = {}
+        self._none = np.empty((0, self.state_size))  # the absent second state of functions of one point
 
     @property
     def nodes(self) -> Array:
@@ -88,7 +89,7 @@ class Algebraic(System):
     def residual(self, x: Array) -> Array:
         """Return F at x, shape (equations,)."""
         u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
-        values: Array = self._residual.values(_NO_TIME, u, _none(self.state_size), p)[0]
+        values: Array = self._residual.values(_NO_TIME, u, self._none, p)[0]
         return values
 
     @functools.cached_property
@@ -97,21 +98,34 @@ class Algebraic(System):
         return self._batch("residual", ("residual",))
 
     @functools.cached_property
+    def _by_unknowns(self) -> Columns:
+        """Columns of the residual's derivatives by the unknowns."""
+        found: Columns = self._residual.columns(self._free)
+        return found
+
+    @functools.cached_property
+    def _by_states(self) -> tuple[Batch, Columns]:
+        """The residual in the user's units, and columns of its derivatives by the states."""
+        batch = self.problem.batch("residual")
+        return batch, batch.columns([])
+
+    @functools.cached_property
     def is_sparse(self) -> bool:
         """The matrix is kept sparse: it is large, and few of its entries may differ from zero, or it is given as a sparse
         one."""
         if self.problem.jacobian is not None:
             return self.state_size >= _MANY and self.problem.gives_sparse_matrix
-        entries = self._residual.columns(self._free).rows.size
+        entries = self._by_unknowns.rows.size
         return self.state_size >= _MANY and entries <= _FEW * self.size * self.equations
 
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
-        check_given(self.problem, self.states(x)[0], self.all_parameters(x))
-        given = _NO_TIME, x[: self.state_size].reshape(1, -1), _none(self.state_size), self._scaled_parameters(x)
+        given = _NO_TIME, x[: self.state_size].reshape(1, -1), self._none, self._scaled_parameters(x)
+        if self.problem.jacobian is not None or self.problem.pattern is not None:
+            check_given(self.problem, self.states(x)[0], self.all_parameters(x))
         if self.problem.jacobian is not None:
             return self._given_jacobian(x, given)
-        columns = self._residual.columns(self._free)
+        columns = self._by_unknowns
         if not self.is_sparse:
             values, jacobian = self._residual.jacobian(*given, columns)
             return values[0], jacobian[0]
@@ -145,10 +159,16 @@ class Algebraic(System):
     ) -> tuple[Array, Factors]:
         """Return the residual at x, and the factored matrix [[F_x, columns^T], [rows]]; see ``Collocation.linearize``."""
         residual, jacobian = self._jacobian(x)
+        if not self.is_sparse:
+            matrix = np.zeros((self.equations + len(rows), self.size + len(columns)))
+            matrix[: self.equations, : self.size] = jacobian
+            for number, column in enumerate(columns):
+                matrix[: self.equations, self.size + number] = column
+            for number, row in enumerate(rows):
+                matrix[self.equations + number] = row
+            return residual, DenseFactors(matrix)
         rows = np.array(rows, dtype=float).reshape(-1, self.size + len(columns))
         columns = np.array(columns, dtype=float).reshape(-1, self.equations)
-        if not self.is_sparse:
-            return residual, DenseFactors(np.vstack([np.hstack([jacobian, columns.T]), rows]))
         from scipy.sparse import csr_array, hstack, vstack
 
         beside = hstack([jacobian, csr_array(columns.T)]) if len(columns) else jacobian
@@ -160,16 +180,16 @@ class Algebraic(System):
         u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
         batch = self._residual
         if self.problem.jacobian is not None:
-            found: Array = batch.jacobian(_NO_TIME, u, _none(n), p, batch.columns(which, ()))[1][0]
+            found: Array = batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(which, ()))[1][0]
             return found
         columns_of = batch.columns(which)
         if self.is_sparse:
             rows, places = columns_of.rows, columns_of.places
-            entries = batch.entries(_NO_TIME, u, _none(n), p, columns_of)[1]
+            entries = batch.entries(_NO_TIME, u, self._none, p, columns_of)[1]
             columns = np.zeros((self.equations, len(which)))
             columns[rows[places >= n], places[places >= n] - n] = entries[places >= n]
             return columns
-        dense: Array = batch.jacobian(_NO_TIME, u, _none(n), p, columns_of)[1][0, :, n:]
+        dense: Array = batch.jacobian(_NO_TIME, u, self._none, p, columns_of)[1][0, :, n:]
         return dense
 
     def transposed_product(self, x: Array, w: Array) -> Array:
@@ -181,7 +201,7 @@ class Algebraic(System):
         """Return the derivative of F along several directions, shape (equations,)."""
         u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
         wide = [self._wide(v, v[None, :n]) for v in directions]
-        found: Array = self._residual.along(_NO_TIME, u, _none(n), p, wide)[0]
+        found: Array = self._residual.along(_NO_TIME, u, self._none, p, wide)[0]
         return found
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
@@ -190,7 +210,7 @@ class Algebraic(System):
             return super().bent(x, w, v)  # two Jacobians, given or with a given pattern, instead of one value for each entry
         u, p, n, batch = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size, self._residual
         wide = self._wide(v, v[None, :n])
-        found: Array = batch.bent(_NO_TIME, u, _none(n), p, w[None], wide, batch.columns(self._free))[0]
+        found: Array = batch.bent(_NO_TIME, u, self._none, p, w[None], wide, batch.columns(self._free))[0]
         return found
 
     @property
@@ -208,9 +228,9 @@ class Algebraic(System):
         p = self.all_parameters(x)
         if self.problem.jacobian is not None:
             return np.array([np.asarray(self._own_jacobian(u, p)) for u in states])
-        batch, times = self.problem.batch("residual"), np.zeros(len(states))
-        jacobians: Array = batch.jacobian(times, states, _none(self.state_size), p, batch.columns([]))[1]
-        return jacobians
+        batch, columns = self._by_states
+        times = _NO_TIME if len(states) == 1 else np.zeros(len(states))
+        return batch.jacobian(times, states, self._none, p, columns)[1]
 
     def field_jacobian(self, x: Array) -> Array:
         """Return F_u as the unknowns have it: with `as_field`, a matrix with the eigenvalues of F_u."""
@@ -228,17 +248,43 @@ class Algebraic(System):
 
         All n of them or, of a matrix that is kept sparse, those right of the imaginary axis or near to it.
         """
-        if self.is_sparse:
-            key = x.tobytes()
-            if key not in self._found:  # the ends of a step and of its parts are asked for several times
-                self._found = {**dict(list(self._found.items())[-_KEPT:]), key: rightmost(self.as_field().field_jacobian(x))}
-            return self._found[key]
-        matrix = self.jacobian(x)
-        return off_axis(eigenvalues, matrix, eigenvalues(matrix))
+        return self._eigenvalues(x)[0]
 
     def computed_eigenvalues(self, x: Array) -> ComplexArray:
         """Return the eigenvalues with their round-off, where a zero of a real part is located."""
-        return self.eigenvalues(x) if self.is_sparse else eigenvalues(self.jacobian(x))
+        return self._eigenvalues(x)[1]
+
+    def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
+        """Return the eigenvalues at several places; those of small matrices are computed together."""
+        new = [x for x in places if x.tobytes() not in self._found]
+        matrices = np.array([] if self.is_sparse else [self.jacobian(x) for x in new])
+        if len(matrices) and np.isfinite(matrices).all():
+            found = eigenvalues(matrices)
+            near = may_be_on_axis(found).any()
+            for x, matrix, values in zip(new, matrices, found):
+                self._keep(x.tobytes(), (off_axis(eigenvalues, matrix, values) if near else values, values))
+        return [self.eigenvalues(x) for x in places]
+
+    def _keep(self, key: bytes, found: tuple[ComplexArray, ComplexArray]) -> None:
+        if len(self._found) > _KEPT:
+            del self._found[next(iter(self._found))]
+        self._found[key] = found
+
+    def _eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Return the eigenvalues, and as computed, once: the ends of a step and of its parts are asked for several times."""
+        key = x.tobytes()
+        if key not in self._found:
+            self._keep(key, self._all_eigenvalues(x))
+        return self._found[key]
+
+    def _all_eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Return the eigenvalues, those of pairs on the axis up to round-off with the real part 0, and as computed."""
+        if self.is_sparse:
+            found = rightmost(self.as_field().field_jacobian(x))
+            return found, found
+        matrix = self.jacobian(x)
+        found = eigenvalues(matrix)
+        return off_axis(eigenvalues, matrix, found), found
 
     def is_symmetric(self, x: Array) -> bool:
         """Return whether F_u is a large symmetric matrix, up to round-off: its eigenvalues are real."""
@@ -263,7 +309,7 @@ class Algebraic(System):
         if not self.problem.functionals:
             return np.empty(0)
         batch = self.problem.batch("functionals")
-        values: Array = batch.values(_NO_TIME, self.states(x), _none(self.state_size), self.all_parameters(x))[0]
+        values: Array = batch.values(_NO_TIME, self.states(x), self._none, self.all_parameters(x))[0]
         return values
 
     def column_gradient(self, x: Array, name: str) -> Array | None:
@@ -273,9 +319,7 @@ class Algebraic(System):
             return super().column_gradient(x, name)
         batch = self._batch("functionals")
         u, p = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x)
-        gradient: Array = batch.jacobian(_NO_TIME, u, _none(self.state_size), p, batch.columns(self._free))[1][
-            0, names.index(name)
-        ]
+        gradient: Array = batch.jacobian(_NO_TIME, u, self._none, p, batch.columns(self._free))[1][0, names.index(name)]
         return gradient
 
     def column_bent(self, x: Array, name: str, v: Array) -> Array:
@@ -286,7 +330,7 @@ class Algebraic(System):
         batch, n = self._batch("functionals"), self.state_size
         weights = np.zeros((1, len(names)))
         weights[0, names.index(name)] = 1.0
-        given = _NO_TIME, x[:n].reshape(1, -1), _none(n), self._scaled_parameters(x)
+        given = _NO_TIME, x[:n].reshape(1, -1), self._none, self._scaled_parameters(x)
         found: Array = batch.bent(*given, weights, self._wide(v, v[None, :n]), batch.columns(self._free))[0]
         return found
 
@@ -341,8 +385,3 @@ _KEPT = 16
 #: Entries on both sides of the diagonal that differ by less, relative to the largest entry, are equal: round-off of sums.
 _SYMMETRIC = 1e-13
 _NO_TIME = np.zeros(1)
-
-
-def _none(n: int) -> Array:
-    """Return the absent second state of a function of one point."""
-    return np.empty((0, n))

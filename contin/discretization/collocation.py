@@ -492,7 +492,7 @@ class Collocation(System):
         ``closely``: up to round-off, as what depends on the place itself needs. A solution depends on its square only.
         """
         breaks = self._all_breaks(x, closely)
-        if near(breaks, self.mesh, self.mesh[-1] - self.mesh[0]).all():
+        if not breaks.size or near(breaks, self.mesh, self.mesh[-1] - self.mesh[0]).all():
             return None
         return self.on_mesh(moved_to_breaks(self.mesh, breaks))
 

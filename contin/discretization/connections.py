@@ -366,7 +366,7 @@ def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:
     """
     from scipy.linalg import schur  # .1 s; only this needs it
 
-    if not np.all(np.isfinite(jacobian)):
+    if not np.isfinite(jacobian).all():
         raise ConvergenceError("the Jacobian of the vector field at the equilibrium is not finite")
     rates = np.sort(np.linalg.eigvals(jacobian).real)
     n = len(rates)

@@ -19,6 +19,7 @@ from contin.discretization.protocol import Carrier
 from contin.discretization.rounding import on_circle
 from contin.discretization.scales import Scales
 from contin.errors import ProblemError
+from contin.functions.batch import Columns
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks
@@ -195,10 +196,15 @@ class PeriodicCollocation(Collocation):
         Of an autonomous field the states may be any, of a forced one they are those at the Gauss points.
         """
         n, times = self._n, np.zeros(len(points)) if self.autonomous else self._times
-        columns = self.problem.batch("field").columns([])
-        none, p = np.empty((0, n)), self._scaled_parameters(x)
-        derivatives: Array = self._field.jacobian(times, points, none, p, columns)[1][:, :n, :n]
-        return derivatives
+        given = times, points, np.empty((0, n)), self._scaled_parameters(x)
+        derivatives: Array = self._field.jacobian(*given, self._by_states)[1]
+        return derivatives[:, :n, :n]
+
+    @functools.cached_property
+    def _by_states(self) -> Columns:
+        """Columns of the field's derivatives by the states."""
+        found: Columns = self.problem.batch("field").columns([])
+        return found
 
     def rates_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of T F at the Gauss points along directions of the states there, all scaled, (N d, n) each."""
@@ -230,6 +236,10 @@ class PeriodicCollocation(Collocation):
         """
         return self._multipliers(x)[0]
 
+    def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
+        """Return the logarithms of the multipliers at several places."""
+        return [self.eigenvalues(x) for x in places]
+
     def neutral(self, x: Array) -> Mask:
         """Return which multipliers lie on the unit circle up to round-off, shape (n,), but for the one that always is 1."""
         return self._multipliers(x)[1]
@@ -256,7 +266,7 @@ class PeriodicCollocation(Collocation):
         if self.order > 1:
             matrices = np.concatenate([matrices, np.linalg.inv(self.turn)[None]])
         values = self._logarithms(x, matrices)
-        total = float(self._quadrature @ np.einsum("kaa->k", jacobian))
+        total = float(self._quadrature @ jacobian.trace(axis1=1, axis2=2))
         reals = values.real.tolist()
         smallest = [place for place, value in enumerate(reals) if value <= min(reals) + _EQUAL]
         if smallest and not self._is_own_error(values, smallest):
@@ -395,7 +405,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         After a repelling stretch, as of a canard, round-off in that direction hides all other multipliers.
         """
         values = log_eigenvalues(transitions)
-        if np.abs(values).min() <= _DRIFTED or not np.all(np.isfinite(transitions)):
+        if np.abs(values).min() <= _DRIFTED or not np.isfinite(transitions).all():
             self._drifted.discard(x.tobytes())
             return values
         self._drifted.add(x.tobytes())

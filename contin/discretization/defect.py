@@ -144,13 +144,14 @@ class Defect:
         with np.errstate(all="ignore"):
             p = system.scaled_parameters(x)
             rates, moving = system.field_values(system.mesh, at_mesh, p), system.switching(x)
-            jumps = moving.places[moving.jumps & moving.settled]
-            if jumps.size:  # a rate has no value there
+            if moving.places.size:  # a rate has no value there
+                jumps = moving.places[moving.jumps & moving.settled]
                 rates[np.abs(system.mesh[:, None] - jumps).argmin(axis=0)] = np.nan
             fill_points(n, tables, h, x, *self._rates_of_intervals(rates, at_mesh, p), points)
             rates[self.broken] = np.nan
             fill_left(n, tables, h, x, system.field_values(self.times, points, p), left, self.conditions)
-            self._fill_split(x, p, moving, left)
+            if moving.places.size:
+                self._fill_split(x, p, moving, left)
             error = factors.solve(left)
             better = x - error
             largest = move(n, tables, x, error, points, at_mesh)

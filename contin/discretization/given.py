@@ -39,7 +39,7 @@ def check_given(problem: AlgebraicProblem, u: Array, p: Array) -> None:
             matrix = _matrix(problem, here, p)
             wanted, error = _slope(problem, here, p, direction)
         terms = abs(matrix) @ np.abs(direction)
-        if np.all(np.isfinite(wanted)) and np.all(np.isfinite(terms)):
+        if np.isfinite(wanted).all() and np.isfinite(terms).all():
             break
     else:
         return  # nothing to compare with: Newton's method will say that there are no values

@@ -96,7 +96,7 @@ class MapSystem(Algebraic):
         with np.errstate(all="ignore"):
             for at in range(1, self.rounds):
                 following = self._images(x, self.states(x)[at - 1 : at])
-                if not np.all(np.isfinite(following)):
+                if not np.isfinite(following).all():
                     break  # it runs away: the rest stays where it began
                 self.states(x)[at] = following
         return x
@@ -266,15 +266,23 @@ class MapSystem(Algebraic):
 
         That of a pair on the unit circle, to round-off, has the real part zero.
         """
-        values = self.computed_eigenvalues(x)
-        return np.where(on_circle(self.computed_eigenvalues, x, values) & is_pair(values), 1j * values.imag, values)
+        return self._eigenvalues(x)[0]
+
+    def eigenvalues_at(self, places: Sequence[Array]) -> list[ComplexArray]:
+        """Return the logarithms of the multipliers at several places."""
+        return [self.eigenvalues(x) for x in places]
+
+    def _all_eigenvalues(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Return the logarithms, and as computed."""
+        values = self._logarithms(x)
+        return np.where(on_circle(self._logarithms, x, values) & is_pair(values), 1j * values.imag, values), values
 
     def neutral(self, x: Array) -> Mask:
         """Return which multipliers lie on the unit circle up to round-off, shape (n,)."""
-        return on_circle(self.computed_eigenvalues, x, self.computed_eigenvalues(x))
+        return on_circle(self._logarithms, x, self.computed_eigenvalues(x))
 
-    def computed_eigenvalues(self, x: Array) -> ComplexArray:
-        """Return the logarithms of the multipliers with their round-off, where a zero of a real part is located."""
+    def _logarithms(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers as they are computed."""
         values = log_eigenvalues(self.transitions(x))
         values.real = np.maximum(values.real, np.log(_NO_MULTIPLIER))
         return values

@@ -62,10 +62,17 @@ def on_circle(eigenvalues: Callable[[Array], ComplexArray], x: Array, values: Co
     return near & (np.abs(values.real) <= bound)
 
 
+def may_be_on_axis(values: ComplexArray) -> Mask:
+    """Return which eigenvalues are complex and so near to the axis that round-off decides; of matrices, shape (..., n)."""
+    sizes = np.abs(values).max(axis=-1, initial=0.0, keepdims=True)
+    near: Mask = (np.abs(values.real) < _NEAR_AXIS * sizes) & (values.imag != 0) & (values.real != 0)
+    return near
+
+
 def off_axis(eigenvalues: Callable[[Array], ComplexArray], matrix: Array, values: ComplexArray) -> ComplexArray:
     """Return the eigenvalues ``values`` of a matrix, with the real part 0 for pairs on the axis up to round-off."""
-    near = (np.abs(values.real) < _NEAR_AXIS * np.abs(values).max(initial=0.0)) & (values.imag != 0) & (values.real != 0)
-    if not np.any(near):
+    near = may_be_on_axis(values)
+    if not near.any():
         return values
     error = changes(lambda signs: eigenvalues(matrix * (1 + np.finfo(float).eps * signs(matrix))), values)
     return np.where(near & (np.abs(values.real) <= _CERTAIN * error), 1j * values.imag, values)

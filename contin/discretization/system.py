@@ -82,7 +82,8 @@ class System(Discretization):
 
     def _scaled_parameters(self, x: Array) -> Array:
         """Return all parameters divided by their sizes."""
-        p = self.all_parameters(x)
+        p = self.parameters.copy()
+        p[self._free] = x[self.state_size :] * self.free_scales
         return p if self.scales is None else p / self.scales.parameters
 
     def _batch(self, name: str, rows: Sequence[str] = ()) -> Any:

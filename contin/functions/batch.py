@@ -204,14 +204,14 @@ class Batch:
         if self.interpreted is not None:
             return self.interpreted.values(t, u, v, p)
         out = np.empty((len(u), self.count))
-        self._run(self._values_program(), t, u, v, p, out, _NO_JACOBIAN)
+        self._run(self._programs.get("values") or self._values_program(), t, u, v, p, out, _NO_JACOBIAN)
         return out
 
     def jacobian(self, t: Array, u: Array, v: Array, p: Array, columns: Columns) -> tuple[Array, Array]:
         """Return values and derivatives, shape (points, count, columns.width)."""
         if self.interpreted is not None:
             return self.interpreted.jacobian(t, u, v, p, columns.inputs)
-        out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, columns.width))
+        out, jac = np.empty((len(u), self.count)), np.zeros((len(u), self.count, columns.inputs.size))
         self._run(self._slopes(columns.key)[0], t, u, v, p, out, jac)
         return out, jac
 
@@ -357,10 +357,8 @@ class Batch:
         return self.recording
 
     def _values_program(self) -> Program:
-        found: Program | None = self._programs.get("values")
-        if found is None:
-            stores = list(zip(self._known().results, range(self.count)))
-            self._programs["values"] = found = program(self._known().tape, stores, self._inputs())
+        stores = list(zip(self._known().results, range(self.count)))
+        found: Program = self._kept("values", lambda: program(self._known().tape, stores, self._inputs()))
         return found
 
     def _slopes(self, inputs: tuple[int, ...], packed: bool = False) -> tuple[Program, list[tuple[int, int]]]:
@@ -452,10 +450,11 @@ class Batch:
 
     def _run(self, found: Program, t: Array, u: Array, v: Array, p: Array, out: Array, jac: Array) -> None:
         """Run a program for all points, in several threads where one took long before."""
-        count, kind = len(u), len(found.code)
+        count = len(u)
         if count < _MANY:
             run(found, (t, u, v), p, out, jac)
             return
+        kind = len(found.code)
         if count * self._seconds.get(kind, 0.0) > _LONG and threads.count() > 1:
             threads.each(lambda part: run(*part), _divided(found, t, u, v, p, out, jac))
             return

@@ -239,7 +239,7 @@ class _Inside:
         for number in _PROBES:
             given = {self.tape.operations[place].data: number + 0.01 * i for i, place in enumerate(inputs)}
             at = self.tape.evaluate(places, given)
-            if np.all(np.isfinite(at)):
+            if np.isfinite(at).all():
                 found.append(at)
         return found
 

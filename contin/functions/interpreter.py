@@ -572,15 +572,15 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
             now += 1
 
 
-def run(program: Program, points: tuple[Array, Array, Array], p: Array, out: Array, jac: Array) -> None:
-    """Run a program at points (t, u, v) with parameters p; see `evaluate`."""
+def run(program: Program, points: Any, p: Array, out: Array, jac: Array) -> None:
+    """Run a program at points (t, u, v) with parameters p; see `evaluate`. To name them, as `Points`, would take a tenth."""
     try:
         instructions, room = program.rooms.pop()  # another thread has its own
     except IndexError:
         instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables)
         room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
-    instructions.scalars[program.parameters : program.parameters + len(p)] = p
-    evaluate(instructions, program.first, program.last, Points(*points), room, out, jac)
+    instructions.scalars[program.parameters : program.parameters + p.size] = p
+    evaluate(instructions, program.first, program.last, points, room, out, jac)
     program.rooms.append((instructions, room))
 
 

@@ -24,13 +24,15 @@ def _lapack() -> Any:
 def eigenvalues(matrix: Array) -> ComplexArray:
     """Return the eigenvalues of a real matrix, complex; NaN where it is not finite, as outside the domain of the equations.
 
+    Several matrices, shape (..., n, n), have one row of eigenvalues each, all NaN where one of them is not finite.
+
     Examples
     --------
     >>> eigenvalues(np.diag([1.0, 2.0])).tolist(), eigenvalues(np.full((1, 1), np.inf)).tolist()
     ([(1+0j), (2+0j)], [(nan+0j)])
     """
-    if not np.all(np.isfinite(matrix)):
-        return np.full(len(matrix), np.nan, dtype=complex)
+    if not np.isfinite(matrix).all():
+        return np.full(matrix.shape[:-1], np.nan, dtype=complex)
     return np.linalg.eigvals(matrix).astype(complex, copy=False)
 
 
@@ -56,16 +58,18 @@ class DenseFactors:
     def __init__(self, matrix: Array) -> None:
         if matrix.shape[0] != matrix.shape[1]:
             raise ValueError(f"a matrix of {matrix.shape[0]} rows and {matrix.shape[1]} columns is not square")
+        #: The matrix itself.
+        self.matrix = matrix
         self._lu, self._exchanges, zero_pivot = _lapack().dgetrf(matrix)
         self._singular = zero_pivot > 0
         #: Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite.
-        self.sign = self._sign() if np.all(np.isfinite(matrix)) else np.nan
+        self.sign = self._sign() if np.isfinite(matrix).all() else np.nan
 
     def _sign(self) -> float:
         """Return the sign of the product of the pivots, times -1 for each exchange of rows."""
         if self._singular:
             return 0.0
-        exchanges = np.count_nonzero(self._exchanges != np.arange(len(self._exchanges)))
+        exchanges = sum(row != place for place, row in enumerate(self._exchanges.tolist()))
         return -1.0 if (exchanges + np.count_nonzero(self._lu.diagonal() < 0)) % 2 else 1.0
 
     def solve(self, b: Array) -> Array:

@@ -16,22 +16,19 @@ This matrix is singular where the whole one is, with a kernel of the same dimens
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Stack
+from contin.functions.kernel_parts import Matrix, Stack, helper
 from contin.linalg.singular import orthonormalize_row
 
 
 @kernel
-def orthonormal_rows(chain: Stack, relations: Stack) -> float:
-    """Fill the ``relations`` (N - 1, n, 2 n + k) of the first point to each of the others, from the second on.
-
-    ``chain`` is that of `contin.linalg.elimination.Eliminated`. The result is the least pivot of the mesh points, as a part of
-    their mean.
-    """
+def condense(chain: Stack, carried: Matrix, first: Matrix, last: Matrix, relations: Stack, others: Matrix) -> float:
+    """Fill the ``relations`` and ``others`` of `Ends`, and return the least pivot, all described there."""
     points, n, width = relations.shape
     least, total = math.inf, 0.0
     for j in range(points):
@@ -42,25 +39,132 @@ def orthonormal_rows(chain: Stack, relations: Stack) -> float:
             for b in range(width):
                 rows[i, b] = block[n + i, n + b]
             orthonormalize_row(rows, i)
+    conditions, span = first.shape[0], relations[points - 1]
+    for i in range(conditions):
+        for b in range(n):
+            others[i, b] = first[i, b]
+        for b in range(width - n):
+            others[i, n + b] = last[i, b]
+    for i in range(carried.shape[0] - n):
+        row = others[conditions + i]
+        for b in range(width):
+            row[b] = carried[n + i, b]
+        for k in range(n):
+            product = _product(carried[n + i], span[k])
+            for b in range(width):
+                row[b] -= product * span[k, b]
     return float(least * points * n / total)
 
 
+@helper
+def _product(one, other):
+    """Return the inner product of two rows."""
+    product = 0.0
+    for b in range(one.size):
+        product += one[b] * other[b]
+    return product
+
+
+class Relations(NamedTuple):
+    """The arrays of `Ends`."""
+
+    relations: Stack
+    others: Matrix
+
+
 @kernel
-def largest_turn(one: Stack, other: Stack) -> float:
-    """Return the largest sum, over the mesh points, of the squared sines of the angles between two spans of relations."""
-    points, n, width = one.shape
+def compare(before: Relations, after: Relations, quotient: Matrix, work: Matrix) -> float:
+    """Fill the ``quotient`` (2 n + k, 2 n + k), and return the largest turn, both described in `compared`."""
+    points, n, size = before.relations.shape
+    one, other = before.relations[points - 1], after.relations[points - 1]
+    for i in range(n):
+        for b in range(size):
+            quotient[i, b], work[i, b] = one[i, b], 0.0
+        for k in range(n):
+            product = _product(one[i], other[k])
+            for b in range(size):
+                work[i, b] += product * other[k, b]
+    for i in range(n, size):
+        for b in range(size):
+            quotient[i, b], work[i, b] = before.others[i - n, b], after.others[i - n, b]
+    _solve(work, quotient)
     largest = 0.0
     for j in range(points):
         total = float(n)
         for i in range(n):
             for k in range(n):
-                product = 0.0
-                for b in range(width):
-                    product += one[j, i, b] * other[j, k, b]
+                product = _product(before.relations[j, i], after.relations[j, k])
                 total -= product * product
         if not total <= largest:
             largest = total
     return largest
+
+
+@helper
+def _solve(matrix, right):
+    """Solve for the columns of the right-hand side, in place, by elimination with partial pivoting; NaN if it is singular."""
+    size = matrix.shape[0]
+    for column in range(size):
+        place = column
+        for i in range(column + 1, size):
+            if abs(matrix[i, column]) > abs(matrix[place, column]):
+                place = i
+        if place != column:
+            for b in range(size):
+                matrix[column, b], matrix[place, b] = matrix[place, b], matrix[column, b]
+                right[column, b], right[place, b] = right[place, b], right[column, b]
+        pivot = matrix[column, column] if matrix[column, column] != 0.0 else math.nan
+        for i in range(column + 1, size):
+            factor = matrix[i, column] / pivot
+            if factor == 0.0:
+                continue
+            for b in range(column + 1, size):
+                matrix[i, b] -= factor * matrix[column, b]
+            for b in range(size):
+                right[i, b] -= factor * right[column, b]
+    for column in range(size - 1, -1, -1):
+        for k in range(column + 1, size):
+            factor = matrix[column, k]
+            for b in range(size):
+                right[column, b] -= factor * right[k, b]
+        pivot = matrix[column, column] if matrix[column, column] != 0.0 else math.nan
+        for b in range(size):
+            right[column, b] /= pivot
+
+
+@kernel
+def is_near_one(matrix: Matrix, apart: float, factor: float, work: Matrix) -> int:
+    """Return 1 where all eigenvalues certainly have a positive real part and sizes between 1 / factor and factor, 0 elsewhere.
+
+    That is where the matrix differs from the identity by less than ``apart`` < 1 in the Frobenius norm; and where its symmetric
+    part S has S - I / factor positive definite, and a norm of the matrix is less than the factor.
+    """
+    size, distance, square = matrix.shape[0], 0.0, 0.0
+    for i in range(size):
+        for b in range(size):
+            entry = matrix[i, b]
+            gap = entry - 1.0 if i == b else entry
+            distance, square = distance + gap * gap, square + entry * entry
+            work[i, b] = 0.5 * (entry + matrix[b, i])
+        work[i, i] -= 1.0 / factor
+    if distance < apart * apart:
+        return 1
+    rows, columns = 0.0, 0.0
+    for i in range(size):
+        row, column = 0.0, 0.0
+        for b in range(size):
+            row, column = row + abs(matrix[i, b]), column + abs(matrix[b, i])
+        rows, columns = max(rows, row), max(columns, column)
+    if not min(square, rows * columns) < factor * factor:
+        return 0
+    for k in range(size):  # Cholesky's elimination of the lower triangle
+        if not work[k, k] > 0.0:
+            return 0
+        for i in range(k + 1, size):
+            part = work[i, k] / work[k, k]
+            for b in range(k + 1, i + 1):
+                work[i, b] -= part * work[b, k]
+    return 1
 
 
 class Ends:
@@ -86,20 +190,19 @@ class Ends:
     """
 
     def __init__(self, chain: Array, carried: Array, first: Array, last: Array) -> None:
-        conditions, n = first.shape
-        self.relations = np.empty((len(chain), n, carried.shape[1]))
-        with np.errstate(all="ignore"):
-            self.least_pivot = orthonormal_rows(chain, self.relations)
-            span, border = self.relations[-1], carried[n:]
-            self.others = np.vstack([np.hstack([first, last]), border - (border @ span.T) @ span])
+        (conditions, n), (height, width) = first.shape, carried.shape
+        self.relations = np.empty((len(chain), n, width))
+        self.others = np.empty((conditions + height - n, width))
+        self.least_pivot = condense(chain, carried, first, last, self.relations, self.others)
 
 
-def compared(before: Ends, after: Ends) -> tuple[Array, Array, float]:
-    """Return the condensed matrices at two points, with rows that relate the ends in the same way, and the largest turn.
+def compared(before: Ends, after: Ends) -> tuple[Array, float]:
+    """Return the quotient after^-1 before of the condensed matrices at two points, and the largest turn.
 
-    The rows at the second point are the projections of those at the first one to their span there.
+    The rows that relate the ends at the second point are the projections of those at the first one to their span there, so
+    that both matrices have the same rows. The turn is the largest sum, over the mesh points, of the squared sines of the angles
+    between the two spans of relations.
     """
-    one, other = before.relations[-1], after.relations[-1]
-    first = np.vstack([one, before.others])
-    second = np.vstack([(one @ other.T) @ other, after.others])
-    return first, second, largest_turn(before.relations, after.relations)
+    quotient, work = np.empty((2, *([before.relations.shape[2]] * 2)))
+    turn = compare(Relations(before.relations, before.others), Relations(after.relations, after.others), quotient, work)
+    return quotient, turn

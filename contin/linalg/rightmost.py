@@ -47,7 +47,7 @@ def rightmost(matrix: Any) -> ComplexArray:
     from scipy.sparse import csc_array, eye_array  # type: ignore[import-untyped]  # .1 s; only large problems need it
 
     matrix = csc_array(matrix, dtype=float)
-    if not np.all(np.isfinite(matrix.data)):
+    if not np.isfinite(matrix.data).all():
         return np.full(2, np.nan, dtype=complex)
     one = eye_array(matrix.shape[0], format="csc")
     size = float(abs(matrix).sum(axis=0).max())
@@ -76,7 +76,7 @@ def nearest(matrix: Any, value: complex) -> complex:
 
     n = matrix.shape[0]
     shifted = csc_array(matrix, dtype=complex) - complex(value) * eye_array(n, format="csc")
-    if not np.all(np.isfinite(shifted.data)):
+    if not np.isfinite(shifted.data).all():
         return complex("nan")
     start = np.random.default_rng(11).standard_normal(n).astype(complex)
     try:

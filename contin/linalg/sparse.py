@@ -49,7 +49,7 @@ class SparseFactors:
         self._matrix.data *= self._scale[self._matrix.indices]
         #: Sign of the determinant: 0 if the matrix is singular, NaN if it is not finite.
         self.sign = np.nan
-        if np.all(np.isfinite(matrix.data)):
+        if np.isfinite(matrix.data).all():
             try:
                 self._lu = splu(self._matrix)
             except RuntimeError:  # a pivot is exactly zero

@@ -34,7 +34,7 @@ def symmetry_matrix(symmetry: Any, count: int) -> Array:
         given = np.array(symmetry, dtype=float)
     except (TypeError, ValueError, OverflowError):
         given = np.empty(0)
-    if given.shape not in ((count,), (count, count)) or not np.all(np.isfinite(given)):
+    if given.shape not in ((count,), (count, count)) or not np.isfinite(given).all():
         raise ProblemError(f"symmetry: {checks.shown(symmetry)} must be {count} signs, or a matrix of {count} rows and columns")
     matrix = np.diag(given) if given.ndim == 1 else given
     if order_of(matrix) == 1:

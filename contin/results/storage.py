@@ -273,7 +273,7 @@ def _with_reference(system: Discretization, x: Array, tangent: Array) -> Discret
         base: Any = _with_reference(system.base, x[:size], tangent[:size])
         return system if base is system.base else system.on(base)
     if isinstance(system, CycleCollocation) and not np.ptp(system.states(x), axis=0).any():
-        return system.with_reference(x + tangent / np.abs(tangent).max()) if np.all(np.isfinite(tangent)) else system
+        return system.with_reference(x + tangent / np.abs(tangent).max()) if np.isfinite(tangent).all() else system
     return system.with_reference(x) if isinstance(system, Collocation) else system
 
 

@@ -7,6 +7,7 @@ estimate the error that is left; stop when that is below the tolerance or round-
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -82,6 +83,8 @@ class Corrected:
         Estimated error left, the largest component relative to 1 + |x|.
     along : ndarray, shape (size,), or None
         The vector t with F_x t = 0 and row.t = 1 that this factorization gives, where it is at hand.
+    moved : float
+        Size of the updates since the factorization, the largest component relative to 1 + |x|; infinity where not known.
     """
 
     x: Array
@@ -89,6 +92,7 @@ class Corrected:
     iterations: int
     error: float
     along: Array | None = None
+    moved: float = np.inf
 
 
 def correct(
@@ -137,7 +141,7 @@ def _newton(
     system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes | None
 ) -> Corrected:
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
-    rows = () if row is None else (row,)
+    rows, bordered = ((), 0) if row is None else ((row,), 1)
     x, progress = np.array(guess, dtype=float), _Progress(newton.tolerance)
     factors: Factors | None = None
     along: Array | None = None
@@ -148,22 +152,22 @@ def _newton(
                 residual, factors = system.linearize(x, rows)
             else:
                 residual = system.residual(x)
-            if row is None:
-                update = factors.solve(residual)
-            elif fresh:  # the direction along the curve comes with the update, at next to no cost
-                both = np.zeros((2, residual.size + 1))
-                both[0, :-1], both[0, -1], both[1, -1] = residual, row @ x - target, 1.0
-                update, along = factors.solve(both)
-            else:
-                update = factors.solve(np.append(residual, row @ x - target))
+            right = np.zeros((1 + (bordered and fresh), residual.size + bordered))
+            right[0, : residual.size] = residual
+            if row is not None:
+                right[0, -1] = row @ x - target
+            if len(right) > 1:  # the direction along the curve comes with the update, at next to no cost
+                right[1, -1] = 1.0
+            found = factors.solve(right)
+            update, along = found[0], found[1] if len(right) > 1 else along
             size = _move(x, update)
-            if not np.isfinite(size):
+            if not math.isfinite(size):
                 break
             progress.record(size, fresh)
             if progress.converged:
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
-                    return Corrected(x, factors, len(progress.sizes), progress.error, along)
+                    return Corrected(x, factors, len(progress.sizes), progress.error, along, progress.moved)
                 return _settled(system, x, row, target, newton, sizes, progress.sizes)
             if progress.diverges:
                 break
@@ -194,7 +198,7 @@ def _settled(
         residual, factors = system.linearize(x, rows)
         update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
         relative.append(_relative(update, sizes(x)))
-        if not np.all(np.isfinite(update)):
+        if not np.isfinite(update).all():
             break
         least = newton.tolerance * np.maximum(sizes(x), before)
         if not np.all(np.abs(update) <= least):
@@ -265,7 +269,7 @@ def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...
     With unknowns of very different sizes, round-off of the large ones reaches the small ones.
     """
     noise = rounded_off(system, x, rows)
-    if not (np.all(np.isfinite(noise)) and np.all(np.isfinite(update))):
+    if not (np.isfinite(noise).all() and np.isfinite(update).all()):
         return False
     level = float(np.max(noise / (1 + np.abs(x))))
     return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(UNITS * level, coarse))
@@ -288,22 +292,22 @@ class _Progress:
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
         self.sizes: list[float] = []
-        self._moved = 1.0  # distance from where the Jacobian was taken
+        self.moved = 1.0  # distance from where the Jacobian was taken
         self.rate = 1.0  # estimated ratio of the error after the last update to its size
 
     def record(self, size: float, fresh: bool) -> None:
         """Note an update, made with a ``fresh`` Jacobian or with an old one."""
         self.sizes.append(size)
-        self._moved = size if fresh else self._moved + size
+        self.moved = size if fresh else self.moved + size
         self.rate = self._estimated_rate(fresh)
 
     def _estimated_rate(self, fresh: bool) -> float:
         if len(self.sizes) < 2:  # nothing is known of how nonlinear the equations are
-            return min(self._moved, _FAR) if fresh else 1.0
+            return min(self.moved, _FAR) if fresh else 1.0
         ratio = self.sizes[-1] / self.sizes[-2]
         if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
             return min(1.0, max(self.sizes[-1], ratio * min(1.0, ratio)))
-        return max(min(self._moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
+        return max(min(self.moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
 
     @property
     def error(self) -> float:
@@ -326,7 +330,8 @@ class _Progress:
     def wants_jacobian(self) -> bool:
         """The next update is better made with a new Jacobian: chord steps would take longer."""
         size = self.sizes[-1]
-        return bool(size > _FAR or not self.rate < 0.5 or np.log(self.tolerance / size) < _CHORDS * np.log(self.rate))
+        far = size > _FAR or not self.rate < 0.5
+        return far or (self.rate > 0 and math.log(self.tolerance / size) < _CHORDS * math.log(self.rate))
 
 
 def _chords(

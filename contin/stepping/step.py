@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.discretization.protocol import Discretization, inner
+from contin.discretization.protocol import Discretization
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import ReadOnlyVector, Vector
 from contin.linalg.factors import Factors
 from contin.stepping.newton import Corrected, Newton, correct
 from contin.stepping.state import State
@@ -71,7 +74,8 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
 def trial_of(system: Discretization, done: Corrected) -> Trial:
     """Return the trial of a corrected point, with Newton's last factors."""
     tangent = unit_tangent(system, done.factors, done.along)
-    return Trial(system, done.x, Linearization(tangent, done.factors.sign, done.factors), done.iterations, done.error)
+    linear = Linearization(tangent, done.factors.sign, done.factors, moved=done.moved)
+    return Trial(system, done.x, linear, done.iterations, done.error)
 
 
 def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Trial:
@@ -107,26 +111,78 @@ def tangent_error(trial: Trial, residual: Array) -> Array:
     return error
 
 
-def turn(state: State, trial: Trial) -> float:
-    """Return the angle between the tangents at both ends: the larger of the whole one and half that of the states alone.
+class Judgement(NamedTuple):
+    """What a step is judged by.
 
-    Where parameters are large they dominate the norm, and tangents of different branches can look parallel.
+    Attributes
+    ----------
+    missed : float
+        Distance from the prediction to the corrected point.
+    turn : float
+        Angle between the tangents at both ends: the larger of the whole one and half that of the states alone. Where parameters
+        are large they dominate the norm, and tangents of different branches can look parallel.
+    hidden_turn : float
+        Angle by which the cubic through both ends, along their tangents, turns away from them in its middle.
+    length : float
+        Distance between both ends.
     """
-    system = state.system
-    whole = inner(system, trial.tangent, state.tangent)
-    weights = system.weights[: system.state_size]
-    a, b = trial.tangent[: system.state_size], state.tangent[: system.state_size]
-    sizes = math.sqrt((weights * a) @ a), math.sqrt((weights * b) @ b)
-    part = float((weights * a) @ b) / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
-    return max(_angle(whole), _angle(part) / 2)
+
+    missed: float
+    turn: float
+    hidden_turn: float
+    length: float
 
 
-def hidden_turn(state: State, trial: Trial) -> float:
-    """Return the angle by which the cubic through both ends, along their tangents, turns away from them in its middle."""
-    system = state.system
-    chord, mean = trial.x - state.x, state.tangent + trial.tangent
-    across = chord - (inner(system, chord, mean) / inner(system, mean, mean)) * mean
-    return float(1.5 * np.sqrt(inner(system, across, across) / inner(system, chord, chord)))
+def judged(state: State, guess: Array, trial: Trial) -> Judgement:
+    """Return what the step from a state to a corrected point is judged by."""
+    system, sums = state.system, np.empty(7)
+    compare(Arc(state.x, state.tangent, trial.x, trial.tangent, guess), system.weights, system.state_size, sums)
+    missed, whole, part, first, last, chord, across = sums.tolist()
+    sizes = math.sqrt(first), math.sqrt(last)
+    cosine = part / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
+    hidden = 1.5 * math.sqrt(across / chord) if chord else math.nan
+    return Judgement(math.sqrt(missed), max(_angle(whole), _angle(cosine) / 2), hidden, math.sqrt(chord))
+
+
+class Arc(NamedTuple):
+    """Both ends of a step with their unit tangents, and the prediction of the second."""
+
+    x: ReadOnlyVector
+    tangent: ReadOnlyVector
+    last: ReadOnlyVector
+    last_tangent: ReadOnlyVector
+    guess: ReadOnlyVector
+
+
+@kernel
+def compare(arc: Arc, weights: ReadOnlyVector, states: int, sums: Vector) -> None:
+    """Fill the weighted inner products that `judged` uses.
+
+    |guess - last|^2, t.T of the tangents, and of the states alone t.T, |t|^2, |T|^2; |c|^2 of the chord, and the same of its
+    part across t + T.
+    """
+    x, tangent, last, last_tangent, guess = arc
+    missed, whole, along, mean, chord = 0.0, 0.0, 0.0, 0.0, 0.0
+    part, first_size, last_size = 0.0, 0.0, 0.0
+    for i in range(x.size):
+        weight, one, other = weights[i], tangent[i], last_tangent[i]
+        gap, gone, both = guess[i] - last[i], last[i] - x[i], one + other
+        missed += weight * gap * gap
+        whole += weight * one * other
+        along += weight * gone * both
+        mean += weight * both * both
+        chord += weight * gone * gone
+    for i in range(states):
+        weight, one, other = weights[i], tangent[i], last_tangent[i]
+        part += weight * one * other
+        first_size += weight * one * one
+        last_size += weight * other * other
+    share, across = along / mean, 0.0
+    for i in range(x.size):
+        aside = last[i] - x[i] - share * (tangent[i] + last_tangent[i])
+        across += weights[i] * aside * aside
+    sums[0], sums[1], sums[2], sums[3] = missed, whole, part, first_size
+    sums[4], sums[5], sums[6] = last_size, chord, across
 
 
 def _angle(cosine: float) -> float:

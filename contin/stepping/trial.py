@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -26,18 +28,21 @@ class Linearization:
     factors : Factors or None
     exact : bool
         The matrix was taken right at the point, and not at the iterate before it.
+    moved : float
+        How far the point lies from where the tangent was taken, the largest component relative to 1 + |x|.
     """
 
     tangent: Array
     sign: float
     factors: Factors | None = None
     exact: bool = False
+    moved: float = np.inf
 
 
 def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
     """Return the linearization right at x, its tangent with row.tangent > 0."""
     factors = system.linearize(x, (row,))[1]
-    return Linearization(unit_tangent(system, factors), factors.sign, factors, exact=True)
+    return Linearization(unit_tangent(system, factors), factors.sign, factors, exact=True, moved=0.0)
 
 
 def unit_tangent(system: Discretization, factors: Factors, along: Array | None = None) -> Array:
@@ -84,7 +89,7 @@ class Trial:
         #: The same point on a mesh with points where conditions on states switch (`contin.stepping.settling`).
         self.settled = self
         self.iterations, self.newton_error = iterations, newton_error
-        self._linear = linear
+        self._linear, self._linearize = (None, linear) if callable(linear) else (linear, None)
         self._functionals: dict[str, float] | None = None
         self._discretization_error: float | None = None
         self._values: dict[TestFunction, float] = {}
@@ -97,49 +102,51 @@ class Trial:
     @property
     def linear(self) -> Linearization:
         """Tangent, sign of the determinant, and factors."""
-        if callable(self._linear):
-            self._linear = self._linear()
+        if self._linear is None:
+            assert self._linearize is not None
+            self._linear = self._linearize()
         return self._linear
 
     @property
     def is_linearized(self) -> bool:
         """The linearization is at hand."""
-        return not callable(self._linear)
+        return self._linear is not None
 
     @property
     def tangent(self) -> Array:
         """Unit tangent, shape (size,)."""
-        linear = self._linear
-        return (self.linear if callable(linear) else linear).tangent
+        return (self._linear or self.linear).tangent
 
     @property
     def sign(self) -> float:
         """Sign of the determinant of [F_x; row]."""
-        return self.linear.sign
+        return (self._linear or self.linear).sign
 
     @property
     def factors(self) -> Any:
         """Factors of [F_x; row]; None where they were not kept."""
-        return self.linear.factors
+        return (self._linear or self.linear).factors
 
     def refactor(self, row: Array) -> None:
         """Take the factors anew, right at x, bordered by ``row``; tangent and sign stay."""
-        self._linear = Linearization(self.tangent, self.sign, self._at_x(row), self.linear.exact)
+        self._linear = dataclasses.replace(self.linear, factors=self._at_x(row))
 
     def sharpen_factors(self, row: Array) -> None:
         """Take the factors right at x unless they are from there, and the sign with them; the tangent stays."""
         if not self.linear.exact:
             factors = self._at_x(row)
-            self._linear = Linearization(self.tangent, factors.sign, factors, exact=True)
+            self._linear = dataclasses.replace(self.linear, sign=factors.sign, factors=factors, exact=True)
 
     def _at_x(self, row: Array) -> Factors:
         return self.system.linearize(self.x, (row,))[1]
 
     def value(self, test: TestFunction) -> float:
         """Return the value of a test function, computed once: a point that two steps share has one value for both."""
-        if test not in self._values:
-            self._values[test] = float(test.function(self))
-        return self._values[test]
+        try:
+            return self._values[test]
+        except KeyError:
+            found = self._values[test] = float(test.function(self))
+            return found
 
     @property
     def functionals(self) -> dict[str, float]:
@@ -248,4 +255,4 @@ Monitor = TestFunction
 
 def sign_changed(before: float, after: float) -> bool:
     """Return whether a value passed zero. A zero at the start of a step is not counted again."""
-    return bool(np.isfinite(before) and np.isfinite(after) and before != 0 and before * after <= 0)
+    return before != 0 and before * after <= 0 and math.isfinite(before) and math.isfinite(after)

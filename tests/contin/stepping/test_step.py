@@ -7,7 +7,7 @@ import pytest
 
 from contin import Algebraic, AlgebraicProblem, ConvergenceError, Newton
 from contin.stepping.state import State, standing_at
-from contin.stepping.step import corrected, hidden_turn, located, predict, sharpened, tangent_error, turn
+from contin.stepping.step import corrected, judged, located, predict, sharpened, tangent_error
 from contin.stepping.trial import Linearization, Trial
 
 
@@ -115,13 +115,26 @@ def test_an_exact_tangent_has_no_error():
     assert np.abs(tangent_error(trial, state.system.residual(trial.x))).max() < 1e-5  # the difference has a length of 1e-6
 
 
+def judgement(state, trial):
+    """What a step is judged by whose prediction was exact."""
+    return judged(state, trial.x, trial)
+
+
+def test_what_was_missed_and_the_length_are_distances():
+    """On the unit circle, from the angle .7 to .9: the chord is 2 sin(.1)."""
+    state = state_at(0.7)
+    trial = trial_at(state.system, *at(0.9))
+    found = judged(state, trial.x + [3e-3, 4e-3], trial)
+    assert (found.missed, found.length) == pytest.approx((5e-3, 2 * math.sin(0.1)), rel=1e-14)
+
+
 # --- angles ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("arc", [0.0, 0.05, 1.2])
 def test_the_turn_is_the_angle_between_the_tangents(arc):
     state = state_at(0.7)
-    assert turn(state, trial_at(state.system, *at(0.7 + arc))) == pytest.approx(arc, abs=1e-7)
+    assert judgement(state, trial_at(state.system, *at(0.7 + arc))).turn == pytest.approx(arc, abs=1e-7)
 
 
 def plane(states):
@@ -142,7 +155,7 @@ def test_a_parameter_that_dominates_does_not_hide_a_turn_of_the_states(angle):
     state = standing_at(system, np.zeros(3), cone(system, 0.05, 0.0), 0.1)
     trial = trial_at(system, np.zeros(3), cone(system, 0.05, angle))
     whole = math.acos(state.tangent @ trial.tangent)
-    assert whole < 0.11 and turn(state, trial) == pytest.approx(max(whole, angle / 2), rel=1e-6)
+    assert whole < 0.11 and judgement(state, trial).turn == pytest.approx(max(whole, angle / 2), rel=1e-6)
 
 
 def test_states_that_stand_still_have_no_direction():
@@ -150,12 +163,12 @@ def test_states_that_stand_still_have_no_direction():
     system = plane(2)
     state = standing_at(system, np.zeros(3), cone(system, 1e-3, 0.0), 0.1)
     trial = trial_at(system, np.zeros(3), cone(system, 1e-3, math.pi))
-    assert turn(state, trial) == pytest.approx(2e-3, rel=1e-5)
+    assert judgement(state, trial).turn == pytest.approx(2e-3, rel=1e-5)
 
 
 def test_a_tangent_that_is_not_a_number_has_no_turn():
     state = state_at(0.7)
-    assert math.isnan(turn(state, trial_at(state.system, at(0.8)[0], [math.nan, math.nan])))
+    assert math.isnan(judgement(state, trial_at(state.system, at(0.8)[0], [math.nan, math.nan])).turn)
 
 
 @pytest.mark.parametrize("height", [1e-3, 0.02, 0.1])
@@ -163,13 +176,13 @@ def test_a_hidden_turn_is_that_of_the_cubic_between_the_ends(height):
     """Ends with the same tangent, the second one h aside at a distance of 1: y = h (3 s^2 - 2 s^3), whose slope is 1.5 h."""
     system = circle()
     state = standing_at(system, np.zeros(2), np.array([1.0, 0.0]), 1.0)
-    found = hidden_turn(state, trial_at(system, [1.0, height], [1.0, 0.0]))
+    found = judgement(state, trial_at(system, [1.0, height], [1.0, 0.0])).hidden_turn
     assert found == pytest.approx(1.5 * height, rel=height)
-    assert turn(state, trial_at(system, [1.0, height], [1.0, 0.0])) == 0
+    assert judgement(state, trial_at(system, [1.0, height], [1.0, 0.0])).turn == 0
 
 
 @pytest.mark.parametrize("arc", [0.1, 0.8])
 def test_an_even_turn_hides_nothing(arc):
     """On the circle the chord lies half-way between both tangents."""
     state = state_at(0.7)
-    assert hidden_turn(state, trial_at(state.system, *at(0.7 + arc))) < 1e-12
+    assert judgement(state, trial_at(state.system, *at(0.7 + arc))).hidden_turn < 1e-12
