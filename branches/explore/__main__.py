@@ -43,7 +43,9 @@ def main(argv=None) -> int:
         path = _page_path(options.out)
         data = gather(options.results, options.quiet)
         page = assemble(data).encode()
-        write_bytes(path, page)
+        with interrupt.held():
+            write_bytes(path, page)
+            interrupt.change("the page is complete")
     except (StoreError, MissingLibraryError, ContinError) as error:
         complain(f"error: {error}")
         return EXIT_BAD_INPUT

@@ -27,7 +27,7 @@ from contin.linalg.singular import orthonormalize_row
 
 
 @kernel
-def condense(chain: Stack, carried: Matrix, first: Matrix, last: Matrix, relations: Stack, others: Matrix) -> float:
+def relate_ends(chain: Stack, carried: Matrix, first: Matrix, last: Matrix, relations: Stack, others: Matrix) -> float:
     """Fill the ``relations`` and ``others`` of `Ends`, and return the least pivot, all described there."""
     points, n, width = relations.shape
     least, total = math.inf, 0.0
@@ -73,7 +73,7 @@ class Relations(NamedTuple):
 
 
 @kernel
-def compare(before: Relations, after: Relations, quotient: Matrix, work: Matrix) -> float:
+def divide_ends(before: Relations, after: Relations, quotient: Matrix, work: Matrix) -> float:
     """Fill the ``quotient`` (2 n + k, 2 n + k), and return the largest turn, both described in `compared`."""
     points, n, size = before.relations.shape
     one, other = before.relations[points - 1], after.relations[points - 1]
@@ -193,7 +193,7 @@ class Ends:
         (conditions, n), (height, width) = first.shape, carried.shape
         self.relations = np.empty((len(chain), n, width))
         self.others = np.empty((conditions + height - n, width))
-        self.least_pivot = condense(chain, carried, first, last, self.relations, self.others)
+        self.least_pivot = relate_ends(chain, carried, first, last, self.relations, self.others)
 
 
 def compared(before: Ends, after: Ends) -> tuple[Array, float]:
@@ -204,5 +204,5 @@ def compared(before: Ends, after: Ends) -> tuple[Array, float]:
     between the two spans of relations.
     """
     quotient, work = np.empty((2, *([before.relations.shape[2]] * 2)))
-    turn = compare(Relations(before.relations, before.others), Relations(after.relations, after.others), quotient, work)
+    turn = divide_ends(Relations(before.relations, before.others), Relations(after.relations, after.others), quotient, work)
     return quotient, turn

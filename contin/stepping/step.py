@@ -136,7 +136,7 @@ class Judgement(NamedTuple):
 def judged(state: State, guess: Array, trial: Trial) -> Judgement:
     """Return what the step from a state to a corrected point is judged by."""
     system, sums = state.system, np.empty(7)
-    compare(Arc(state.x, state.tangent, trial.x, trial.tangent, guess), system.weights, system.state_size, sums)
+    fill_sums(Arc(state.x, state.tangent, trial.x, trial.tangent, guess), system.weights, system.state_size, sums)
     missed, whole, part, first, last, chord, across = sums.tolist()
     sizes = math.sqrt(first), math.sqrt(last)
     cosine = part / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
@@ -155,7 +155,7 @@ class Arc(NamedTuple):
 
 
 @kernel
-def compare(arc: Arc, weights: ReadOnlyVector, states: int, sums: Vector) -> None:
+def fill_sums(arc: Arc, weights: ReadOnlyVector, states: int, sums: Vector) -> None:
     """Fill the weighted inner products that `judged` uses.
 
     |guess - last|^2, t.T of the tangents, and of the states alone t.T, |t|^2, |T|^2; |c|^2 of the chord, and the same of its
