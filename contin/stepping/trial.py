@@ -89,7 +89,8 @@ class Trial:
         #: The same point on a mesh with points where conditions on states switch (`contin.stepping.settling`).
         self.settled = self
         self.iterations, self.newton_error = iterations, newton_error
-        self._linear, self._linearize = (None, linear) if callable(linear) else (linear, None)
+        self._linear: Linearization | None = None if callable(linear) else linear
+        self._linearize = linear if callable(linear) else None
         self._functionals: dict[str, float] | None = None
         self._discretization_error: float | None = None
         self._values: dict[TestFunction, float] = {}
