@@ -94,7 +94,7 @@ def _singular(point) -> float:
 
     system = point.system
     factors = system.linearize(point.x, (system.weights * point.tangent,))[1]
-    return float(np.linalg.norm(smallest_directions(factors, system.size)[2], 2))
+    return float(np.linalg.norm(smallest_directions(factors, system.size, 2)[2], 2))
 
 
 def _refusal(m, n, nu) -> str:
