@@ -77,9 +77,6 @@ _ASTRAY = 2.5
 _DOUBT = 0.2
 #: A component above this is never in doubt: tangents are better known than that.
 _STEEP = 0.3
-#: Nor is one in doubt where the tangent was taken so near that solutions which bend by this much per unit of length leave it as
-#: it is: more than that they bend closer than 1e-4 to a branch point.
-_BENT = 1e4
 #: Nor is one that differs by less than this part of itself from what the parameter's own values say. Ten times larger, folds
 #: on both sides of a pitchfork are seen where there are none.
 _EVEN = 0.02
@@ -611,7 +608,7 @@ class Continuation:
         """
         at = trial.system.parameter_index(self.primary)
         component = abs(trial.tangent[at])
-        if component >= _STEEP or _BENT * trial.linear.moved < _DOUBT * component:
+        if component >= _STEEP:
             return False
         rate = trial.tangent[at] / inner(state.system, state.tangent, trial.tangent)
         expected = 2 * (trial.x[at] - state.x[at]) / step - state.tangent[at]

@@ -83,8 +83,6 @@ class Corrected:
         Estimated error left, the largest component relative to 1 + |x|.
     along : ndarray, shape (size,), or None
         The vector t with F_x t = 0 and row.t = 1 that this factorization gives, where it is at hand.
-    moved : float
-        Size of the updates since the factorization, the largest component relative to 1 + |x|; infinity where not known.
     """
 
     x: Array
@@ -92,7 +90,6 @@ class Corrected:
     iterations: int
     error: float
     along: Array | None = None
-    moved: float = np.inf
 
 
 def correct(
@@ -167,7 +164,7 @@ def _newton(
             if progress.converged:
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
-                    return Corrected(x, factors, len(progress.sizes), progress.error, along, progress.moved)
+                    return Corrected(x, factors, len(progress.sizes), progress.error, along)
                 return _settled(system, x, row, target, newton, sizes, progress.sizes)
             if progress.diverges:
                 break
@@ -292,22 +289,22 @@ class _Progress:
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
         self.sizes: list[float] = []
-        self.moved = 1.0  # distance from where the Jacobian was taken
+        self._moved = 1.0  # distance from where the Jacobian was taken
         self.rate = 1.0  # estimated ratio of the error after the last update to its size
 
     def record(self, size: float, fresh: bool) -> None:
         """Note an update, made with a ``fresh`` Jacobian or with an old one."""
         self.sizes.append(size)
-        self.moved = size if fresh else self.moved + size
+        self._moved = size if fresh else self._moved + size
         self.rate = self._estimated_rate(fresh)
 
     def _estimated_rate(self, fresh: bool) -> float:
         if len(self.sizes) < 2:  # nothing is known of how nonlinear the equations are
-            return min(self.moved, _FAR) if fresh else 1.0
+            return min(self._moved, _FAR) if fresh else 1.0
         ratio = self.sizes[-1] / self.sizes[-2]
         if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
             return min(1.0, max(self.sizes[-1], ratio * min(1.0, ratio)))
-        return max(min(self.moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
+        return max(min(self._moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
 
     @property
     def error(self) -> float:

@@ -74,8 +74,7 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
 def trial_of(system: Discretization, done: Corrected) -> Trial:
     """Return the trial of a corrected point, with Newton's last factors."""
     tangent = unit_tangent(system, done.factors, done.along)
-    linear = Linearization(tangent, done.factors.sign, done.factors, moved=done.moved)
-    return Trial(system, done.x, linear, done.iterations, done.error)
+    return Trial(system, done.x, Linearization(tangent, done.factors.sign, done.factors), done.iterations, done.error)
 
 
 def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Trial:

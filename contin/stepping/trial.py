@@ -28,21 +28,18 @@ class Linearization:
     factors : Factors or None
     exact : bool
         The matrix was taken right at the point, and not at the iterate before it.
-    moved : float
-        How far the point lies from where the tangent was taken, the largest component relative to 1 + |x|.
     """
 
     tangent: Array
     sign: float
     factors: Factors | None = None
     exact: bool = False
-    moved: float = np.inf
 
 
 def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
     """Return the linearization right at x, its tangent with row.tangent > 0."""
     factors = system.linearize(x, (row,))[1]
-    return Linearization(unit_tangent(system, factors), factors.sign, factors, exact=True, moved=0.0)
+    return Linearization(unit_tangent(system, factors), factors.sign, factors, exact=True)
 
 
 def unit_tangent(system: Discretization, factors: Factors, along: Array | None = None) -> Array:
