@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from contin.problems.variational import VariationalProblem
 from contin.results import plot
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of
-from contin.stepping.settings import Settings, settings_with
+from contin.stepping.settings import Options, Settings, settings_with
 from contin.stepping.state import Stop
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -52,6 +52,10 @@ class Junction:
     also: list[Point] = field(default_factory=list)
 
 
+#: Branches that the text of a diagram shows: it fits on a screen.
+_SHOWN = 20
+
+
 @dataclass
 class Diagram:
     """Branches, and the junctions where they meet.
@@ -67,6 +71,14 @@ class Diagram:
 
     branches: list[Branch] = field(default_factory=list)
     junctions: list[Junction] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        count, junctions = len(self.branches), len(self.junctions)
+        lines = [f"  {number}: {branch!r}" for number, branch in enumerate(self.branches[:_SHOWN])]
+        if count > _SHOWN:
+            lines.append(f"  ... {count - _SHOWN} more")
+        head = f"Diagram of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}"
+        return "\n".join([head, *lines])
 
     def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
         """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
@@ -344,7 +356,7 @@ def _seen(system: Any, x: Array) -> Array:
 
 def diagram(
     start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
-    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, progress: bool | None = None, **options: Any,
+    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, progress: bool | None = None, **options: Unpack[Options],
 ) -> Diagram:  # fmt: skip
     """Follow every branch that can be reached from a solution, to a given depth.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -34,13 +34,13 @@ from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point
-from contin.stepping.settings import Settings, settings_with
+from contin.stepping.settings import Options, Settings, settings_with
 from contin.stepping.trial import TestFunction
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
           event: TestFunction | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
-          progress: bool | None = None, **options: Any) -> Branch:  # fmt: skip
+          progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
     From a point of such a curve, without a further parameter, it goes on; ``kind`` takes another one that leaves there.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -22,14 +22,14 @@ from contin.linalg.orientation import oriented_along
 from contin.problems.statement import forget_changed
 from contin.results.branch import Branch
 from contin.results.point import Point, underlying
-from contin.stepping.settings import Settings, settings_with
+from contin.stepping.settings import Options, Settings, settings_with
 
 #: A branch point lies no further from where folds meet it, relative to 1 + its size: both are located to 1e-9 or better.
 _HERE = 1e-5
 
 
 def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
-          progress: bool | None = None, **options: Any) -> Branch:  # fmt: skip
+          progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
     """Follow the branch through a point, or away from a branch point, to its end.
 
     Ctrl-C ends the run: the branch so far is returned.

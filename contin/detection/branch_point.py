@@ -73,6 +73,10 @@ class BranchPoint:
     hessian: Array
     imperfection: float
 
+    def __repr__(self) -> str:
+        branches = f"{len(self.tangents)} branches cross" if self.tangents else "isolated"
+        return f"BranchPoint({branches}; imperfection {self.imperfection:.1e})"
+
     @property
     def gap(self) -> float:
         """Distance at which the curve beta = 0, a hyperbola near by, passes the branch point: zero where it is perfect."""

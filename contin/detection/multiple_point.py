@@ -89,6 +89,11 @@ class MultiplePoint:
     continuum: bool = False
     spread: float = 0.0
 
+    def __repr__(self) -> str:
+        count = len(self.tangents)
+        meet = ", families of branches meet" if self.continuum else f", {count} branch{'es' * (count != 1)}" * bool(count)
+        return f"MultiplePoint(kernel of dimension {self.dimension}{meet})"
+
 
 class _Manifold:
     """F(x) + Psi beta = 0 over coordinates s, around x0."""

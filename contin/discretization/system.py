@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Array, Indices
 from contin.discretization.differences import derivative
 from contin.discretization.mesh import MeshControl
@@ -54,6 +55,12 @@ class System(Discretization):
         self.scales = scales
         #: Sizes of the free parameters.
         self.free_scales: Array = np.ones(len(self.free)) if scales is None else scales.parameters[self._free]
+
+    def __repr__(self) -> str:
+        mesh = f"{self.intervals} interval{'s' * (self.intervals != 1)} of degree {self.degree}, " * bool(self.intervals)
+        return (
+            f"{type(self).__name__}({mesh}states {checks.listed(self.problem.states)}; free {', '.join(self.free) or 'none'})"
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: all but what is computed when it is first asked for, such as compiled functions."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from contin.arrays import Array
 from contin.results import plot, table
 from contin.results.point import Point
 from contin.stepping.state import Stop
+
+#: Labels that the text of a branch shows: a screen is not filled by a snaking branch of a hundred folds.
+_SHOWN = 40
 
 
 @dataclass
@@ -38,7 +41,9 @@ class Branch:
     notes: list[str] = field(default_factory=list)
 
     def __repr__(self) -> str:
-        labels = " ".join(point.label for point in self.points if point.label)
+        found = [point.label for point in self.points if point.label]
+        left_out = f" ... {found[-1]} ({len(found)} labels)" if len(found) > _SHOWN else ""
+        labels = " ".join(found[:_SHOWN]) + left_out
         notes = f"; {len(self.notes)} note{'s' * (len(self.notes) != 1)}" if self.notes else ""
         return f"Branch({len(self.points)} points{table.meshes(self.points)}: {labels}; {self.stop or 'not ended'}{notes})"
 
@@ -47,6 +52,28 @@ class Branch:
 
     def __iter__(self) -> Iterator[Point]:
         return iter(self.points)
+
+    @overload
+    def __getitem__(self, which: int) -> Point: ...
+
+    @overload
+    def __getitem__(self, which: slice) -> list[Point]: ...
+
+    @overload
+    def __getitem__(self, which: str) -> Array: ...
+
+    def __getitem__(self, which: Any) -> Any:
+        """Return a point by its number, points by a slice, or a column by its name (`column`).
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, solve, trace
+        >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
+        >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
+        >>> branch[0].label, branch["a"][0] == branch[0]["a"], len(branch[1:3])
+        ('EP', True, 2)
+        """
+        return self.column(which) if isinstance(which, str) else self.points[which]
 
     def column(self, name: str) -> Array:
         """Return a parameter or functional over all points.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypedDict
 
 from contin import checks
 from contin.discretization.mesh import MeshControl
@@ -133,6 +133,32 @@ class Settings:
         for name, values in checks.mapping("zeros", self.zeros, "lists of numbers").items():
             for value in checks.sequence(f"zeros: {checks.plain(name)}", values, "numbers"):
                 checks.number(f"zeros: {checks.plain(name)}", value)
+
+
+class Options(TypedDict, total=False):
+    """The fields of `Settings` by name, as `trace`, `curve` and `diagram` take them: a type checker knows what is misspelt."""
+
+    primary: str | None
+    direction: int
+    step: float
+    min_step: float
+    max_step: float
+    max_points: int
+    limits: Mapping[str, Sequence[float]]
+    zeros: Mapping[str, Sequence[float]]
+    trivial: str | None
+    monitors: Sequence[TestFunction]
+    folds: bool
+    branch_points: bool
+    errors: bool
+    angle: float
+    change: float
+    accuracy: float
+    newton: Newton
+    mesh: MeshControl
+    test_functions: Sequence[TestFunction]
+    scales: Mapping[str, float]
+    extrema: Sequence[str]
 
 
 def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:

@@ -67,6 +67,9 @@ class State:
     sensed: Array | None = None
     discretization_error: float = np.nan
 
+    def __repr__(self) -> str:
+        return f"State({self.system!r}, {self.accepted} points, arclength {self.arclength:.6g}, step {self.step:.3g})"
+
     @property
     def row(self) -> Array:
         """The row that borders F_x: its product with a vector is the inner product with the tangent."""
