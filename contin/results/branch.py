@@ -70,8 +70,8 @@ class Branch:
         >>> from contin import AlgebraicProblem, solve, trace
         >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
         >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
-        >>> branch[0].label, branch["a"][0] == branch[0]["a"], len(branch[1:3])
-        ('EP', True, 2)
+        >>> branch[0].label, branch["a"][[0, -1]].round(10).tolist(), len(branch[1:3])
+        ('EP', [1.0, 4.0], 2)
         """
         return self.column(which) if isinstance(which, str) else self.points[which]
 
