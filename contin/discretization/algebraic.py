@@ -380,7 +380,7 @@ _MANY = 200
 #: Largest part of its entries that may differ from zero.
 _FEW = 0.1
 #: Sets of eigenvalues that are kept: more than a search for Hopf points compares.
-_KEPT = 16
+_KEPT = 64
 #: The t of functions that do not take it.
 #: Entries on both sides of the diagonal that differ by less, relative to the largest entry, are equal: round-off of sums.
 _SYMMETRIC = 1e-13

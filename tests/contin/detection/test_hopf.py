@@ -157,3 +157,25 @@ def test_a_large_problem_may_start_at_zero():
     exact = 4 * (n + 1) ** 2 / math.pi**2 * math.sin(math.pi / 2 / (n + 1)) ** 2
     assert [point.label for point in branch if point.label] == ["EP", "BP", "EP"]
     assert abs(branch.labelled("BP")[0]["lam"] - exact) < 1e-10
+
+
+@pytest.mark.parametrize("place", [-0.611, -0.1, 0.3, 0.77])
+@pytest.mark.parametrize("coupling", [0.21, 0.25, 0.4])
+def test_two_hopf_points_close_to_each_other_in_a_long_step(place, coupling):
+    """Two modes of nearly the same frequency: eigenvalues -.2 + 3 i +- sqrt(g^2 - 100 (a - c)^2) and their conjugates.
+
+    One crosses the axis twice, at a = c -+ sqrt(g^2 - .04) / 10, which is .01 to .07 apart in steps of .5.
+    """
+
+    def field(u, p):
+        apart = 10 * (p.a - place)
+        x, y, v, w = u.x, u.y, u.v, u.w  # (x + i v)' = (-.2 + 3 i + i d) (x + i v) + g (y + i w), and with -d
+        return (
+            -0.2 * x - (3 + apart) * v + coupling * y - x**3, -0.2 * y - (3 - apart) * w + coupling * x - y**3,
+            -0.2 * v + (3 + apart) * x + coupling * w - v**3, -0.2 * w + (3 - apart) * y + coupling * v - w**3,
+        )  # fmt: skip
+
+    start = solve(AlgebraicProblem(field, ["x", "y", "v", "w"], {"a": -2.0}), [0.0] * 4)
+    found = trace(start, free=["a"], limits={"a": (-2, 2)}, step=0.1, max_step=0.5).labelled("HB")
+    aside = math.sqrt(coupling**2 - 0.04) / 10
+    assert [point["a"] for point in found] == pytest.approx([place - aside, place + aside], abs=1e-9)
