@@ -29,6 +29,8 @@ _PARTS = 4
 #: ... how often these parts are halved, where eigenvalues move far: peaks of a hundredth of a step are seen. Without, two of
 #: 187 Hopf points of random problems are passed, in a step of 30 times their distance, ...
 _CLOSER = 5
+#: ... of this many unknowns at most, whose eigenvalues at a place take less time than a step, ...
+_SMALL = 32
 #: ... and how often a piece is halved: crossings closer than 2^-20 of it are not told apart.
 _CUTS = 20
 #: Hopf points closer than this part of the step are one point with several pairs: round-off of eigenvalues of multiplicity two.
@@ -91,7 +93,7 @@ def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     if not any(_moving(looked)):
         return []
     passed = _passed(looked)
-    if not segment.trial.system.intervals:  # with a mesh each place takes long
+    if segment.trial.system.size <= _SMALL:  # otherwise each place takes long
         closely = _passed(_looked_at_closely(segment, looked))
         if len(closely) > len(passed):
             passed, inside = closely, sorted({*inside, *(s for pair in closely for s in pair)} - {s for s, _ in knots})
