@@ -109,7 +109,8 @@ def _moving(places: list[Place]) -> list[bool]:
     """Return between which of some places eigenvalues move further than they are from the imaginary axis.
 
     Where all move less, each is nearer to one on its own side of the axis than to any on the other: none changes the side.
-    Those on the axis at both places do not count.
+    Those on the axis at both places do not count. They are taken to move as fast as beside the two places too: ones that go
+    to the axis and come back look as if they stood.
     """
     system: Any = places[0][1].system
     values = system.eigenvalues_at([trial.x for _, trial in places])
@@ -118,7 +119,10 @@ def _moving(places: list[Place]) -> list[bool]:
     along = np.sort(np.array(values), axis=1)
     sizes = np.abs(along.real)
     distances = np.where((sizes[1:] == 0) & (sizes[:-1] == 0), np.inf, np.minimum(sizes[1:], sizes[:-1])).min(axis=1)
-    return [not far < distance for far, distance in zip(np.abs(along[1:] - along[:-1]).max(axis=1), distances)]
+    lengths = np.diff([s for s, _ in places])
+    speeds = np.pad(np.abs(along[1:] - along[:-1]).max(axis=1) / lengths, 1)
+    fastest = np.maximum(np.maximum(speeds[:-2], speeds[2:]), speeds[1:-1])
+    return [not far < distance for far, distance in zip(fastest * lengths, distances)]
 
 
 def _looked_at_closely(segment: Segment, places: list[Place]) -> list[Place]:

@@ -159,12 +159,12 @@ def test_a_large_problem_may_start_at_zero():
     assert abs(branch.labelled("BP")[0]["lam"] - exact) < 1e-10
 
 
-@pytest.mark.parametrize("place", [-0.611, -0.1, 0.3, 0.77])
-@pytest.mark.parametrize("coupling", [0.21, 0.25, 0.4])
+@pytest.mark.parametrize("place", [-0.611, -0.5014, -0.2286, -0.1, 0.3, 0.77])
+@pytest.mark.parametrize("coupling", [0.205, 0.21, 0.25, 0.4])
 def test_two_hopf_points_close_to_each_other_in_a_long_step(place, coupling):
     """Two modes of nearly the same frequency: eigenvalues -.2 + 3 i +- sqrt(g^2 - 100 (a - c)^2) and their conjugates.
 
-    One crosses the axis twice, at a = c -+ sqrt(g^2 - .04) / 10, which is .01 to .07 apart in steps of .5.
+    One crosses the axis twice, at a = c -+ sqrt(g^2 - .04) / 10, which is .009 to .07 apart in steps of .5.
     """
 
     def field(u, p):
