@@ -24,7 +24,7 @@ from numba.core.registry import cpu_target
 from numba.np.arrayobj import populate_array
 
 from contin.functions.kernel_parts import Helper, Instruction, names_in
-from contin.functions.machine_code import Code
+from contin.functions.machine_code import Code, machine
 
 #: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
@@ -69,7 +69,7 @@ def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Cod
         context = cpu_target.target_context
         cpu_target.typing_context.refresh()
         context.refresh()
-        with _in_short(context.codegen()):
+        with _own_options(context.codegen()):
             done = compiler.compile_extra(
                 cpu_target.typing_context, context, _ready(function), tuple(map(_type, parameters)), result, flags, {}
             )
@@ -77,17 +77,30 @@ def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Cod
 
 
 @contextlib.contextmanager
-def _in_short(codegen: Any) -> Iterator[None]:
-    """Let what is compiled meanwhile be optimized once, as a whole, and collect no garbage: it saves a quarter of the time."""
-    collects, libraries = gc.isenabled(), codegen._library_class
-    codegen._library_class = _Library
+def _own_options(codegen: Any) -> Iterator[None]:
+    """Let what is compiled meanwhile be for `contin.functions.machine_code.machine`, in place of this processor.
+
+    It is optimized once, as a whole, and no garbage is collected: that saves a quarter of the time.
+    """
+    collects, libraries, target = gc.isenabled(), codegen._library_class, codegen._tm
+    codegen._library_class, codegen._tm = _Library, _target()
     gc.disable()
     try:
         yield
     finally:
-        codegen._library_class = libraries
+        codegen._library_class, codegen._tm = libraries, target
         if collects:
             gc.enable()
+
+
+@functools.cache
+def _target() -> Any:
+    """Return LLVM's description of the processor that machine code is made for."""
+    triple, processor = machine()
+    reloc = "static" if triple.startswith("x86") else "default"  # as numba for code that this process runs
+    return llvm.Target.from_triple(triple).create_target_machine(
+        cpu=processor, opt=3, reloc=reloc, codemodel="jitdefault", jit=True
+    )
 
 
 class _Library(JITCodeLibrary):
@@ -228,7 +241,7 @@ class _Entry:
                 function.linkage = "internal"
         foreign = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
         foreign += [v.name for v in module.global_variables if v.is_declaration]
-        return Code(self.name, tuple(foreign), self.context.codegen()._tm.emit_object(module))
+        return Code(self.name, tuple(foreign), _target().emit_object(module))
 
     def _write(self) -> None:
         builder, conventions, described = self.builder, self.context.call_conv, self.done.fndesc

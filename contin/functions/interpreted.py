@@ -17,6 +17,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, Function, Indices
 from contin.errors import InterpretedWarning, ProblemError
+from contin.functions import round_off
 from contin.functions.colouring import Colouring, SparsePattern, colouring
 from contin.functions.signature import Signature, named_values
 
@@ -251,6 +252,9 @@ class Interpreted:
         found = np.hstack([column.reshape(shape) for column, shape in zip(columns, shapes)])
         if np.iscomplexobj(found) and not np.iscomplexobj(x):  # Python's (-1.0) ** 0.5 is complex: it has no real value
             found = np.where(found.imag == 0, found.real, np.nan)
+        if round_off.SEED:
+            found = np.array(found, dtype=complex if np.iscomplexobj(found) else float)
+            round_off.move(found)
         return found
 
     def _function_values(self, index: int, t: Array, x: Array) -> Array:

@@ -115,10 +115,10 @@ def test_code_that_calls_a_function_that_is_not_there_is_not_taken(kernel):
 
 
 def test_the_key_depends_on_the_machine_and_on_versions(monkeypatch):
-    """A cache may lie in a home that several machines share."""
+    """A cache may lie in a home that several machines share. Processors that run the same code share it."""
     keys = {Kernel(_twice, reorder=True).key}
     for target, name, value in (
-        (machine_code.llvm, "get_host_cpu_name", lambda: "z80"), (np, "__version__", "0.0.1"), (sys, "version", "2.7"),
+        (machine_code.llvm, "get_host_cpu_features", dict), (np, "__version__", "0.0.1"), (sys, "version", "2.7"),
     ):  # fmt: skip
         with monkeypatch.context() as patch:
             patch.setattr(target, name, value)
@@ -126,6 +126,14 @@ def test_the_key_depends_on_the_machine_and_on_versions(monkeypatch):
             keys.add(Kernel(_twice, reorder=True).key)
     kernels._surroundings.cache_clear()
     assert len(keys) == 4
+
+
+def test_the_code_does_not_depend_on_the_processor(monkeypatch):
+    """Kernels give the same bits on processors with AVX2: they are compiled for x86-64-v3, not for the host."""
+    here = machine_code.machine()
+    monkeypatch.setattr(machine_code.llvm, "get_host_cpu_name", lambda: "sapphirerapids")
+    assert machine_code.machine() == here
+    assert here[1] in ("x86-64-v3", "x86-64", "generic")
 
 
 @pytest.mark.parametrize(
