@@ -10,7 +10,7 @@ import contextlib
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,6 +37,9 @@ _ROUGH = 1e-5
 #: Factor of that length, and how often. Nine times an eighth reach features 1e-9 times as wide as their input.
 _SHORTER = 1 / 8
 _TIMES = 9
+#: Differences of second and of fourth order agree within the round-off of the values where they differ by this multiple of those.
+#: A derivative that is zero, of a function that rounds once, gives 1.
+_WITHIN = 4.0
 #: Weights of f(x + k h), k = 1, 2, less those of f(x - k h), in the derivative of fourth order.
 _WEIGHTS = (8 / 12, -1 / 12)
 #: Places beside the first one where the ways to evaluate a function are compared.
@@ -49,6 +52,18 @@ _AGREES = 1e-6
 _MANY = 100
 
 
+class _Estimated(NamedTuple):
+    """Values of functions, or derivatives, shape (places, count), and their round-off at each place."""
+
+    values: Array
+    errors: Array
+
+
+def _rounded(values: Array) -> _Estimated:
+    """Return values with their round-off."""
+    return _Estimated(values, np.finfo(float).eps * np.abs(values).max(axis=1, initial=0.0))
+
+
 class Interpreted:
     """Functions evaluated in Python, for `contin.functions.batch.Batch`.
 
@@ -57,7 +72,8 @@ class Interpreted:
     reason : str
         Why the functions are not recorded.
     error : float
-        Largest estimated error of a derivative so far, relative to the largest derivative at its place; 0 with complex steps.
+        Largest estimated error of a derivative so far, relative to the largest derivative at its place and to the values over
+        the sizes of the inputs; 0 with complex steps.
     """
 
     def __init__(
@@ -111,13 +127,13 @@ class Interpreted:
     def along(self, t: Array, u: Array, v: Array, p: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of the values along directions, shape (places, count)."""
         x = self._joined(u, v, p)
-        return self._along(t, x, [np.broadcast_to(direction, x.shape) for direction in directions])
+        return self._along(t, x, [np.broadcast_to(direction, x.shape) for direction in directions]).values
 
     def jacobian_along(self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, directions: Sequence[Array]) -> Array:
         """Return the derivative of the Jacobian along directions, shape (places, count, inputs)."""
         x = self._joined(u, v, p)
         given = [np.broadcast_to(direction, x.shape) for direction in directions]
-        found = [self._along(t, x, [np.broadcast_to(unit, x.shape), *given]) for unit in np.eye(x.shape[1])[inputs]]
+        found = [self._along(t, x, [np.broadcast_to(unit, x.shape), *given]).values for unit in np.eye(x.shape[1])[inputs]]
         return np.stack(found, axis=2) if found else np.zeros((len(x), self._count, 0))
 
     def _joined(self, u: Array, v: Array, p: Array) -> Array:
@@ -157,20 +173,20 @@ class Interpreted:
             self._complex = self._takes_complex(t[:1], x[:1])
         direction = np.zeros(x.shape)
         direction[:, group] = 1.0
-        found = self._along(t, x, [direction])
+        found = self._along(t, x, [direction]).values
         if first:
             self._say()
         return found
 
-    def _along(self, t: Array, x: Array, directions: Sequence[Array]) -> Array:
+    def _along(self, t: Array, x: Array, directions: Sequence[Array]) -> _Estimated:
         """Return derivatives along directions: complex steps for the first one where they are right, differences for others."""
         if not directions:
-            return self._values(t, x)
+            return _rounded(self._values(t, x))
         *others, last = directions
         if not others and self._complex:
-            return self._complex_step(t, x, last)
+            return _rounded(self._complex_step(t, x, last))
 
-        def inner(t: Array, x: Array, places: Indices) -> Array:
+        def inner(t: Array, x: Array, places: Indices) -> _Estimated:
             return self._along(t, x, [direction[places] for direction in others])
 
         return self._difference(inner, t, x, last, nested=bool(others))
@@ -182,37 +198,45 @@ class Interpreted:
         return found
 
     def _difference(
-        self, function: Callable[[Array, Array, Indices], Array], t: Array, x: Array, direction: Array, nested: bool = False
-    ) -> Array:
+        self, function: Callable[[Array, Array, Indices], _Estimated], t: Array, x: Array, direction: Array, nested: bool = False
+    ) -> _Estimated:
         """Return the derivative of a function along a direction, by differences as long as its error estimate allows.
 
-        ``function`` takes times and inputs of some places, and the numbers of these places.
+        ``function`` takes times and inputs of some places, and the numbers of these places. A shorter length is not tried where
+        the differences of second and of fourth order agree within the round-off of the values.
         """
         moving, at, first = direction != 0, np.abs(np.where(np.isfinite(x), x, 0.0)), _NESTED if nested else _DIFFERENCE
         sizes = np.maximum(at, 1.0) if nested else np.where(at < _LEAST, 1.0, at)
         length = first * np.where(moving, sizes / np.where(moving, np.abs(direction), 1.0), np.inf).min(axis=1)
         length = np.where(np.isfinite(length), length, first)
-        best, least = np.zeros((len(x), self._count)), np.full(len(x), np.inf)
-        left = np.arange(len(x))
+        best, errors, least = np.zeros((len(x), self._count)), np.zeros(len(x)), np.full(len(x), np.inf)
+        known, size, left = np.full(len(x), np.inf), length / first, np.arange(len(x))
         for _ in range(_TIMES + 1):
             h = length[left, None]
             step = h * direction[left]
-            sides = [function(t[left], x[left] + k * step, left) - function(t[left], x[left] - k * step, left) for k in (1, 2)]
+            ends = [function(t[left], x[left] + k * step, left) for k in (1, -1, 2, -2)]
             with np.errstate(all="ignore"):
+                sides = ends[0].values - ends[1].values, ends[2].values - ends[3].values
                 fourth = sum(weight * side for weight, side in zip(_WEIGHTS, sides)) / h
+                noise = np.max([end.errors for end in ends], axis=0, initial=0.0) / h[:, 0]
                 scale = np.abs(fourth).max(axis=1, initial=0.0) + 1e-300
-                rough = np.abs(fourth - sides[0] / (2 * h)).max(axis=1, initial=0.0) / scale
+                gap = np.abs(fourth - sides[0] / (2 * h)).max(axis=1, initial=0.0)
+                rough = (gap + noise) / scale
+                done = (rough <= _ROUGH) | (gap <= _WITHIN * noise)
+                usual = np.max([np.abs(end.values).max(axis=1, initial=0.0) for end in ends], axis=0, initial=0.0) / size[left]
             better = rough < least[left]
-            best[left[better]], least[left[better]] = fourth[better], rough[better]
+            chosen = left[better]
+            best[chosen], errors[chosen], least[chosen] = fourth[better], noise[better], rough[better]
+            gap, noise = (gap / (scale + usual))[better], (noise / (scale + usual))[better]  # a derivative may be zero
+            known[chosen] = np.minimum(gap, gap**2 / _ROUGH) + noise
             best[left[~np.isfinite(rough) & ~np.isfinite(least[left])]] = np.nan
-            left = left[~(rough <= _ROUGH)]
+            left = left[~done]
             if not left.size:
                 break
             length = length * _SHORTER
         if len(x):
-            known = least[np.isfinite(least)]
-            self.error = max(self.error, float(np.minimum(known, known**2 / _ROUGH).max(initial=0.0)))
-        return best
+            self.error = max(self.error, float(known[np.isfinite(known)].max(initial=0.0)))
+        return _Estimated(best, errors)
 
     @property
     def _count(self) -> int:
@@ -225,7 +249,7 @@ class Interpreted:
         try:
             for unit in _directions(x.shape[1]):
                 direction = np.broadcast_to(unit, places.shape)
-                difference = self._difference(lambda t, x, _: self._values(t, x), times, places, direction)
+                difference, _ = self._difference(lambda t, x, _: _rounded(self._values(t, x)), times, places, direction)
                 known = np.all(np.isfinite(difference), axis=1)
                 step = self._complex_step(times[known], places[known], direction[known])
                 scale = 1 + np.abs(difference[known])
