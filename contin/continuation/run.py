@@ -796,6 +796,9 @@ class Continuation:
         if system.scales is not state.system.scales:
             previous, step = None, float(np.clip(step * length, self.settings.min_step, self.settings.max_step))
         x, row = carry(state.x), system.weights * tangent
+        if state.singular:  # a corrected point has a tangent of any of the branches; the first step corrects what is carried
+            self.state = dataclasses.replace(state, system=system, x=x, tangent=tangent, step=step)
+            return True
         try:
             done = correct(system, x, row, row @ x, self.settings.newton)
         except ConvergenceError:

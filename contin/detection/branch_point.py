@@ -97,7 +97,8 @@ class BranchPoint:
         >>> found.tangents[0].round(6).tolist()
         [-0.707107, -0.707107]
         """
-        cosines = [inner(system, tangent, direction) for tangent in self.tangents]
+        unit = direction / np.sqrt(inner(system, direction, direction))
+        cosines = [inner(system, tangent, unit) for tangent in self.tangents]
         order = ordered(self.tangents, cosines)
         tangents = [oriented_along(self.tangents[i], cosines[i]) for i in order]
         return dataclasses.replace(self, tangents=tuple(tangents))

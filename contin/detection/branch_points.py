@@ -122,7 +122,7 @@ class BranchPointSearch:
                 at = inner(state.system, state.tangent, found.x - state.x)
                 inside = segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
                 if inside and found.gap < self._gap and segment.distance(found.x, at) < _OFF * step:
-                    found = found.along(state.system, trial.x - state.x)
+                    found = found.along(state.system, segment.direction(at))
                     return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:
                 pass

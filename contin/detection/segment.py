@@ -125,6 +125,12 @@ class Segment:
         found: Array = np.array([1.0, s, s * s, s * s * s]) @ self._cubic
         return found
 
+    def direction(self, distance: float) -> Array:
+        """Return the derivative of the cubic at a distance, by the part of the step, shape (size,)."""
+        s = distance / self.step
+        found: Array = np.array([0.0, 1.0, 2 * s, 3 * s * s]) @ self._cubic
+        return found
+
     @functools.cached_property
     def _cubic(self) -> Array:
         """The coefficients of the cubic by powers of the part of the step, shape (4, size)."""

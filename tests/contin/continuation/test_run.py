@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_load_of, bratu_mean, elastica, two_elasticas
 from scipy.optimize import brentq
+from scipy.special import ellipk
 
 from contin import (
     AlgebraicProblem,
@@ -239,3 +240,29 @@ def test_every_labelled_branch_point_can_be_left():
     assert [round(point["a"], 9) for point in fork.labelled("BP")] == [1]
     for point in (*rest.labelled("BP"), *fork.labelled("BP")):
         assert trace(point, branch=1, limits={"a": (-1, 2)}).stop.reason == "limit"
+
+
+@pytest.mark.parametrize(("degree", "direction"), [(2, 1), (2, -1), (3, -1), (6, 1)])
+def test_a_branch_is_left_for_the_other_one_where_the_first_step_takes_a_finer_mesh(degree, direction):
+    """A cantilever: the branch from lam = ((n - 1/2) pi)^2 ends at lam = ((2 n - 1) K(sin(end angle / 2)))^2."""
+    cantilever = BoundaryValueProblem(
+        lambda t, u, p: (u.m, -p.lam * math.sin(u.th)), lambda a, b, p: (a.th, b.m), ["th", "m"], {"lam": 1.0}
+    )
+    limits = {"lam": (0, 100)}
+    straight = trace(solve(cantilever, lambda t: (0, 0), degree=degree), free=["lam"], limits=limits, step=0.5)
+    loads = straight.labelled("BP")
+    assert len(loads) == 3
+    for number, load in enumerate(loads, 1):
+        bent = trace(load, branch=1, direction=direction, limits=limits, step=0.5)
+        assert [point.label for point in bent if point.label] == ["BP", "EP"]
+        modulus = math.sin(float(bent.points[-1].segment(0)["th"][-1]) / 2)
+        assert (2 * number - 1) * ellipk(modulus**2) == pytest.approx(10, rel=1e-7)
+
+
+@pytest.mark.parametrize("size", [1.0, 0.01])
+def test_branches_that_cross_at_a_small_angle_are_told_apart(size):
+    """x (a - 1 - x / size): the branch x = size (a - 1) crosses x = 0 at an angle of that size."""
+    problem = AlgebraicProblem(lambda u, p: (u.x * (p.a - 1 - u.x / p.size),), ["x"], {"a": 0.0, "size": size})
+    (crossing,) = trace(solve(problem, [0.0]), free=["a"], limits={"a": (-5, 5)}).labelled("BP")
+    other = trace(crossing, branch=1, limits={"a": (-5, 5)})
+    assert other.points[-1]["x"] == pytest.approx(size * (other.points[-1]["a"] - 1), rel=1e-9)
