@@ -7,6 +7,7 @@ values no longer fall.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -61,7 +62,7 @@ def find_zero(
         fc = function(c)
         if fc == 0:
             return c
-        if fc * fb < 0:
+        if (fc < 0) != (fb < 0):
             a, fa = b, fb
         else:
             shrink = 1 - fc / fb
@@ -90,4 +91,6 @@ def _interpolated(known: list[Value]) -> float | None:
     (x, fx), (y, fy), (z, fz) = known
     if fx == fy or fy == fz or fz == fx:
         return None
+    size = -math.frexp(max(abs(fx), abs(fy), abs(fz)))[1]  # with the largest of order one, no product below is zero or infinite
+    fx, fy, fz = (math.ldexp(value, size) for value in (fx, fy, fz))
     return x * fy * fz / ((fx - fy) * (fx - fz)) + y * fx * fz / ((fy - fx) * (fy - fz)) + z * fx * fy / ((fz - fx) * (fz - fy))

@@ -173,7 +173,7 @@ class Segment:
         (a, first), (b, last) = left, right
         ends, name = (first.value(test), last.value(test)), test.name
         try:
-            if ends[0] * ends[1] > 0 or ends[0] == 0:  # a limit that the run starts on
+            if np.sign(ends[0]) == np.sign(ends[1]) or ends[0] == 0:  # a limit that the run starts on
                 at, there = a, first
             else:
                 at = find_zero(lambda s: test.function(self.at(s)), (a, ends[0]), (b, ends[1]), self.precision, guess)

@@ -253,4 +253,4 @@ Monitor = TestFunction
 
 def sign_changed(before: float, after: float) -> bool:
     """Return whether a value passed zero. A zero at the start of a step is not counted again."""
-    return before != 0 and before * after <= 0 and math.isfinite(before) and math.isfinite(after)
+    return before != 0 and (after == 0 or (before < 0) != (after < 0)) and math.isfinite(before) and math.isfinite(after)

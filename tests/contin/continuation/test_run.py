@@ -255,7 +255,7 @@ def test_a_branch_is_left_for_the_other_one_where_the_first_step_takes_a_finer_m
     for number, load in enumerate(loads, 1):
         bent = trace(load, branch=1, direction=direction, limits=limits, step=0.5)
         assert [point.label for point in bent if point.label] == ["BP", "EP"]
-        modulus = math.sin(float(bent.points[-1].segment(0)["th"][-1]) / 2)
+        modulus = math.sin(bent.points[-1].system.states(bent.points[-1].x)[-1, 0] / 2)
         assert (2 * number - 1) * ellipk(modulus**2) == pytest.approx(10, rel=1e-7)
 
 

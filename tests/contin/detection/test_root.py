@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contin import ConvergenceError
+from contin import AlgebraicProblem, ConvergenceError, solve, trace
 from contin.detection.root import find_zero
 
 #: Functions with a simple zero between two places. The zeros are exact numbers, but for those of x = cos x (the Dottie number)
@@ -112,3 +112,24 @@ def test_a_small_step_before_a_jump_is_no_zero():
     with pytest.raises(ConvergenceError, match="no zero"):
         find_zero(lambda x: 1e-10 * (1 - 1e-3 * x) if x < 0.3 else -1.0, (0.0, 1e-10), (1.0, -1.0), 1e-12)
     assert find_zero(lambda x: 1e-10 - x, (0.0, 1e-10), (1.0, -1.0), 1e-14) == pytest.approx(1e-10, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-170, 1e170, 1e300])
+def test_the_size_of_the_function_makes_no_difference(size):
+    """Products of three values would be zero or infinite; the zero is W(1), as above."""
+    function = FUNCTIONS["exponential"][0]
+
+    def scaled(x):
+        return size * function(x)
+
+    places = []
+    assert find_zero(counted(scaled, places), *ends(scaled, -3.0, 2.0), 1e-13) == pytest.approx(0.56714329040978387, abs=1e-12)
+    assert len(places) <= 16
+
+
+def test_a_branch_whose_parameter_vanishes_exponentially():
+    """lam e^x = x turns at lam = 1 / e, and lam is 1e-189 at x = 440: a limit of zero is reached there but for round-off."""
+    problem = AlgebraicProblem(lambda u, p: (p.lam * math.exp(u.x) - u.x,), ["x"], {"lam": 0.01})
+    branch = trace(solve(problem, [0.0]), free=["lam"], limits={"lam": (0, 10)})
+    (fold,) = branch.labelled("LP")
+    assert fold["lam"] == pytest.approx(1 / math.e, rel=1e-12) and branch.points[-1]["lam"] < 1e-15 < 10 < branch.points[-1]["x"]
