@@ -219,9 +219,8 @@ def test_folds_of_cycles_in_two_parameters():
 def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
     """On the Lorenz cycles from 24.7 to 16 nothing happens: at each cycle, and once more where its mesh changes.
 
-    That is every third step, and where the error of an accepted point asks for a finer one. The first step takes six, to see that
-    all multipliers near -1 and on the circle are close to those of the Hopf point; it is made twice, the second time on a finer
-    mesh.
+    That is every third step, and where the error of an accepted point asks for a finer one. The first step takes six, to see
+    that multipliers near -1 and on the circle stay close to those of the Hopf point, and is made again on a finer mesh.
     """
     calls = []
 

@@ -132,4 +132,5 @@ def test_a_branch_whose_parameter_vanishes_exponentially():
     problem = AlgebraicProblem(lambda u, p: (p.lam * math.exp(u.x) - u.x,), ["x"], {"lam": 0.01})
     branch = trace(solve(problem, [0.0]), free=["lam"], limits={"lam": (0, 10)})
     (fold,) = branch.labelled("LP")
-    assert fold["lam"] == pytest.approx(1 / math.e, rel=1e-12) and branch.points[-1]["lam"] < 1e-15 < 10 < branch.points[-1]["x"]
+    assert fold["lam"] == pytest.approx(1 / math.e, rel=1e-12)
+    assert branch.points[-1]["lam"] < 1e-15 and branch.points[-1]["x"] > 10
