@@ -210,9 +210,7 @@ class _Search:
         tangents = [oriented(tangent / np.sqrt(inner(system, tangent, tangent))) for tangent in tangents]
         tangents = [tangents[i] for i in ordered(tangents, [0.0] * len(tangents))]
         kernel = _orthonormal(system, matrix.kernel)
-        change = np.array([[inner(system, new, old) for old in matrix.kernel] for new in kernel])
-        gram = np.array([[inner(system, a, b) for b in matrix.kernel] for a in matrix.kernel])
-        change = np.linalg.solve(gram, change.T).T  # new = change @ old
+        change = np.linalg.inv([[inner(system, old, new) for new in kernel] for old in matrix.kernel])  # new = change @ old
         hessian = change @ hessian @ change.T
         return BranchPoint(self.x, tuple(tangents), kernel, matrix.left(), hessian, float(abs(self.beta)))
 
