@@ -738,8 +738,7 @@ class Continuation:
         half = max(control.min_intervals, state.system.intervals // 2)
         for count in (half, fewest) if self._is_too_fine(state) else (fewest,):
             wanted = control if count == control.min_intervals else dataclasses.replace(control, min_intervals=count)
-            adapted = state.system.adapted(state.x, wanted)
-            adapted = adapted or outgrown(state.system, state.x)
+            adapted = outgrown(state.system, state.x, state.system.adapted(state.x, wanted))
             if adapted is not None and self._move_to(adapted):
                 return
 

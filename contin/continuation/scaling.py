@@ -383,12 +383,15 @@ def _said(name: str, settings: Settings) -> float:
     return min((abs(float(number)) for number in said if number), default=np.inf)
 
 
-def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier] | None:
-    """Return the system with larger sizes where unknowns have outgrown theirs, and the carrier; None where there is no need."""
-    if not isinstance(system, System):
-        return None
-    if not np.abs(x).max() > USUAL[1]:
-        return None  # most steps
+def outgrown(
+    system: Discretization, x: Array, adapted: tuple[Discretization, Carrier] | None = None
+) -> tuple[Discretization, Carrier] | None:
+    """Return the system, or one adapted to x, with larger sizes where unknowns have outgrown theirs, and the carrier.
+
+    What was adapted, which may be nothing, where there is no need.
+    """
+    if not isinstance(system, System) or not np.abs(x).max() > USUAL[1]:
+        return adapted  # most steps
     names, count = list(system.problem.parameters), len(system.problem.states)
     states, parameters = np.ones(count), np.ones(len(names))
     if system.scales is not None:
@@ -396,7 +399,12 @@ def outgrown(system: Discretization, x: Array) -> tuple[Discretization, Carrier]
     found = usual(system.largest(x))
     size, size_of_free = found[:count], found[count:]
     if max(size.max(), size_of_free.max(initial=0.0)) <= 1:
-        return None
+        return adapted
     parameters[[names.index(name) for name in system.free]] *= np.maximum(1.0, size_of_free)
-    other, _ = system.with_scales(x, states * np.maximum(1.0, size), parameters)
-    return None if other is system else (other, system.carrier(other))
+    base, carry = adapted or (system, np.array)
+    assert isinstance(base, System)
+    other, _ = base.with_scales(carry(x), states * np.maximum(1.0, size), parameters)
+    if other is base:
+        return adapted
+    rescale = base.carrier(other)
+    return other, lambda v: rescale(carry(v))
