@@ -119,7 +119,7 @@ _ATTEMPTS, _GROWTH = 4, 4
 #: A finer mesh stays if it makes the error smaller than this part of it. Where it does not, as at round-off or at a jump of the
 #: equations inside an interval, meshes would grow without end.
 _HELPS = 0.5
-#: Labels of points that must be found again on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
+#: Labels of points that must not be missed on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
 _CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
 #: Labels of points that no derivative by the solution tells.
 _BY_VALUES = ("EP", "UZ", "MX")
@@ -696,15 +696,19 @@ class Continuation:
                 self.notes.append(note)
 
     def _is_confirmed(self, point: SpecialPoint, segment: Segment) -> bool:
-        """Return whether a special point was located and, where that was asked for, found again on a finer mesh.
+        """Return whether a special point was located and, where that was asked for, not missed on a finer mesh.
 
-        Others are noted: they get no label. The end of a run keeps its own.
+        Others are noted: they get no label. The end of a run keeps its own. So does a point whose errors are not known because
+        Newton's method fails on the finer mesh; that is noted.
         """
-        lost = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
-        if point.stop is not None or (point.is_located and not lost):
+        what = f"{point.label} {point.name.removeprefix('possible').strip()}".strip()
+        unknown = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
+        if point.stop is not None or (point.is_located and not (unknown and point.is_lost)):
+            if point.stop is None and unknown:
+                place = f"{self.primary} = {point.trial[self.primary]:.10g}"
+                self.notes.append(f"{what} at {place}: its ± is nan, since Newton's method failed when the point was located again")
             return True
         why = why_lost(point.trial, point.is_located)
-        what = f"{point.label} {point.name.removeprefix('possible').strip()}".strip()
         self._note(f"a possible {what} {why}", segment)
         return False
 
@@ -831,10 +835,10 @@ class Continuation:
         coarse = own_normal_form(found.trial.system, found)
         if found.errors is None and labelled and self.settings.errors:
             again = refined(found.same_as or found, self.settings)
-            details, errors = found.details if found.same_as else again.details, again.errors
+            details, errors, is_lost = found.details if found.same_as else again.details, again.errors, again.is_lost
             if found.label not in _BY_VALUES and again.trial.system.switching(again.trial.x).jumps.any():
-                errors = dict.fromkeys(errors, np.nan)
-            found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors)
+                errors, is_lost = dict.fromkeys(errors, np.nan), True
+            found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors, is_lost=is_lost)
         if coarse is not None:
             better = own_normal_form(found.trial.system, found) if found.errors else coarse
             found = with_normal_form(found, better or coarse, coarse)

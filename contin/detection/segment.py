@@ -50,6 +50,8 @@ class SpecialPoint:
         The fold or branch point that lies at the same place and is located better.
     errors : mapping of str to float, optional
         Errors of the free parameters, where they are known from how the point was found.
+    is_lost : bool
+        It was looked for on a finer mesh, and is not there.
     """
 
     at: float
@@ -61,6 +63,7 @@ class SpecialPoint:
     test: TestFunction | None = None
     same_as: SpecialPoint | None = None
     errors: Mapping[str, float] | None = None
+    is_lost: bool = False
 
     @property
     def is_located(self) -> bool:

@@ -26,7 +26,7 @@ def test_a_point_that_runs_away_on_finer_meshes_gets_no_label(monkeypatch):
     coarse = trace(start, settings, free=["lam"], errors=False)
 
     def elsewhere(system, x, tangent, test, newton):
-        return Trial(system, x + 0.5, Linearization(tangent, 1.0))
+        return Trial(system, x + 0.5, Linearization(tangent, 1.0)), 0.0
 
     monkeypatch.setattr(refinement, "_zero_again", elsewhere)
     branch = trace(start, settings, free=["lam"])
