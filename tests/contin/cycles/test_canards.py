@@ -142,7 +142,7 @@ def test_a_branch_that_bends_within_a_shorter_way_than_the_smallest_step():
     problem = AlgebraicProblem(oregonator, ["x", "z"], {"f": 0.3, "eps": 0.04, "q": 8e-4})
     rest = contin.trace(contin.solve(problem, [0.7, 0.7]), free=["f"], limits={"f": (0.2, 1)})
     (hopf,) = rest.labelled("HB")
-    branch = contin.trace(hopf, branch=1, limits={"f": (0.2, 1)}, max_points=90)
+    branch = contin.trace(hopf, branch=1, limits={"f": (0.2, 1)}, max_points=65)
     assert branch.stop.reason == "max points"
     (note,) = branch.notes
     assert note.startswith("from f = 0.5125426") and "steps below 1e-06 are taken" in note
