@@ -251,3 +251,37 @@ def test_a_branch_that_begins_at_a_hopf_point_is_read_back(tmp_path):
     assert [point.label for point in again] == [point.label for point in branch]
     further = contin.trace(again.points[-1], limits={"mu": (-1, 1)})
     assert further.points[-1]["max_x"] == pytest.approx(1, abs=1e-9)
+
+
+def lorenz_84(u, p):
+    return -(u.y**2) - u.z**2 - (u.x - p.F) / 4, u.x * u.y - 4 * u.x * u.z - u.y + 0.25, 4 * u.x * u.y + u.x * u.z - u.z
+
+
+@pytest.mark.parametrize("errors", [True, False])
+def test_cycles_that_outgrow_the_sizes_of_their_hopf_point(errors):
+    """There y is 2e-4; on the cycles it is of order one. The doubling by shooting (DOP853, det(M + I) = 0)."""
+    equilibria = AlgebraicProblem(lorenz_84, ["x", "y", "z"], {"F": 0.0})
+    line = contin.trace(contin.solve(equilibria, [0.0, 0.25, 0.0]), free=["F"], limits={"F": (0, 2)})
+    cycles = contin.trace(line.labelled("HB")[0], branch=1, errors=errors, limits={"F": (1, 8.5)})
+    (doubling,) = cycles.labelled("PD")
+    assert doubling["F"] == pytest.approx(8.157983671848, abs=5e-11) and not cycles.notes
+    assert np.all(cycles[-2].system.scales is None or cycles[-2].system.scales.states >= 0.1)
+    assert not errors or doubling.errors["F"] < 1e-10
+
+
+def catalytic(u, p):
+    z = 1 - u.x - u.y - u.s
+    return 5 * z**2 - 2 * u.x**2 - 10 * u.x * u.y, p.q * z - 0.1 * u.y - 10 * u.x * u.y, 0.0675 * (z - 0.4 * u.s)
+
+
+def test_cycles_whose_period_changes_fast_beside_hopf_points():
+    """The catalytic oscillator of MatCont's manual: both Hopf points of the equilibria are the ends of one branch of cycles."""
+    equilibria = AlgebraicProblem(catalytic, ["x", "y", "s"], {"q": 0.5})
+    line = contin.trace(contin.solve(equilibria, [0.238, 0.0415, 0.515]), free=["q"], limits={"q": (0.5, 1.5)})
+    first, last = line.labelled("HB")
+    cycles = contin.trace(first, branch=1, limits={"q": (0.5, 1.5)}, max_points=250)
+    end = cycles[-1]
+    assert end.label == "HB" and end["q"] == pytest.approx(last["q"], abs=1e-12)
+    assert end["period"] == pytest.approx(2 * math.pi / last.details["frequency"], rel=1e-11)
+    assert [fold["q"] for fold in cycles.labelled("LP")] == pytest.approx([1.039162965369, 1.053610280788], abs=1e-11)
+    assert not cycles.notes

@@ -1,10 +1,11 @@
 """Error estimates of special points: not smaller than the error, and none where the point is not found again."""
 
+import numpy as np
 import pytest
 from bank import abc, bru
 from bank.closed_forms import bratu
 
-from contin import Settings, solve, trace
+from contin import ConvergenceError, Settings, solve, trace
 from contin.detection import refinement
 from contin.stepping.trial import Linearization, Trial
 
@@ -41,3 +42,31 @@ def test_a_point_that_runs_away_on_finer_meshes_gets_no_label(monkeypatch):
 def test_errors_of_algebraic_points_are_those_of_their_location(case):
     for point, special in zip([p for p in case.run().points[1:] if p.label], case.specials):
         assert abs(point["d"] - special.values["d"]) < 4 * point.errors["d"] and 0 < point.errors["d"] < 1e-12
+
+
+def test_a_point_for_which_newton_fails_on_finer_meshes_keeps_its_label(monkeypatch):
+    """Nothing is known against it: its errors are NaN, and a note says so."""
+    start = solve(bratu(), [0, 0], degree=6)
+
+    def fails(system, x, tangent, test, newton):
+        raise ConvergenceError("Newton did not converge")
+
+    monkeypatch.setattr(refinement, "_zero_again", fails)
+    branch = trace(start, free=["lam"], limits={"lam": (0, 4), "mean": (-1, 1)})
+    (fold,), (note,) = branch.labelled("LP"), branch.notes
+    assert fold["lam"] == pytest.approx(3.513830719125161, abs=1e-8) and fold.errors["lam"] != fold.errors["lam"]
+    assert note.startswith("LP lam at lam = 3.51383") and "± is nan" in note
+
+
+@pytest.mark.parametrize(("place", "noise"), [(0.0, 1e-6), (2e-7, 1e-9), (-3e-5, 0.0)])
+def test_a_zero_in_round_off_is_known_to_where_the_function_grows(place, noise):
+    """The distance covers the zero and is less than a thousand times what round-off leaves open."""
+    random = np.random.default_rng(4)
+    found = refinement._known_to(lambda s: (s - place) + noise * random.uniform(-1, 1))
+    assert abs(place) <= found <= 1e3 * max(abs(place), noise)
+
+
+@pytest.mark.parametrize("function", [lambda s: 1 + s, lambda s: s * s, lambda s: 0.0])
+def test_what_does_not_change_its_sign_is_no_zero(function):
+    with pytest.raises(ConvergenceError, match="not found again"):
+        refinement._known_to(function)
