@@ -88,7 +88,7 @@ def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     symmetric: Any = getattr(segment.trial.system, "is_symmetric", None)
     if symmetric is not None and symmetric(segment.state.x) and symmetric(segment.trial.x):
         return []  # all eigenvalues are real
-    inside = [segment.step * part / _PARTS for part in range(1, _PARTS)]
+    inside = sorted({segment.step * part / _PARTS for part in range(1, _PARTS)} - {s for s, _ in knots})
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda knot: knot[0])
     if not any(_moving(looked)):
         return []
