@@ -198,7 +198,7 @@ class Collocation(System):
 
     def newton_error(self, x: Array, factors: Factors) -> float:
         """Return what Newton's method or round-off has left, measured in the same way."""
-        return self._defect.left_by_newton(x, factors)
+        return self._defect.left_by_newton(x, self.residual(x), factors)
 
     @property
     def states_count(self) -> int:

@@ -186,7 +186,7 @@ class Defect:
             last = self.system.field_values(mesh[1:] - aside, at_mesh[1:], p)
         return first, last
 
-    def left_by_newton(self, x: Array, factors: Any) -> float:
+    def left_by_newton(self, x: Array, residual: Array, factors: Any) -> float:
         """Return the part of such an error that no mesh makes smaller: of states, rates and free parameters, by the residual.
 
         Newton's method has left it, or round-off.
@@ -194,7 +194,7 @@ class Defect:
         system, n, none = self.system, self.n, np.empty((0, self.n))
         at_mesh = x[: system.state_size].reshape(-1, n)[:: system.degree].copy()
         with np.errstate(all="ignore"):
-            error = factors.solve(np.append(system.residual(x), 0.0))
+            error = factors.solve(np.append(residual, 0.0))
             rates = system.field_values(system.mesh, at_mesh, system.scaled_parameters(x))
             largest = move(n, self.tables, x, error, none, at_mesh)
             return self._with_rates(x - error, rates, at_mesh, largest)
