@@ -135,13 +135,13 @@ class _FirstPoint:
         terms = [self.system.largest(term) for term in self._terms()]
         modes = list(self._modes(known))
         reach = min([_reach(terms), *(mode.distance for mode in modes)])
-        reach = _held(reach, terms[0], np.where(at, 0.0, known))
+        reach = _held(reach, terms, np.where(at, 0.0, known))
         natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
         change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
         natural = _larger(natural, _sizes(terms, change), ~at, error)
         branches = [self._settled_branch(mode) for mode in modes if mode.vector.any()]
         branches = [(parts, size) for parts, size in branches if np.any(parts)]  # some are nothing but what changes
-        held = [_held(size, parts[0], known) for parts, size in branches]
+        held = [_held(size, parts[:1], known) for parts, size in branches]
         for (parts, _), size in zip(branches, held):
             if np.isfinite(size):
                 natural = _larger(natural, _sizes(parts, size), ~at, error)
@@ -344,11 +344,14 @@ def _reach(terms: Sequence[Array]) -> float:
     return min(found)
 
 
-def _held(reach: float, direction: Array, known: Array) -> float:
-    """Return a factor, made smaller where it changes a known state by more than its size."""
-    natural = np.where(direction > 0, direction * reach, 0.0) if np.isfinite(reach) else np.zeros_like(direction)
-    moved = (direction > 0) & (known > 0) & _counts(known, natural)
-    return float(min([reach, *(known[moved] / direction[moved])]))
+def _held(reach: float, terms: Sequence[Array], known: Array) -> float:
+    """Return a change of the variable of an expansion, made smaller where a term changes a known state by more than its size."""
+    held = [reach]
+    for power, term in enumerate(terms, 1):
+        natural = np.where(term > 0, term * reach**power, 0.0) if np.isfinite(reach) else np.zeros_like(term)
+        moved = (term > 0) & (known > 0) & _counts(known, natural)
+        held += list((known[moved] / term[moved]) ** (1 / power))
+    return float(min(held))
 
 
 def _sizes(terms: Sequence[Array], change: float) -> Array:
