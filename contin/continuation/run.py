@@ -514,7 +514,7 @@ class Continuation:
                 segment, judgement = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
                 doubt = inspection.doubt() or self._contradiction(segment, inspection) or self._lost_end(segment, inspection)
-                doubt = doubt or self._moved_past(segment.trial)
+                doubt = doubt or self._moved_past(segment.trial) or inspection.strays(self._tests)
                 if step < 2 * finest or not doubt:
                     inspection.special_points(self._tests)  # where points inside cannot be found the step is halved
                     return Step(segment, inspection, judgement, doubt)

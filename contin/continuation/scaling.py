@@ -135,13 +135,15 @@ class _FirstPoint:
         terms = [self.system.largest(term) for term in self._terms()]
         modes = list(self._modes(known))
         reach = min([_reach(terms), *(mode.distance for mode in modes)])
-        reach = _held(reach, terms, np.where(at, 0.0, known))
+        small = (known > 0) & (known < USUAL[0]) & ~at
+        bends = np.where(at | (small & ~(known > _NOTHING * self._alone(small))), 0.0, known)
+        reach = min(_held(reach, terms[0], np.where(at, 0.0, known)), _bent(terms, bends))
         natural = np.where(at, min(reach if np.isfinite(reach) else 1.0, said), 0.0)
         change = min(natural[self.at], known[self.at] if _counts(known, natural)[self.at] else np.inf)
         natural = _larger(natural, _sizes(terms, change), ~at, error)
         branches = [self._settled_branch(mode) for mode in modes if mode.vector.any()]
         branches = [(parts, size) for parts, size in branches if np.any(parts)]  # some are nothing but what changes
-        held = [_held(size, parts[:1], known) for parts, size in branches]
+        held = [_held(size, parts[0], known) for parts, size in branches]
         for (parts, _), size in zip(branches, held):
             if np.isfinite(size):
                 natural = _larger(natural, _sizes(parts, size), ~at, error)
@@ -203,12 +205,17 @@ class _FirstPoint:
             left = left & ~part
 
     def _apart(self, which: Pattern) -> Array:
-        """Return how far, up to one, states can change by themselves before F_x is singular; 0 where that never happens."""
-        found = np.zeros(which.size)
+        """The same up to one, and 0 where that never happens: states that enter linearly go as far as 1e12."""
+        found = self._alone(which)
+        return np.where(np.isfinite(found), np.minimum(found, 1.0), 0.0)
+
+    def _alone(self, which: Pattern) -> Array:
+        """Return how far states can change by themselves before F_x is singular; infinity where that never happens."""
+        found = np.full(which.size, np.inf)
         for number in np.flatnonzero(which) if np.count_nonzero(which) <= _MOST else ():
             alone = self._kept(np.ones_like(self.x), np.arange(which.size) == number)
             mode = self._nearest(alone, np.ones_like(which))
-            found[number] = 0.0 if mode is None else min(mode.distance, 1.0)  # states that enter linearly go as far as 1e12
+            found[number] = np.inf if mode is None else mode.distance
         return found
 
     def _nearest(self, direction: Array, kept: Pattern) -> _Mode | None:
@@ -344,14 +351,20 @@ def _reach(terms: Sequence[Array]) -> float:
     return min(found)
 
 
-def _held(reach: float, terms: Sequence[Array], known: Array) -> float:
-    """Return a change of the variable of an expansion, made smaller where a term changes a known state by more than its size."""
-    held = [reach]
-    for power, term in enumerate(terms, 1):
-        natural = np.where(term > 0, term * reach**power, 0.0) if np.isfinite(reach) else np.zeros_like(term)
-        moved = (term > 0) & (known > 0) & _counts(known, natural)
-        held += list((known[moved] / term[moved]) ** (1 / power))
-    return float(min(held))
+def _held(reach: float, direction: Array, known: Array) -> float:
+    """Return a factor, made smaller where it changes a known state by more than its size."""
+    natural = np.where(direction > 0, direction * reach, 0.0) if np.isfinite(reach) else np.zeros_like(direction)
+    moved = (direction > 0) & (known > 0) & _counts(known, natural)
+    return float(min([reach, *(known[moved] / direction[moved])]))
+
+
+def _bent(terms: Sequence[Array], known: Array) -> float:
+    """Return the smallest change of the variable of an expansion at which a term of higher order is as large as a known state."""
+    found = [np.inf]
+    for power, term in enumerate(terms[1:], 2):
+        moved = (term > 0) & (known > 0)
+        found += list((known[moved] / term[moved]) ** (1 / power))
+    return float(min(found))
 
 
 def _sizes(terms: Sequence[Array], change: float) -> Array:

@@ -106,8 +106,11 @@ class BranchPointSearch:
 
     @property
     def sign_changes(self) -> bool:
-        """The determinant's sign changes inside the step."""
-        return sign_changed(self.segment.before.sign, self.segment.trial.sign)
+        """The determinant's sign changes inside the step, as that right at its end says."""
+        before, trial = self.segment.before, self.segment.trial
+        if before.sign != trial.sign:
+            trial.sharpen_factors(self.segment.state.row)
+        return sign_changed(before.sign, trial.sign)
 
     @functools.cached_property
     def simple(self) -> SpecialPoint:

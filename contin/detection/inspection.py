@@ -59,6 +59,7 @@ _BESIDE = 1e-4
 _TRIVIAL = 1e-6
 #: It lies no further off the cubic through both ends of the step than this part of the step, as other branch points.
 _OFF = 0.1
+_STRAYS = "the determinant changes its sign, and no branch point was found"
 _ADVICE = "a smaller max_step or accuracy, or more intervals may help"
 #: A branch can close on its first point after this many regular points.
 _FEWEST = 3
@@ -118,8 +119,22 @@ class Inspection:
             located, what = self._branch_points.multiple.is_located, f"{count} branch points in one step were not told apart"
         else:
             located = not self._branch_points.sign_changes or self._branch_points.simple.is_located
-            what = "the determinant changes its sign, and no branch point was found"
+            what = _STRAYS
         return "" if located else what
+
+    def strays(self, tests: Iterable[TestFunction]) -> str:
+        """Return why the step may have left its branch where branch points are not looked for; "" where not.
+
+        The determinant changes its sign where branches cross, labelled or not, and where a kind of problem knows its equations
+        to be singular; otherwise Newton's method left the branch: another arm of it beside a fold is passed the other way.
+        """
+        if self.settings.branch_points or self._own_home is not None or not self._branch_points.sign_changes:
+            return ""
+        for point in self.special_points(tests):
+            ends = point.stop is not None and not (point.test is not None and point.test.limit)
+            if point.is_located and (point.label == "BP" or ends):
+                return ""
+        return "" if self._branch_points.simple.is_located else _STRAYS
 
     def _is_steady(self) -> bool:
         """Return whether the primary parameter goes, between its folds, the way that the tangents say."""

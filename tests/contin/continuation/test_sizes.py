@@ -210,3 +210,49 @@ def test_a_parameter_that_is_an_error_and_becomes_free():
     folds = contin.curve(branch.labelled("LP")[0], "nu", limits={"nu": (-1, 1)})
     assert str(folds.stop) == "reached nu = 1" and len(folds) < 40
     assert folds.column("a") == pytest.approx(folds.column("nu"), abs=1e-12)
+
+
+# --- small closed curves beside states of order one -------------------------------------------------------------------
+
+#: Equations of a closed curve of radius r, other unknowns, and the states at a = 0.
+SMALL = {
+    "circle": (lambda u, p, r: (u.x**2 + p.a**2 - r**2, u.y - 1 - p.a), lambda r: {"x": r, "y": 1.0}),
+    "ellipse": (lambda u, p, r: (u.x**2 / 9 + p.a**2 - r**2, u.y - math.exp(p.a)), lambda r: {"x": 3 * r, "y": 1.0}),
+    "sphere and plane": (
+        lambda u, p, r: (u.x**2 + u.z**2 + p.a**2 - r**2, u.z - u.x, u.y - math.cos(u.x)),
+        lambda r: {"x": r / math.sqrt(2), "z": r / math.sqrt(2), "y": 1.0},
+    ),
+    "loop beside three": (
+        lambda u, p, r: (u.x**2 + p.a**2 - r**2, u.y - 1 - u.x, u.z - u.y**2, u.w - u.z * u.y),
+        lambda r: {"x": r, "y": 1 + r, "z": (1 + r) ** 2, "w": (1 + r) ** 3},
+    ),
+}
+
+
+@pytest.mark.parametrize("radius", [1e-3, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("kind", SMALL)
+def test_small_closed_curves(kind, radius):
+    """Where the curve is flat in a, only the second term of x shows the size of a. Folds at a = radius and -radius."""
+    law, states = SMALL[kind]
+    first = states(radius)
+    problem = AlgebraicProblem(lambda u, p: law(u, p, radius), list(first), {"a": 0.0})
+    branch = trace(solve(problem, list(first.values())), free=["a"], limits={"a": (-1, 1)})
+    assert [point.label for point in branch if point.label] == ["EP", "LP", "LP", "EP"] and not branch.notes
+    assert str(branch.stop) == "the branch closed on its first point"
+    assert [point["a"] / radius for point in branch.labelled("LP")] == pytest.approx([1, -1], rel=1e-9)
+    for point in branch:
+        x, a = point["x"] / first["x"], point["a"] / radius
+        assert x**2 + a**2 == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("radius", [1e-3, 1e-5, 1e-7])
+def test_a_small_closed_curve_of_a_boundary_value_problem(radius):
+    """x' = 0 with x(0)^2 + a^2 = r^2, beside y'' = -pi^2 y / 4 with y(0) = 0, y(1) = 1 + a."""
+    problem = BoundaryValueProblem(
+        lambda t, u, p: (0 * u.x, u.v, -(math.pi**2) / 4 * u.y),
+        lambda a, b, p: (a.x**2 + p.a**2 - radius**2, a.y, b.y - 1 - p.a), ["x", "y", "v"], {"a": 0.0},
+    )  # fmt: skip
+    start = solve(problem, lambda t: (radius, math.sin(math.pi * t / 2), math.pi / 2 * math.cos(math.pi * t / 2)))
+    branch = trace(start, free=["a"], limits={"a": (-1, 1)})
+    assert [point.label for point in branch if point.label] == ["EP", "LP", "LP", "EP"]
+    assert [point["a"] / radius for point in branch.labelled("LP")] == pytest.approx([1, -1], rel=1e-9)

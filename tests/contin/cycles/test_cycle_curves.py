@@ -2,9 +2,11 @@
 
 import functools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
 import contin
@@ -229,6 +231,42 @@ def test_a_curve_of_doublings_does_not_slide_onto_an_equilibrium():
     assert found.labelled("LP")[0]["be"] == pytest.approx(0.767089, abs=1e-6)
     for point in found:
         assert point["max_x"] - point["min_x"] > 0.03
+
+
+@pytest.mark.full
+def test_a_curve_of_doublings_does_not_go_back_on_itself():
+    """Beside its corner at the period 58.47 both arms of the same curve lie close together, and a step led to the other arm.
+
+    From there the curve led back to where it came from. Here it ends elsewhere: nu is another one at the same be = .6, with the
+    multiplier -1 there by integration over a round.
+    """
+    problem = contin.AlgebraicProblem(circuit, ["x", "y", "z"], {"nu": -0.9, "be": 0.5})
+    rest = contin.trace(contin.solve(problem, [0, 0, 0]), free=["nu"], limits={"nu": (-0.95, -0.55)})
+    limits = {"nu": (-0.62, -0.5), "period": (0, 20)}
+    single = contin.trace(rest.labelled("HB")[0], branch=1, limits=limits, max_points=60)
+    (doubling,) = contin.trace(single.labelled("BP")[0], branch=1, limits=limits, max_points=60).labelled("PD")
+    found = contin.curve(doubling, "be", limits={"be": (0.49, 1.5)}, zeros={"be": [0.6]})
+    there, back = found.labelled("UZ")
+    assert len(found.labelled("LP")) == 1 and there["nu"] - back["nu"] > 0.05
+    for point in (there, back):
+        monodromy = integrated(point)
+        assert np.abs(np.linalg.eigvals(monodromy) + 1).min() < 1e-5
+
+
+def integrated(point):
+    """The monodromy matrix of a cycle of `circuit`, by SciPy's integrator and complex steps."""
+    start = point.system.base.evaluate(point.x, np.array([0.0]))[0, :3]
+    numbers = SimpleNamespace(nu=point["nu"], be=point["be"])
+    columns = []
+    for k in range(3):
+        first = start.astype(complex)
+        first[k] += 1e-30j
+        orbit = solve_ivp(
+            lambda t, u: circuit(SimpleNamespace(x=u[0], y=u[1], z=u[2]), numbers), (0, point["period"]), first,
+            method="DOP853", rtol=1e-12, atol=1e-12,
+        )  # fmt: skip
+        columns.append(orbit.y[:, -1].imag / 1e-30)
+    return np.transpose(columns)
 
 
 def test_multipliers_on_curves():

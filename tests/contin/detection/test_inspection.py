@@ -7,7 +7,7 @@ import pytest
 from bank import abc, enz, pp2
 from bank.closed_forms import bratu, bratu_fold, pitchfork
 
-from contin import Settings, TestFunction, solve, trace
+from contin import AlgebraicProblem, Settings, TestFunction, solve, trace
 
 
 def labels(branch):
@@ -97,3 +97,24 @@ def test_a_limit_far_beyond_a_fold_is_met_on_the_way_back():
     """lam = 1 is a limit that the run starts on, leaves inwards and comes back to past the fold."""
     branch = trace(solve(bratu(), [0, 0], {"lam": 1.0}, degree=6), free=["lam"], limits={"lam": (1.0, 4)})
     assert labels(branch) == ["LP", "EP"] and math.isclose(branch.points[-1]["lam"], 1.0, abs_tol=1e-12)
+
+
+@pytest.mark.parametrize("gap", [1e-1, 1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("options", [{"step": 0.05}, {"step": 2.9}, {"step": 4.0, "accuracy": 0.2, "angle": 1.4}])
+@pytest.mark.parametrize("branch_points", [True, False])
+def test_no_step_leads_to_the_other_arm_of_a_hyperbola(gap, options, branch_points):
+    """x^2 = a^2 + gap^2 from a = -3, x > 0: the other arm, x < 0, lies straight on."""
+    problem = AlgebraicProblem(lambda u, p: (u.x**2 - p.a**2 - gap**2,), ["x"], {"a": -3.0})
+    branch = trace(solve(problem, [3.0]), free=["a"], limits={"a": (-3.1, 3.1)}, branch_points=branch_points, **options)
+    assert labels(branch) == ["EP"] and branch.points[-1]["a"] == pytest.approx(3.1)
+    assert min(point.x[0] for point in branch) > 0
+
+
+@pytest.mark.parametrize("gap", [1e-1, 1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("branch_points", [True, False])
+def test_an_arm_of_a_hyperbola_turns_back(gap, branch_points):
+    """a^2 = x^2 + gap^2 from a = -3: the fold is at a = -gap, and the way back ends at a = -3.1."""
+    problem = AlgebraicProblem(lambda u, p: (p.a**2 - u.x**2 - gap**2,), ["x"], {"a": -3.0})
+    branch = trace(solve(problem, [3.0]), free=["a"], limits={"a": (-3.1, 3.1)}, branch_points=branch_points, step=2.9)
+    assert labels(branch) == ["LP", "EP"] and branch.points[-1]["a"] == pytest.approx(-3.1)
+    assert branch.labelled("LP")[0]["a"] == pytest.approx(-gap, rel=1e-8)
