@@ -28,7 +28,7 @@ _FAR = 0.1
 #: Chord steps that cost about as much as one factorization. Ten times as many save 7 % of the factorizations on the test bank,
 #: and take more solves; ten times fewer take 49 % more factorizations.
 _CHORDS = 4
-#: Updates that small and no longer shrinking are round-off: far above that of one solve, far below what is worth an iteration.
+#: Updates that small and no longer shrinking may be round-off: far above that of one solve, far below what is worth an iteration.
 _ROUND_OFF = 1e-9
 #: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: then a
 #: few steps reach round-off, where slower ones would take as long as a factorization.
@@ -161,7 +161,7 @@ def _newton(
             if not math.isfinite(size):
                 break
             progress.record(size, fresh)
-            if progress.converged:
+            if progress.converged or (progress.stagnates and _is_noise(system, x, update, rows, _ROUND_OFF)):
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
                     return Corrected(x, factors, len(progress.sizes), progress.error, along)
@@ -313,10 +313,14 @@ class _Progress:
 
     @property
     def converged(self) -> bool:
-        """The error is below the tolerance, or the updates are round-off."""
-        size, repeated = self.sizes[-1], len(self.sizes) > 1
-        confirmed = repeated or size <= self.tolerance
-        return (confirmed and self.error <= self.tolerance) or (size < _ROUND_OFF and repeated and self.rate >= 0.5)
+        """The error is below the tolerance."""
+        confirmed = len(self.sizes) > 1 or self.sizes[-1] <= self.tolerance
+        return confirmed and self.error <= self.tolerance
+
+    @property
+    def stagnates(self) -> bool:
+        """Small updates no longer shrink: they are round-off, or there is no solution and unknowns are smaller still."""
+        return self.sizes[-1] < _ROUND_OFF and len(self.sizes) > 1 and self.rate >= 0.5
 
     @property
     def diverges(self) -> bool:
