@@ -103,7 +103,7 @@ _ROUNDS = 3
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
 #: small as min_step come much nearer, and regular points do not come so near.
 _NEARLY = 1e-2
-#: A run whose primary parameter has stood still for so many steps is asked whether it should go on.
+#: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
 _STANDING = 6
 #: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
 #: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
@@ -401,6 +401,9 @@ class Continuation:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
         elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
+            if self.stop is None:
+                here = f"{self.primary} stays at {segment.trial[self.primary]:.10g}, as far as can be told"
+                self.notes.append(f"{here}: a vertical family, as of a linear or conservative system; folds are not told there")
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
         found_at_end = self._located(SpecialPoint(segment.step, label, name, step.end))
         yield self._point(found_at_end, segment.state, accuracy=self._accuracy)

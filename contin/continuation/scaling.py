@@ -10,6 +10,9 @@ that are zero, or nothing but errors, follow from the exact Taylor expansion of 
 3. The eigenvector v of mu leads to the branch that leaves there. The amplitude at which a nonlinear term along v is as large as
    the linear one is the size of the states that take part in v.
 
+Where the branch is flat in p, as at the top of a circle, its bend alone bounds the size of p: a term of higher order that is as
+large as a state whose small value is more than nothing, since F_x would be singular not much further than that away.
+
 All of these are made with F_x^-1 and compared state by state, so that they do not depend on units. A limit is no size: it can
 only make one smaller. Where nothing is found the size is one; a branch that outgrows a size gets a larger one. Only sizes far
 from one count (`contin.discretization.scales`).
@@ -359,7 +362,7 @@ def _held(reach: float, direction: Array, known: Array) -> float:
 
 
 def _bent(terms: Sequence[Array], known: Array) -> float:
-    """Return the smallest change of the variable of an expansion at which a term of higher order is as large as a known state."""
+    """Return the smallest change of an expansion's variable at which a term of higher order is as large as a known state."""
     found = [np.inf]
     for power, term in enumerate(terms[1:], 2):
         moved = (term > 0) & (known > 0)

@@ -1,9 +1,9 @@
 """The sense in which the primary parameter goes along a branch, where that is more than an error of the discretization.
 
 In a canard explosion a parameter stays within 1e-10 or less over many steps, while its rate on the mesh is 1e-11 with an
-arbitrary sign: that of the error of the mesh. A rate that small is compared with the one on a finer mesh. Where they differ,
-the parameter stands still as far as can be told, and no fold is seen there. A fold lies on such a plateau if the parameter
-leaves it in the other sense than the one it came in.
+arbitrary sign: that of the error of the mesh. A rate that small is compared with the one on a finer mesh or, without a mesh,
+with round-off. Where they differ, or where it is no more than that, the parameter stands still as far as can be told, and no
+fold is seen there. A fold lies on such a plateau if the parameter leaves it in the other sense than the one it came in.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.linalg.orientation import oriented
-from contin.stepping.newton import Newton, correct
+from contin.stepping.newton import UNITS, Newton, correct
 from contin.stepping.trial import TestFunction, Trial, linearization
 
 #: Rates above this are significant without a look at a finer mesh. Ten times larger, more steps take twice as long.
@@ -30,6 +30,8 @@ _ROUND_OFF = 1e-14
 #: Distance from a first point at which the sign of a small rate is looked at: located folds are known to 1e-9 to 1e-6. Ten
 #: times larger, another fold could lie between.
 _BESIDE = 1e-4
+#: Draws of the signs of round-off. One more changes the estimate by a few percent.
+_DRAWS = 3
 #: A rate is significant where that on the finer mesh differs by less than this part of it.
 _AGREES = 0.5
 
@@ -48,14 +50,32 @@ def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
     rate = trial.value(fold)
     if not abs(rate) < _CLEAR:
         return float(np.sign(rate))
-    if trial.system.refined() is None:
-        return float(np.sign(rate))  # without a mesh, there is round-off only
+    if trial.system.refined() is None:  # without a mesh, there is round-off only
+        return float(np.sign(rate)) if abs(rate) > _noise(trial, fold) else 0.0
     finer = on_finer_mesh(trial, newton)
     if finer is None:
         return 0.0
     again = finer.value(fold)
     significant = abs(again) > _ROUND_OFF and abs(again - rate) < _AGREES * abs(rate)
     return float(np.sign(rate)) if significant else 0.0
+
+
+def _noise(trial: Trial, fold: TestFunction) -> float:
+    """Return the rate of the primary parameter that is round-off, without a mesh.
+
+    Each equation is evaluated with an error as large as one unit in the last place of x makes, of its own sign: discretized
+    derivatives make it large. The equations of the tangent are those of a change of x, with errors in proportion.
+    """
+    system, x, tangent = trial.system, trial.x, trial.tangent
+    size, own = (float(np.linalg.norm(vector[: system.state_size])) for vector in (x, tangent))
+    if not size:
+        return 0.0
+    random, noise, at = np.random.default_rng(7), 0.0, system.parameter_index(fold.name)
+    residual, factors = system.linearize(x, (system.weights * tangent,))
+    for _ in range(_DRAWS):
+        error = system.residual(x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), x.size))) - residual
+        noise = max(noise, abs(factors.solve(np.append(error * random.choice((-1.0, 1.0), error.size), 0.0))[at]))
+    return float(UNITS * noise * own / size)
 
 
 def growing(system: Discretization, x: Array, tangent: Array, primary: str, newton: Newton) -> Array:

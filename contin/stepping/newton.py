@@ -28,7 +28,8 @@ _FAR = 0.1
 #: Chord steps that cost about as much as one factorization. Ten times as many save 7 % of the factorizations on the test bank,
 #: and take more solves; ten times fewer take 49 % more factorizations.
 _CHORDS = 4
-#: Updates that small and no longer shrinking may be round-off: far above that of one solve, far below what is worth an iteration.
+#: Updates that small and no longer shrinking may be round-off: far above that of one solve, far below what an iteration is
+#: worth. They are where round-off of x makes as much.
 _ROUND_OFF = 1e-9
 #: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: then a
 #: few steps reach round-off, where slower ones would take as long as a factorization.

@@ -124,3 +124,30 @@ def test_folds_on_both_sides_of_a_pitchfork(apart, step):
     for point in (*through.labelled("LP"), *ended.labelled("LP")):
         assert point["a"] == pytest.approx(apart**4, abs=1e-12)
         assert abs(point["X"]) == pytest.approx(apart, abs=1e-7)
+
+
+@pytest.mark.parametrize("factor", [lambda u, s: 1, lambda u, s: 1 + u**2, lambda u, s: 1 + s])
+def test_a_vertical_branch_of_a_discretized_column_has_no_folds(factor):
+    """(u'''' + lam u'') f(u) = 0 by differences: at a load all amplitudes solve it. Round-off of the load is 1e-11 and more.
+
+    With 30 places the load is (2 - 2 cos(pi h)) / h^2, h = 1 / 31.
+    """
+    count, h = 30, 1 / 31
+
+    def column(u, p):
+        values = [-u[0], 0, *(u[i] for i in range(count)), 0, -u[count - 1]]
+        square = h * sum(each**2 for each in values[2:-2])
+        bent = [(values[i - 1] - 2 * values[i] + values[i + 1]) / h**2 for i in range(1, count + 3)]
+        return tuple(
+            ((bent[i] - 2 * bent[i + 1] + bent[i + 2]) / h**2 + p.lam * bent[i + 1]) * factor(values[i + 2], square)
+            for i in range(count)
+        )
+
+    problem = AlgebraicProblem(column, [f"u{i}" for i in range(count)], {"lam": 8.0})
+    (buckling,) = trace(solve(problem, [0] * count), free=["lam"], limits={"lam": (8, 11)}).labelled("BP")
+    branch = trace(buckling, branch=1, limits={"lam": (5, 15)}, max_points=60)
+    assert [point.label for point in branch if point.label] == ["BP", "EP"]
+    assert branch.column("lam") == pytest.approx((2 - 2 * math.cos(math.pi * h)) / h**2, abs=1e-9)
+    assert max(branch.points[-1].x[:count]) > 100
+    (note,) = branch.notes
+    assert note.startswith("lam stays at 9.86116") and "a vertical family" in note
