@@ -19,8 +19,8 @@ from contin.stepping.trial import Trial
 _SHORTER = (1e-2, 1e-4)
 #: Looser tolerances that are tried, as multiples of the one that failed: the smallest that goes on is told.
 _LOOSER = (1e3, 1e4, 1e5)
-#: An advice must let the run go on for so many steps, and over so many times ``min_step``: one step may succeed right before
-#: what ends the run. No more than the third number of steps are tried.
+#: An advice must let the run go on for so many steps, and over so many times ``min_step`` or, with a looser tolerance, as
+#: far as a first step: one step may succeed right before what ends the run. No more than the third number of steps are tried.
 _STEPS, _WAY, _MOST = 10, 2, 100
 #: Each of them is tried so much longer than the one before.
 _LONGER = 1.5
@@ -78,7 +78,7 @@ def advice(state: State, settings: Settings) -> str:
         return ""
     for times in _LOOSER:
         loose = dataclasses.replace(settings.newton, tolerance=times * settings.newton.tolerance)
-        if loose.tolerance < 1 and _goes_on(state, dataclasses.replace(settings, newton=loose), way):
+        if loose.tolerance < 1 and _goes_on(state, dataclasses.replace(settings, newton=loose), settings.step / _WAY):
             return f"the run goes on with newton=Newton(tolerance={loose.tolerance:g}): the one that is set is round-off here"
     if (shorter := _least_step(state, settings)) is not None:
         return f"the run goes on with steps of {shorter:g}: set min_step to that or less"

@@ -401,7 +401,7 @@ class Continuation:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
         elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
-            if self.stop is None:
+            if self.stop is None and not segment.trial.system.intervals:
                 here = f"{self.primary} stays at {segment.trial[self.primary]:.10g}, as far as can be told"
                 self.notes.append(f"{here}: a vertical family, as of a linear or conservative system; folds are not told there")
         label, name = ("EP", self.stop.reason) if self.stop else ("", "")
