@@ -1,7 +1,9 @@
 """For people who wait for a run: a line of progress, labels within the limits, and advice that names what helps."""
 
 import io
+import re
 
+import numpy as np
 import pytest
 
 import contin
@@ -143,3 +145,21 @@ def test_round_off_above_the_tolerance():
     errors = [point.newton_error for point in branch if not point.label]
     assert 1e-10 < max(errors) < 1e-5
     assert any("round-off above its tolerance" in note for note in branch.notes)
+
+
+@pytest.mark.parametrize(("rate", "size"), [(100, 1.0), (300, 1.0), (300, 1e4), (1000, 1.0), (1000, 1e4), (20, 1e4)])
+def test_an_advice_does_not_fail_at_once(rate, size):
+    """x = a^2 with round-off of size e^(rate a): a looser tolerance that is advised leads on by at least a first step."""
+
+    def noisy(u, p):
+        return ((u.x + size * np.exp(rate * p.a)) - size * np.exp(rate * p.a) - p.a**2,)
+
+    start = contin.solve(AlgebraicProblem(noisy, ["x"], {"a": 0.0}), [0.0])
+    branch = contin.trace(start, free=["a"], limits={"a": (-1, 1)})
+    assert branch.stop.reason == "no convergence"
+    if advised := re.search(r"tolerance=([\d.e-]+)\)", branch.stop.advice):
+        newton = contin.Newton(tolerance=float(advised[1]))
+        again = contin.trace(start, free=["a"], limits={"a": (-1, 1)}, newton=newton)
+        assert again.points[-1]["a"] > branch.points[-1]["a"] + 0.05
+    else:
+        assert branch.stop.advice.startswith("tried in vain")
