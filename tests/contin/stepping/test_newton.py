@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from contin import ConvergenceError, Newton, correct
+from contin import Algebraic, AlgebraicProblem, ConvergenceError, Newton, correct
 
 
 class Matrix:
@@ -197,3 +197,12 @@ def test_the_guess_is_left_as_it_was():
     guess = np.array([9.0])
     correct(square_root(), guess)
     assert guess.tolist() == [9.0]
+
+
+@pytest.mark.parametrize("square", [1e-18, 1e-20])
+@pytest.mark.parametrize("guess", [1e-8, 1e-9])
+def test_small_updates_that_solve_nothing_are_no_round_off(square, guess):
+    """x^2 + square = 0 has no real solution: updates stay at the size of its root, below 1e-9."""
+    nothing = Algebraic(AlgebraicProblem(lambda u, p: (u.x**2 + square,), ["x"], {"a": 0.0}), [])
+    with pytest.raises(ConvergenceError):
+        correct(nothing, [guess])
