@@ -709,7 +709,7 @@ class Continuation:
         if point.stop is not None or (point.is_located and not (unknown and point.is_lost)):
             if point.stop is None and unknown:
                 place = f"{self.primary} = {point.trial[self.primary]:.10g}"
-                self.notes.append(f"{what} at {place}: its ± is nan, since Newton's method failed when the point was located again")
+                self.notes.append(f"{what} at {place}: its ± is nan, since Newton's method failed at the second look")
             return True
         why = why_lost(point.trial, point.is_located)
         self._note(f"a possible {what} {why}", segment)

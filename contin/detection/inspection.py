@@ -294,7 +294,7 @@ class Inspection:
 
     @functools.cached_property
     def _knots(self) -> list[Place]:
-        """Return places, each behind the one before, between which a test function has one zero at most, as far as can be told."""
+        """Return places, each behind the one before, between which a test function has one zero at most, if all is seen."""
         segment = self.segment
         folds = [(fold.at, fold.trial) for fold in self._folds if 0 < fold.at < segment.step]
         return [(0.0, segment.beginning()), *folds, (segment.step, segment.trial)]

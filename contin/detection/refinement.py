@@ -238,7 +238,9 @@ def _branch_point_again(
     return found.along(system, carry(details.tangents[0])) if details.tangents else found
 
 
-def _zero_again(system: Discretization, x: Array, tangent: Array, test: TestFunction | None, newton: Newton) -> tuple[Trial, float]:
+def _zero_again(
+    system: Discretization, x: Array, tangent: Array, test: TestFunction | None, newton: Newton
+) -> tuple[Trial, float]:
     """Return the zero of a test function near x, by the secant method along the tangent; without one, x corrected.
 
     With how far off it may lie: where round-off of the function ends the secant method, the sign of the function decides.

@@ -37,7 +37,7 @@ _ROUGH = 1e-5
 #: Factor of that length, and how often. Nine times an eighth reach features 1e-9 times as wide as their input.
 _SHORTER = 1 / 8
 _TIMES = 9
-#: Differences of second and of fourth order agree within the round-off of the values where they differ by this multiple of those.
+#: Differences of second and of fourth order agree within the round-off of the values where they differ by this multiple of it.
 #: A derivative that is zero, of a function that rounds once, gives 1.
 _WITHIN = 4.0
 #: Weights of f(x + k h), k = 1, 2, less those of f(x - k h), in the derivative of fourth order.
@@ -198,7 +198,12 @@ class Interpreted:
         return found
 
     def _difference(
-        self, function: Callable[[Array, Array, Indices], _Estimated], t: Array, x: Array, direction: Array, nested: bool = False
+        self,
+        function: Callable[[Array, Array, Indices], _Estimated],
+        t: Array,
+        x: Array,
+        direction: Array,
+        nested: bool = False,
     ) -> _Estimated:
         """Return the derivative of a function along a direction, by differences as long as its error estimate allows.
 

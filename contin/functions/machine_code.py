@@ -45,8 +45,8 @@ class Code(NamedTuple):
 def machine() -> tuple[str, str]:
     """Return the system and the processor that machine code is made for.
 
-    The processor is not this one, but a fixed one of its kind, so that kernels give the same bits on all of them: x86-64-v3 (with
-    AVX2 and fused multiply-add, from 2013 on), the first x86-64 where that does not run, or LLVM's generic one of other kinds.
+    The processor is not this one, but a fixed one of its kind, so that kernels give the same bits on all of them: x86-64-v3
+    (with AVX2 and fused multiply-add, from 2013 on), the first x86-64 where that does not run, or LLVM's generic one of other kinds.
     """
     triple = llvm.get_default_triple()
     if not triple.startswith("x86_64"):
@@ -56,7 +56,22 @@ def machine() -> tuple[str, str]:
 
 
 #: What LLVM calls the features that x86-64-v3 has and x86-64 has not.
-_VERSION_3 = "avx avx2 bmi bmi2 cx16 f16c fma lzcnt movbe popcnt sahf sse3 sse4.1 sse4.2 ssse3 xsave".split()
+_VERSION_3 = (
+    "avx",
+    "avx2",
+    "bmi",
+    "bmi2",
+    "f16c",
+    "fma",
+    "lzcnt",
+    "movbe",
+    "popcnt",
+    "sse4.2",
+    "ssse3",
+    "cx16",
+    "sahf",
+    "xsave",
+)
 
 
 def stored(key: str, name: str, doc: str | None) -> Callable[..., Any] | None:

@@ -9,8 +9,8 @@ import pytest
 import contin
 from contin import BoundaryValueProblem
 
-#: u'' = e^k (u u' - u), u(0) = -1, u(1) = 3/2, and u'' = e^k (u^3 - u), u(0) = -1, u(1) = 1, with the largest k. There the
-#: place of the second layer moves by e^k 2e-16 exp(sqrt(2) e^(k/2)), 1e-5, with the last bit of the equations; by 1e-1 at k = 6.
+#: u'' = e^k (u u' - u), u(0) = -1, u(1) = 3/2, and u'' = e^k (u^3 - u), u(0) = -1, u(1) = 1, with the largest k. There
+#: the last bit of the equations moves the second layer by e^k 2e-16 exp(sqrt(2) e^(k/2)), 1e-5; at k = 6 by 1e-1.
 LAYERS = {
     "Lagerstrom and Cole": (lambda u, k: np.exp(k) * (u.u * u.v - u.u), 1.5, lambda t: (-1 + 2.5 * t, 2.5), 5.2),
     "Allen and Cahn": (lambda u, k: np.exp(k) * (u.u**3 - u.u), 1.0, lambda t: (-1 + 2 * t, 2), 5.2),
@@ -41,7 +41,8 @@ def test_layers_are_no_branch_points(name):
     branch, plain = (contin.trace(start, free=["k"], limits=limits, branch_points=wanted) for wanted in (True, False))
     assert abs(len(branch) - len(plain)) <= 2 and len(branch) < 60  # 500 steps led to k = 5.196
     for each in (branch, plain):
-        assert [point.label for point in each if point.label] == ["EP", "EP"] and str(each.stop) == f"reached k = {limits['k'][1]:g}"
+        assert [point.label for point in each if point.label] == ["EP", "EP"]
+        assert str(each.stop) == f"reached k = {limits['k'][1]:g}"
         assert all("round-off" in note for note in each.notes)  # that is near, with any solver
 
 
