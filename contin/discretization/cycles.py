@@ -41,8 +41,8 @@ _DRIFTED = 1e-6
 #: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
 _SHRUNK = 1e-7
 #: Share of the period's relative change in the length of a step: weight of (change of T)^2 / (1 + T)^2. With 1 in place of it
-#: and of 1 + T, steps beside a Hopf point whose cycles change T by c a^2, c large, are as long as 1 / c, and some cycles lost their
-#: end. 1 takes a tenth more orbits, 0.01 as many; 0 would leave nothing to hold where cycles change their period only.
+#: and of 1 + T, steps beside a Hopf point whose cycles change T by c a^2, c large, are as long as 1 / c, and some cycles lost
+#: their end. 1 takes a tenth more orbits, 0.01 as many; 0 would leave nothing to hold where cycles change their period only.
 _PERIOD_SHARE = 0.1
 #: The reference is renewed where an orbit differs from it by more than this part of its size.
 _MOVED = 1e-6

@@ -46,7 +46,7 @@ def machine() -> tuple[str, str]:
     """Return the system and the processor that machine code is made for.
 
     The processor is not this one, but a fixed one of its kind, so that kernels give the same bits on all of them: x86-64-v3
-    (with AVX2 and fused multiply-add, from 2013 on), the first x86-64 where that does not run, or LLVM's generic one of other kinds.
+    (with AVX2 and fused multiply-add, from 2013 on), the first x86-64 where that does not run, or LLVM's generic one elsewhere.
     """
     triple = llvm.get_default_triple()
     if not triple.startswith("x86_64"):
