@@ -49,6 +49,9 @@ _ONE = 1e-5
 #: A multiplier whose logarithm is smaller is not called unstable: in a conservative system the mesh moves the second multiplier
 #: 1 by up to 1e-10, where round-off moves it by 1e-13. Ten times larger, a cycle beside a fold may count as stable.
 _NEARLY_ONE = 1e-9
+#: A multiplier is told from 1 where its logarithm is larger than so many times that of the one that is 1. The two of a double
+#: one differ by 1e-7 of it. Ten times larger, a cycle beside a fold may count as stable.
+_AS_FAR = 2.0
 #: Step along the tangent over which multipliers are compared: their errors need one digit. In a canard explosion they change by
 #: a tenth of their value where the step is a thousand times longer.
 _ASIDE = 1e-5
@@ -166,12 +169,13 @@ def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
 def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = _NEARLY_ONE) -> int:
     """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off.
 
-    Multipliers whose logarithm is below ``least`` are left out, too.
+    Multipliers whose logarithm is below ``least`` are left out, too, and those as near to 1 as the one that is 1 by its error:
+    in a conservative system the mesh parts a double one to both sides.
     """
     values, trivial = system.eigenvalues(x), _trivial(system, x)
     outside = (values.real > 0) & ~system.neutral(x) & (np.abs(values) >= least)
     if trivial is not None:
-        outside[trivial] = False
+        outside &= np.abs(values) > _AS_FAR * abs(values[trivial])
     return int(np.count_nonzero(outside))
 
 
