@@ -14,6 +14,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, Function, Indices
 from contin.errors import ProblemError
+from contin.functions import round_off
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
 from contin.problems.angles import angle_periods, check_periodic
@@ -212,6 +213,9 @@ class AlgebraicProblem(Restated):
                 raise ProblemError(f"jacobian: {checks.shown(found)} must be a matrix of numbers") from None
         if matrix.shape != shape:
             raise ProblemError(f"jacobian: its shape {matrix.shape} must be {shape}, equations by states")
+        if round_off.SEED:
+            matrix = matrix.copy()
+            round_off.move(matrix if isinstance(matrix, np.ndarray) else matrix.data)
         return matrix
 
 
