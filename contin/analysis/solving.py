@@ -10,9 +10,11 @@ import numpy as np
 
 from contin import checks
 from contin.analysis.deflation import correct_away
+from contin.analysis.dependence import dependence
 from contin.analysis.guess import Guess, Options, first_guess
 from contin.arrays import Array
-from contin.detection.second_variation import degeneracy
+from contin.detection.second_variation import degeneracy, dependent_conditions
+from contin.discretization.algebraic import Algebraic
 from contin.discretization.basis import DEGREES
 from contin.discretization.collocation import Collocation
 from contin.discretization.degree import CYCLE_DEGREE, usual_degree
@@ -131,6 +133,7 @@ def solved(
         x = carry(done.x)
     else:
         done = corrected(system, x)
+    _check_determined(system, done.x)
     return point_of(system, done.x, done.iterations, done.error)
 
 
@@ -177,11 +180,31 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
             for place in approached(system, x):
                 with contextlib.suppress(ConvergenceError):
                     return correct(system, place, newton=newton, sizes=system.magnitudes)
-        if isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
+        reason = ""
+        if isinstance(system, Algebraic):
+            reason = dependence(system, x)
+        elif isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
             reason = degeneracy(system, x)
-            if reason:
-                raise ProblemError(f"{reason}: no solution was found from this guess") from None
+            reason += reason and ": no solution was found from this guess"
+        if reason:
+            raise ProblemError(reason) from None
         raise
+
+
+def _check_determined(system: System, x: Array) -> None:
+    """Check that a solution does not come with others around it, of which round-off chose one.
+
+    Raises
+    ------
+    ProblemError
+    """
+    reason = ""
+    if isinstance(system, Algebraic):
+        reason = dependence(system, x)
+    elif isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
+        reason = dependent_conditions(system, x)
+    if reason:
+        raise ProblemError(reason)
 
 
 def _check_options(problem: object, intervals: object, degree: object, control: object, newton: object) -> None:

@@ -192,6 +192,17 @@ def degeneracy(system: Collocation, x: Array) -> str:
     return ""
 
 
+def dependent_conditions(system: Collocation, x: Array) -> str:
+    """Return that conditions of a variational problem repeat or contradict each other at a solution x; "" if not."""
+    try:
+        second_variation(system, x)
+    except ProblemError as error:
+        return str(error)
+    except np.linalg.LinAlgError:
+        pass
+    return ""
+
+
 #: A mode keeps a symmetry that maps it to itself up to this part of its size, and breaks one that does not.
 _KEEPS = 1e-4
 #: Places at which a mode and its image are compared.

@@ -72,6 +72,13 @@ class DenseFactors:
         exchanges = sum(row != place for place, row in enumerate(self._exchanges.tolist()))
         return -1.0 if (exchanges + np.count_nonzero(self._lu.diagonal() < 0)) % 2 else 1.0
 
+    @property
+    def reciprocal_condition(self) -> float:
+        """About 1 / (|J| |J^-1|) in the norm of the largest sum of a column: 0 of a singular matrix."""
+        if self.sign == 0 or not np.isfinite(self.sign):
+            return self.sign
+        return float(_lapack().dgecon(self._lu, np.abs(self.matrix).sum(axis=0).max())[0])
+
     def solve(self, b: Array) -> Array:
         """Return the x with J x = b, or for rows of b the rows x; NaN if J is singular."""
         return self._solved(b, transposed=False)
