@@ -18,8 +18,8 @@ from contin.arrays import Array
 SEED = int(os.environ.get("CONTIN_ROUND_OFF") or 0)
 
 
-def move(values: Array, seed: int = SEED) -> None:
-    """Move numbers of a contiguous array of float or complex numbers in place; zeros, infinities and NaN stay.
+def move(values: Array, seed: int | None = None) -> None:
+    """Move numbers of a contiguous array of float or complex numbers in place, by `SEED` or another; zeros, infinities and NaN stay.
 
     Examples
     --------
@@ -28,6 +28,7 @@ def move(values: Array, seed: int = SEED) -> None:
     >>> bool(np.all(abs(x - [1.0, 3.0, 0.0]) <= [2.3e-16, 4.5e-16, 0.0]))
     True
     """
+    seed = SEED if seed is None else seed
     bits = values.view(np.float64).reshape(-1).view(np.uint64)
     mixed = (bits ^ np.uint64(seed * 0x9E3779B97F4A7C15 % 2**64)) * np.uint64(0xBF58476D1CE4E5B9)  # splitmix64
     mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)

@@ -1,12 +1,15 @@
 """Error estimates of special points: not smaller than the error, and none where the point is not found again."""
 
+import math
+
 import numpy as np
 import pytest
 from bank import abc, bru
 from bank.closed_forms import bratu
 
-from contin import ConvergenceError, Settings, solve, trace
+from contin import BoundaryValueProblem, ConvergenceError, Settings, solve, trace
 from contin.detection import refinement
+from contin.functions import round_off
 from contin.stepping.trial import Linearization, Trial
 
 
@@ -18,6 +21,28 @@ def test_branch_points_on_a_coarse_mesh_are_refined_to_themselves():
     assert len(points) == len(known)
     for point, length in zip(points, known):
         assert abs(point["L"] - length) < point.errors["L"] < 1e-6
+
+
+def foundation(t, u, p):
+    """An inextensible rod on a foundation of stiffness k: height, angle, moment, shear force."""
+    return math.sin(u.angle), u.moment, -p.lam * math.sin(u.angle) - u.shear * math.cos(u.angle), -p.k * u.height
+
+
+def test_the_error_of_a_branch_point_covers_round_off(monkeypatch):
+    """A secondary one: round-off of the equations moves it by 5e-12, where two meshes agree to 3e-13 by chance."""
+    problem = BoundaryValueProblem(
+        foundation, lambda a, b, p: (a.height, a.moment, b.height, b.moment), ["height", "angle", "moment", "shear"],
+        {"lam": 1.0, "k": 100.0},
+    )  # fmt: skip
+    trivial = trace(solve(problem, [0.0] * 4), free=["lam"], limits={"lam": (0, 60)})
+    places, errors = [], []
+    for seed in range(1, 6):
+        monkeypatch.setattr(round_off, "SEED", seed)
+        first = trivial.labelled("BP")[0]
+        (second,) = trace(first, branch=1, limits={"lam": (0, 100)}).labelled("BP")
+        places.append(second["lam"])
+        errors.append(second.errors["lam"])
+    assert max(places) - min(places) < 5 * min(errors) and max(errors) < 1e-9
 
 
 def test_a_point_that_runs_away_on_finer_meshes_gets_no_label(monkeypatch):
