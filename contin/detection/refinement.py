@@ -33,8 +33,6 @@ _SAME_KERNEL = 0.9
 _HALVINGS = 4
 #: An error is given as no less than so many units in the last place of the largest parameter.
 _UNITS = 16
-#: The largest of three draws of round-off is multiplied by this: less is below half of what it may be once in five times.
-_CERTAIN = 2.0
 #: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
 _FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
 #: Where it fails, the place is known as far as the function grows on both sides, with different signs: distances at which it
@@ -109,7 +107,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
         size = 1 + np.abs(better.x[system.state_size :])
         steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
         if isinstance(found, BranchPoint):
-            left = left + _CERTAIN * rounded_off(system, found, settings.newton)[system.state_size :]
+            left = left + rounded_off(system, found, settings.newton)[system.state_size :]
         if np.any(steps > _FAR * size) or np.max(steps / size) > last:
             is_lost = last == np.inf
             break

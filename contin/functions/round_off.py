@@ -19,7 +19,7 @@ SEED = int(os.environ.get("CONTIN_ROUND_OFF") or 0)
 
 
 def move(values: Array, seed: int | None = None) -> None:
-    """Move numbers of a contiguous array of float or complex numbers in place, by `SEED` or another; zeros, infinities and NaN stay.
+    """Move numbers of a contiguous array of float or complex numbers in place, by `SEED` or another; zero, inf and NaN stay.
 
     Examples
     --------
