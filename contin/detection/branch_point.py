@@ -38,7 +38,7 @@ _UNEXPLAINED = 0.5
 #: followed.
 _FLAT = 1e-9
 
-#: Steps of Newton's method that are made of round-off. The largest of three is below half of what is usual once in twenty times.
+#: Steps of Newton's method that are made of round-off. The largest of three is seldom below half of what is usual.
 _DRAWS = 3
 
 
@@ -148,6 +148,8 @@ def locate_branch_point(
 def rounded_off(system: Discretization, point: BranchPoint, newton: Newton) -> Array:
     """Return by how much round-off moves each unknown of a branch point: by further Newton steps, which lead nowhere.
 
+    Each begins where the one before ended, rounded once more: round-off of all residuals is drawn anew.
+
     Examples
     --------
     >>> from contin import Algebraic, AlgebraicProblem
@@ -157,11 +159,11 @@ def rounded_off(system: Discretization, point: BranchPoint, newton: Newton) -> A
     >>> bool(np.all(rounded_off(system, found, Newton()) < 1e-15))
     True
     """
-    noise = np.zeros_like(point.x)
+    random, noise = np.random.default_rng(5), np.zeros_like(point.x)
     with np.errstate(all="ignore"):
         search = _Search(system, point.x, newton, point.kernel)
         for _ in range(_DRAWS):
-            before = search.x
+            search.x = before = search.x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), search.x.size))
             if not search.advance():
                 break
             noise = np.maximum(noise, np.abs(search.x - before))
