@@ -82,7 +82,7 @@ def _problem(number: int, seed: int, most: int) -> Random:
     kind, n = KINDS[number % len(KINDS)], int(random.choice([size for size in SIZES if size <= most]))
     if kind == "triple":
         n = max(n, 3)
-    size = 10 ** random.uniform(-1, 3)
+    size, state = 10 ** random.uniform(-9, 9, 2)
     spectrum = np.sort(size * random.uniform(0.1, 1, n))
     if kind == "double":
         at = random.integers(n - 1)
@@ -99,9 +99,9 @@ def _problem(number: int, seed: int, most: int) -> Random:
         m = max(2, int(np.sqrt(n)))
         one = np.sin(np.arange(1, m + 1) * np.pi / (2 * m + 2)) ** 2
         spectrum = np.sort(size * (one[:, None] + one).ravel())
-    coefficients = (float(random.choice([0.0, 1.0])), 1.0, float(random.choice([0.0, 0.5])))
+    coefficients = (random.choice([0.0, 1.0]) * size / state, size / state**2, random.choice([0.0, 0.5]) * state)
     limit = float(spectrum.max() * random.choice([0.7, 1.2, 3.0, 30.0]))
-    step = float(random.choice([0.05, 0.5, 0.1 * spectrum.max()]))
+    step = float(random.choice([0.05, 0.5, np.clip(0.1 * spectrum.max(), 1e-5, 1e5)]))
     return Random(number, kind, spectrum, bool(random.integers(2)), bool(random.integers(2)), coefficients, limit, step)
 
 
