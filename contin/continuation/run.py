@@ -731,7 +731,9 @@ class Continuation:
             return [None] * len(special)
         groups = [list(group) for _, group in itertools.groupby(special, lambda point: (point.same_as or point).at)]
         middles = [(a[-1].at + b[0].at) / 2 for a, b in itertools.pairwise(groups)]
-        between = [segment.before, *(segment.near(s) for s in middles), segment.trial]
+        last = special[-1]  # behind a limit the step does not belong to the branch
+        ends_there = last.stop is not None and last.test is not None and last.same_as is None
+        between = [segment.before, *(segment.near(s) for s in middles), last.trial if ends_there else segment.trial]
         values = [trial.value(self._index) for trial in between]
         whole = [None if np.isnan(value) else int(value) for value in values]
         changes: list[IndexChange | None] = []
