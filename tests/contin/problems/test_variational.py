@@ -410,8 +410,8 @@ def test_division_by_zero_at_the_guess_is_said():
 
 @pytest.mark.parametrize("before", [1e-1, 1e-4, 1e-8])
 def test_changes_of_the_index_behind_a_limit(before):
-    """A run that ends right before the first buckling load, 4 pi^2, has index 0 throughout: what its last step passes behind the
-    limit is not noted.
+    """A run that ends right before the first buckling load, 4 pi^2, has index 0 throughout: what its last step passes behind
+    the limit is not noted.
     """
     strip = contin.VariationalProblem(
         energy=lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle), states=["angle"], parameters={"load": 30.0},
