@@ -99,7 +99,7 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
         outcome = _follow(config, run, writer, display, Interruption())
         seconds = time.perf_counter() - began
         display.summary(config, writer.events(), writer.count, seconds, path, outcome, _shown(run.stop))
-        for note in run.notes:
+        for note in writer.notes:
             display.note(note)
     return outcome
 
@@ -191,6 +191,7 @@ def _follow(config: Config, run: Continuation, writer: BranchWriter, display, in
         for point in run:
             point, number = checked(point, run, config), writer.count
             writer.append(point)
+            writer.note(run.notes)
             display.point(point, number, run.state.step)
             if point.label and point.name != "start":
                 continue  # inside a step: a run cannot be resumed from here
@@ -200,6 +201,7 @@ def _follow(config: Config, run: Continuation, writer: BranchWriter, display, in
                 return "interrupted"
             if writer.due():
                 writer.checkpoint(run.start, "running")
+        writer.note(run.notes)
         outcome = "lost" if run.stop.reason == "no convergence" else "complete"
         writer.checkpoint(run.start, outcome, run.stop)
     return outcome

@@ -102,6 +102,8 @@ def _run_stages(config: OpenConfig, path: Path, display, resume: bool, overwrite
         display.begin_stages(config, writer.count, len(writer.events()))
         outcome, stop = _followed(config, (run, labelled), writer, display)
         display.stages_summary(config, writer.events(), writer.count, time.perf_counter() - began, path, (outcome, stop))
+        for note in writer.notes:
+            display.note(note)
     return outcome
 
 
@@ -296,6 +298,7 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
     for point in (_named(config, point) for point in run):
         display.stage_point(config, config.stages[number - 1], point, writer.count)
         writer.append(point)
+        writer.note(_notes(config, number, run))
         labelled[-1] += [point] if point.label else []
         if point.label and point.name != "start":
             continue  # inside a step: a run cannot be resumed from here
@@ -307,6 +310,7 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
         if writer.due():
             writer.checkpoint(run.start, "running")
     writer.flush()
+    writer.note(_notes(config, number, run))
     stop = _told(config, number, run, labelled[-1][-1])
     if stop.reason in ("no convergence", "event"):
         stop = dataclasses.replace(stop, message=f"stage {number}: {stop.message}")
@@ -326,6 +330,12 @@ def _told(config: OpenConfig, number: int, run: Continuation, last: Point) -> St
         here = run.state.system.parameter(run.state.x, name)
         return no_state(run, _shown(config, name, here))
     return reached(run.stop, last, run, functools.partial(_shown, config))
+
+
+def _notes(config: OpenConfig, number: int, run: Continuation) -> list[str]:
+    """Return the notes of a stage so far."""
+    units = " (numbers in units of L and B)" if config.dimensions is not None else ""
+    return [f"stage {number}: {note}{units}" for note in run.notes]
 
 
 def _shown(config: OpenConfig, name: str, value: float) -> str:

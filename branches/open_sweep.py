@@ -112,9 +112,9 @@ def _told(config: OpenSweep, folder: Path, name: str, problem: str) -> list[str]
     """Return a combination in words, and its stages unless it failed."""
     if problem:
         return [open_graph.words_of(config.numbers[name])]
-    graph = open_graph.new_graph("")
-    open_graph.add_result(graph, read_branch(folder / name), name, config.numbers[name])
-    return list(open_graph.listed(graph))
+    graph, branch = open_graph.new_graph(""), read_branch(folder / name)
+    open_graph.add_result(graph, branch, name, config.numbers[name])
+    return [*open_graph.listed(graph), *branch.notes]
 
 
 def _load_kernels(configs: list[OpenConfig]) -> None:

@@ -31,6 +31,7 @@ def read_branch(path: str | Path) -> StoredBranch:
         return _class_of(scene)(
             config, attributes["status"], attributes["stop"], attributes["stop_reason"], file["points"][:],
             file["events"][:], solutions["index"][:], solutions["t"][:], solutions["states"][:],
+            tuple(str(attributes.get("notes", "")).splitlines()),
         )  # fmt: skip
 
 

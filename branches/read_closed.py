@@ -22,7 +22,8 @@ from ribbon_model.solution import Solution
 class StoredBranch:
     """A branch file in memory: the scene, the tables of points and of labelled points (structured arrays), the kept solutions.
 
-    ``stop`` is a sentence with the reason why the run ended, ``reason`` a key word ("trivial branch", "limit", ...).
+    ``stop`` is a sentence with the reason why the run ended, ``reason`` a key word ("trivial branch", "limit", ...). ``notes``
+    are those of `contin.Branch`.
     """
 
     config: dict
@@ -34,6 +35,7 @@ class StoredBranch:
     index: np.ndarray
     t: np.ndarray
     states: np.ndarray
+    notes: tuple[str, ...] = ()
 
     def kept(self) -> np.ndarray:
         """Return the numbers of the points whose full solution is kept."""

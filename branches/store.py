@@ -11,7 +11,7 @@ import functools
 import json
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -180,6 +180,8 @@ class BranchWriter:
         self.kind = kind or Kind(CLOSED, "bending modulus B = 1, length L = 2 pi")
         self._buffer: list[tuple[Point, int]] = []
         self._mark: tuple[State, int] | None = None
+        #: What the run saw and did not understand, in order; a resumed run adds to it.
+        self.notes: list[str] = []
         #: Further data for a resumed run, by name: called at every checkpoint that writes the state.
         self.kept: Callable[[], dict[str, bytes]] = dict
         with damage_told(path):
@@ -187,6 +189,7 @@ class BranchWriter:
             self._file = h5py.File.in_memory(image or empty, libver=_LIBRARY)
             self.count = 0 if empty else self._rewind(problem)
         self._file.attrs["config"] = config_text
+        self.note(str(self._file.attrs.get("notes", "")).splitlines())
         # reading the columns from HDF5 for each row would take longer than computing the row
         self._types = {table: self._file[table].dtype for table in ("points", "events")}
         self._saved = time.monotonic()
@@ -202,6 +205,10 @@ class BranchWriter:
     def mark(self, state: State) -> None:
         """Record that the run can be resumed from ``state``, which follows the last point."""
         self._mark = (state, self.count)
+
+    def note(self, texts: Iterable[str]) -> None:
+        """Add the notes that are not there yet; they reach the disk with the next checkpoint."""
+        self.notes = list(dict.fromkeys([*self.notes, *texts]))
 
     def due(self) -> bool:
         """Return whether a checkpoint is due: checkpoints take at most a tenth of the run's time."""
@@ -229,6 +236,7 @@ class BranchWriter:
         self._file.attrs["status"] = status
         self._file.attrs["stop"] = str(stop or "")
         self._file.attrs["stop_reason"] = stop.reason if stop else ""
+        self._file.attrs["notes"] = "\n".join(self.notes)
         if self._mark is not None:
             self._write_state(*self._mark, start)
         self._file.flush()

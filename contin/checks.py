@@ -103,3 +103,14 @@ def names(what: str, value: Any) -> tuple[str, ...]:
     if not all(isinstance(name, str) for name in found):
         raise ProblemError(f"{what}: {shown(value)} must be a list of names")
     return found
+
+
+def chosen(what: str, value: Any, known: Sequence[str]) -> tuple[str, ...]:
+    """Require different names among those that are known, and return them."""
+    found = names(what, value)
+    for name in found:
+        if name not in known:
+            raise ProblemError(f"{what}: {shown(name)} must be one of {listed(known) or 'none, as there are none here'}")
+        if found.count(name) > 1:
+            raise ProblemError(f"{what}: {plain(name)} is given twice")
+    return found

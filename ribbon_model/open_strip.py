@@ -9,10 +9,11 @@ Conditions at the ends: `ribbon_model.ends`. The reactions are the force and the
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections import namedtuple
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -34,6 +35,8 @@ REACTIONS = tuple(
 #: An eigenvalue of the second variation below this part of the largest is zero: a motion that costs no energy. Round-off
 #: leaves 1e-14, and slow branches near their birth have eigenvalues above 1e-8.
 _ZERO = 1e-10
+#: Most phases of a strip: it can shift and turn about itself.
+_MOST_PHASES = 2
 
 
 @dataclass(frozen=True)
@@ -140,11 +143,13 @@ class OpenStrip:
         ProblemError
             Conditions that repeat or contradict each other.
         """
-        states = (*FRAME, *CENTRELINE, *(f"phase{i}" for i in range(self.conditions_inside)))
+        phases = [f"phase_{name.replace(', ', '_').replace(' ', '_')}" for name in self.phases]
+        states = (*FRAME, *CENTRELINE, *phases, *(["support"] if self.roller else []))
         return VariationalProblem(
             None, states, self.parameters, hamiltonian=self._hamiltonian(), ends=self._conditions(),
             end_energy=self._end_energy(), symmetries={"plane": _mirrored},
             functionals={name: rate for name, rate in _PLACES.items() if name not in self.parameters},
+            phases=phases,
         )  # fmt: skip
 
     @property
@@ -256,9 +261,41 @@ class OpenStrip:
                 and self._rigid_freedom(guess[1], self.parameters | (values or {}))
             ):
                 reason = RIGID  # round-off decides whether the solver or the index notices
-            raise ProblemError(reason) from error
-        self.check_determined(point)
+            raise ProblemError(self._with_phases(reason, guess, values, options)) from error
+        try:
+            self.check_determined(point)
+        except ProblemError as error:
+            raise ProblemError(self._with_phases(str(error), guess, values, options)) from error
         return point
+
+    def _with_phases(self, reason: str, guess, values: Mapping[str, float] | None, options: Mapping) -> str:
+        """Return the reason why nothing determines the state, with the phases that do, as few as possible: all are tried."""
+        if reason not in (UNHELD, self._not_found()):
+            return reason
+        others = [name for name in PHASES if name not in self.phases]
+        for count in range(1, _MOST_PHASES - len(self.phases) + 1):
+            fits = [names for names in itertools.combinations(others, count) if self._fits(names, guess, values, options)]
+            if fits:
+                more = "further phases" if self.phases else "phases"
+                return f"{reason}, or give {more}: {' or '.join(str([*names]) for names in fits)}"
+        return reason
+
+    def _fits(self, names: Sequence[str], guess, values: Mapping[str, float] | None, options: Mapping) -> bool:
+        """Return whether phases determine the state near a guess, and hold by symmetry: their multipliers vanish."""
+        strip = replace(self, phases=(*self.phases, *names))
+        count = len(FRAME) + len(CENTRELINE)
+        if isinstance(guess, Point):
+            guess = guess.system.nodes, guess.system.states(guess.x)
+        if callable(guess):
+            begin = strip._with_multipliers(lambda t: guess(t)[:count])
+        else:
+            begin = guess[0], np.hstack([guess[1][:, :count], np.zeros((len(guess[0]), strip.conditions_inside))])
+        try:
+            point = solve(strip.problem, begin, values, **options)
+            strip.check_determined(point)
+        except ContinError:
+            return False
+        return not point.phase_loads()
 
     def _natural_guess(self):
         s = np.linspace(0, 1, 401)
@@ -379,7 +416,7 @@ class OpenStrip:
 RIGID = "ends: the strip can move as a rigid body without resistance; hold more of its place or rotation"
 UNHELD = (
     "ends: the strip can move, turn about itself or change its shape without a change of energy, so nothing determines its "
-    "state; hold more, or give one of the phases " + ", ".join(map(repr, PHASES))
+    "state; hold more"
 )
 #: Why reactions are not determined.
 UNDETERMINED = (

@@ -30,6 +30,7 @@ from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
 from contin.detection.hopf_end import collapsed
 from contin.detection.inspection import Inspection, Start
+from contin.detection.phase_loads import phase_loads
 from contin.detection.refinement import refined
 from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint, with_details
@@ -698,6 +699,15 @@ class Continuation:
                 self._noted.add(kind)
                 self.notes.append(note)
 
+    def _note_phases(self, found: SpecialPoint, error: float) -> None:
+        """Note the phase conditions that load a labelled point, which is known to ``error``."""
+        trial = found.trial
+        place = f"at {found.label} ({self.primary} = {trial[self.primary]:.10g})"
+        known = trial.newton_error + (self.settings.mesh.tolerance if np.isnan(error) else error)
+        for name, load, is_mode in phase_loads(trial.system, trial.x, getattr(found.details, "kernel", ()), known):
+            what = f"has {load:.3g} of the largest number of a mode {place}" if is_mode else f"= {load:.6g} {place}"
+            self.notes.append(f"phases: {name} {what} and not zero, so the phase condition loads the structure; leave it out")
+
     def _is_confirmed(self, point: SpecialPoint, segment: Segment) -> bool:
         """Return whether a special point was located and, where that was asked for, not missed on a finer mesh.
 
@@ -721,7 +731,9 @@ class Continuation:
             return [None] * len(special)
         groups = [list(group) for _, group in itertools.groupby(special, lambda point: (point.same_as or point).at)]
         middles = [(a[-1].at + b[0].at) / 2 for a, b in itertools.pairwise(groups)]
-        between = [segment.before, *(segment.near(s) for s in middles), segment.trial]
+        last = special[-1]  # behind a limit the step does not belong to the branch
+        ends_there = last.stop is not None and last.test is not None and last.same_as is None
+        between = [segment.before, *(segment.near(s) for s in middles), last.trial if ends_there else segment.trial]
         values = [trial.value(self._index) for trial in between]
         whole = [None if np.isnan(value) else int(value) for value in values]
         changes: list[IndexChange | None] = []
@@ -860,6 +872,8 @@ class Continuation:
         stability = Stability()
         if self._index is not None:
             stability = stability_of(found)
+        if found.label:
+            self._note_phases(found, accuracy.error)
         return Point(
             found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
             state.arclength + found.at, trial.iterations, trial.newton_error, found.errors or {}, found.details,

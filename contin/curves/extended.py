@@ -22,7 +22,7 @@ from contin.discretization.system import System
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.linalg.factors import Factors
-from contin.problems.statement import Statement, multipliers_of
+from contin.problems.statement import Statement, multipliers_of, phases_of
 from contin.problems.vector_field import found_elsewhere
 
 #: Cosine between a border and the null vector that it stands for, below which it is renewed: the bordered matrix is then still
@@ -236,6 +236,11 @@ class _ExtendedStatement:
     def multipliers(self) -> tuple[str, ...]:
         """Those of the problem."""
         return multipliers_of(self.problem)
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Those of the problem."""
+        return phases_of(self.problem)
 
     def batch(self, name: str) -> Batch:
         """Return functions of the problem, compiled."""

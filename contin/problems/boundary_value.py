@@ -43,6 +43,9 @@ class BoundaryValueProblem(Restated):
         ``f(t, u, p)``: integrands whose integrals over the domain are columns of every point.
     boundary_count, integral_count : int, optional
         Numbers of values of ``boundary`` and ``integrals`` where these fill an array.
+    phases : sequence of str, optional
+        Names of parameters, or of states, that are zero where phase conditions hold by symmetry: the unfolding numbers that
+        make the equations as many as the unknowns. A run notes labelled points at which they are not zero.
 
     Raises
     ------
@@ -75,6 +78,7 @@ class BoundaryValueProblem(Restated):
     functionals: Mapping[str, Function] = field(default_factory=dict)
     boundary_count: int | None = None
     integral_count: int | None = None
+    phases: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
@@ -85,6 +89,8 @@ class BoundaryValueProblem(Restated):
         if self._counts["rhs"] != len(self.state_names):
             given = ", ".join(self.state_names[:8])
             raise ProblemError(f"rhs returns {self._counts['rhs']} values for the {len(self.state_names)} states {given}")
+        known = (*self.parameters, *self.state_names)
+        object.__setattr__(self, "phases", checks.chosen("phases", self.phases, known))
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -178,6 +178,12 @@ def multipliers_of(problem: Statement) -> tuple[str, ...]:
     return names
 
 
+def phases_of(problem: Statement) -> tuple[str, ...]:
+    """Return the parameters and states of a problem that are zero where its phase conditions hold by symmetry."""
+    names: tuple[str, ...] = getattr(problem, "phases", ())
+    return names
+
+
 def check_statement(
     states: Sequence[str] | int, parameters: Mapping[str, float], functionals: Mapping[str, Function]
 ) -> tuple[str, ...]:

@@ -54,6 +54,10 @@ class VariationalProblem(BoundaryValueProblem):
     symmetries : mapping of str to callable, optional
         Maps of states that leave the energy unchanged, by name: ``map(t, x)`` with t (K,) and x (K, n) at symmetric places t
         returns the image of x, as for `contin.diagram`. Special points say which of them they break.
+    phases : sequence of str, optional
+        Names of those ``integrals`` that hold by a continuous symmetry and pick one of the solutions that it moves into each
+        other; with ``hamiltonian``, of states that accumulate such an integral. Their multipliers are zero then. A run notes
+        labelled points at which they are not: the condition loads the structure.
     domain : pair of float
     starts : mapping of str to float, optional
         Where the search for the controls starts at each point (0): in the domain of the energy.
@@ -96,7 +100,7 @@ class VariationalProblem(BoundaryValueProblem):
         integrals: Mapping[str, Function] | None = None, end_energy: Function | None = None,
         functionals: Mapping[str, Function] | None = None, hamiltonian: Function | None = None,
         symmetries: Mapping[str, Symmetry] | None = None, domain: tuple[float, float] = (0.0, 1.0),
-        starts: Mapping[str, float] | None = None,
+        starts: Mapping[str, float] | None = None, phases: Sequence[str] = (),
     ) -> None:  # fmt: skip
         integrals, functionals, starts = integrals or {}, functionals or {}, starts or {}
         names = check_statement(states, parameters, checks.mapping("functionals", functionals, "functions"))
@@ -114,6 +118,7 @@ class VariationalProblem(BoundaryValueProblem):
             if name not in control_names or hamiltonian is not None:
                 raise ProblemError(f"starts: {checks.shown(name)} is not one of the controls of an energy")
             checks.number(f"starts: {name}", value)
+        held = checks.chosen("phases", phases, names if hamiltonian is not None else tuple(integrals))
         for name, image in checks.mapping("symmetries", symmetries or {}, "functions").items():
             checks.function(f"symmetries: {name}", image)
         taken = [("energy", energy, 4), ("kinematics", kinematics, 4), ("ends", ends, 3), ("end_energy", end_energy, 3)]
@@ -135,6 +140,7 @@ class VariationalProblem(BoundaryValueProblem):
         super().__init__(
             derived.rhs, derived.boundary, (*names, *(f"lam_{name}" for name in names)),
             {**parameters, **dict.fromkeys(self.multipliers, 0.0)}, derived.integrals, domain, derived.functionals,
+            phases=[f"lam_{name}" if hamiltonian is not None else f"mu_{name}" for name in held],
         )  # fmt: skip
 
     def _signatures(self) -> Mapping[str, Arguments]:

@@ -13,6 +13,7 @@ from contin import checks
 from contin.arrays import Array
 from contin.curves.extended import Extended
 from contin.detection.floquet import Floquet, floquet
+from contin.detection.phase_loads import phase_loads
 from contin.detection.second_variation import SecondVariation, index_of, second_variation
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
@@ -264,6 +265,24 @@ class Point:
             raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem or MapProblem")
         fold = self.label == "LP" and self.column != PERIOD and not isinstance(self.system, Extended)
         return floquet(self.system, self.x, self.tangent, self.errors, fold)
+
+    def phase_loads(self) -> dict[str, float]:
+        """Return the multipliers, by name, of phase conditions that load the solution: no symmetry moves it along these.
+
+        Examples
+        --------
+        A loaded string is held by a condition on its mean height, though no symmetry moves it up and down:
+
+        >>> import contin
+        >>> string = contin.VariationalProblem(
+        ...     energy=lambda t, x, w, p: w.y**2 / 2 + p.load * x.y, states=["y"], parameters={"load": 1.0},
+        ...     ends=lambda a, b, p: (a.y, b.y), integrals={"place": lambda t, x, w, p: x.y}, phases=["place"],
+        ... )
+        >>> {name: round(load, 9) for name, load in contin.solve(string, [0.0]).phase_loads().items()}
+        {'mu_place': -1.0}
+        """
+        error = self.newton_error + float(np.nan_to_num(self.discretization_error))
+        return {name: load for name, load, _ in phase_loads(self.system, self.x, (), error)}
 
     def second_variation(self) -> SecondVariation:
         """Return the second variation of the energy there: its eigenvalues, and its modes as functions.

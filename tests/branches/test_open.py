@@ -342,3 +342,15 @@ def test_the_snap_of_the_clamped_strip(root, tmp_path):
     below = nearest["energy"] + nearest["M_tangent"] * (fold["turn"] - nearest["turn"])
     assert snap.released == pytest.approx(fold["energy"] - below, rel=1e-3)
     assert snap.to["M_tangent"] == pytest.approx(nearest["M_tangent"], abs=0.3)
+
+
+def test_notes_of_stages(tmp_path, capsys):
+    """What a stage notes is printed and kept: here a phase that no symmetry implies, which loads the strip."""
+    scene = "material: {law: rod, B1: 1, B2: 1, C: 0.8, kappa_n: 6.283185307179586}\nphases: [spin]\n"
+    config = parse(scene + "stages: [{follow: turn, to: 0.5}, {follow: turn, to: 1}]\n", "scene")
+    assert run_stages(config, tmp_path / "cut.h5", Display(quiet=True)) == "complete"
+    notes = read_branch(tmp_path / "cut.h5").notes
+    shown = capsys.readouterr().out
+    assert [note[:31] for note in notes] == [f"stage {i}: phases: lam_phase_spin" for i in (1, 2, 2)]
+    assert len(set(notes)) == 3 and all(note in shown for note in notes)
+    assert "= -33.3853" in notes[-1]

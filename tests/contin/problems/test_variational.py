@@ -406,3 +406,19 @@ def test_division_by_zero_at_the_guess_is_said():
     problem = stated(energy=lambda t, x, w, p: (p.a - 1) * w.y**2 / 2)
     with pytest.raises(contin.ProblemError, match="guess: the equations have no finite value there"):
         contin.solve(problem, [0.0])
+
+
+@pytest.mark.parametrize("before", [1e-1, 1e-4, 1e-8])
+def test_changes_of_the_index_behind_a_limit(before):
+    """A run that ends right before the first buckling load, 4 pi^2, has index 0 throughout: what its last step passes behind
+    the limit is not noted.
+    """
+    strip = contin.VariationalProblem(
+        energy=lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle), states=["angle"], parameters={"load": 30.0},
+        ends=lambda a, b, p: (a.angle, b.angle), integrals={"offset": lambda t, x, w, p: math.sin(x.angle)},
+    )  # fmt: skip
+    last = 4 * math.pi**2 - before
+    branch = contin.trace(contin.solve(strip, [0.0]), free=["load"], limits={"load": (30, last)})
+    assert branch.stop.reason == "limit" and {point.index for point in branch} == {0} and not branch.notes
+    beyond = contin.trace(contin.solve(strip, [0.0]), free=["load"], limits={"load": (30, 4 * math.pi**2 + before)})
+    assert [point.index_change for point in beyond.labelled("BP")] == [(0, 1)] and beyond[-1].index == 1 and not beyond.notes

@@ -1,0 +1,85 @@
+"""Phase conditions: silent where a symmetry makes their multipliers vanish, else said with the load. Closed forms."""
+
+import math
+
+import pytest
+from scipy.optimize import brentq
+
+import contin
+
+
+def loads(branch) -> list[str]:
+    return [note for note in branch.notes if note.startswith("phases:")]
+
+
+def disc(push: float) -> contin.VariationalProblem:
+    """A point of the plane drawn to the circle of radius sqrt(a), and along y by a force: turns by itself without the force."""
+    return contin.VariationalProblem(
+        energy=lambda t, x, w, p: (w.x**2 + w.y**2) / 2 + (x.x**2 + x.y**2 - p.a) ** 2 / 4 - p.push * x.y,
+        states=["x", "y"], parameters={"a": 1.0, "push": push}, integrals={"angle": lambda t, x, w, p: x.y}, phases=["angle"],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("push", [0.0, 1e-7, 0.5])
+def test_the_multiplier_is_the_force_that_the_phase_holds_back(push):
+    """At y = 0 the phase holds the force by itself: mu = push. Without it there is a circle of solutions, and mu = 0."""
+    branch = contin.trace(contin.solve(disc(push), [1.0, 0.0]), free=["a"], limits={"a": (1, 2)})
+    labelled = [point for point in branch if point.label]
+    assert len(loads(branch)) == (len(labelled) if push else 0)
+    assert all(abs(abs(point["mu_angle"]) - push) < 1e-11 for point in branch)
+    for point, note in zip(labelled, loads(branch)):
+        assert f"mu_angle = {point['mu_angle']:.6g} at EP (a = {point['a']:.10g})" in note
+
+
+def column(phases) -> contin.VariationalProblem:
+    """Clamped and free, under a load, by its angle; the integral of the angle vanishes where it is asked to."""
+    return contin.VariationalProblem(
+        energy=lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle), states=["angle"], parameters={"load": 15.0},
+        ends=lambda a, b, p: (a.angle,), integrals={"place": lambda t, x, w, p: x.angle}, phases=phases,
+    )  # fmt: skip
+
+
+def test_a_phase_that_makes_a_branch_point():
+    """angle'' + load angle = mu with the integral zero: modes 1 - cos(k (1-t)) / cos k with tan k = k, each with mu = k^2."""
+    branch = contin.trace(contin.solve(column(["place"]), [0.0]), free=["load"], limits={"load": (15, 40)})
+    k = brentq(lambda k: math.tan(k) - k, 4.4, 4.6, xtol=1e-14)
+    (point,) = branch.labelled("BP")
+    (note,) = loads(branch)
+    assert abs(point["load"] - k**2) < 1e-9 and point["mu_place"] == pytest.approx(0, abs=1e-12)
+    assert "of a mode at BP" in note and f"{point['load']:.10g}" in note
+    buckled = contin.trace(point, branch=1, max_points=5)
+    assert "mu_place = " in loads(buckled)[-1]
+    assert not loads(contin.trace(contin.solve(column([]), [0.0]), free=["load"], limits={"load": (15, 40)}))
+
+
+def test_loads_of_any_size():
+    """The same column in units in which forces are 1e9 times smaller: the phase loads it as much."""
+    small = contin.VariationalProblem(
+        energy=lambda t, x, w, p: 1e-9 * w.y**2 / 2 + p.load * x.y, states=["y"], parameters={"load": 1e-9},
+        ends=lambda a, b, p: (a.y, b.y), integrals={"place": lambda t, x, w, p: x.y}, phases=["place"],
+    )  # fmt: skip
+    branch = contin.trace(contin.solve(small, [0.0]), free=["load"], limits={"load": (1e-9, 2e-9)})
+    assert len(loads(branch)) == 2 and abs(branch[-1]["mu_place"] + 2e-9) < 1e-18
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+def test_the_unfolding_number_of_a_boundary_value_problem(slope):
+    """u'' = slope + c with u' = 0 at both ends: u may be shifted, and the mean fixes it; c = -slope is zero without a slope."""
+    problem = contin.BoundaryValueProblem(
+        lambda t, u, p: (u.v, p.slope + p.c), lambda a, b, p: (a.v, b.v), ["u", "v"],
+        {"mean": 1.0, "slope": slope, "c": 0.0}, integrals=lambda t, u, p: (u.u - p.mean,), phases=["c"],
+    )  # fmt: skip
+    branch = contin.trace(contin.solve(problem, [0.0, 0.0], free=["c"]), free=["mean", "c"], limits={"mean": (1, 2)})
+    assert [f"c = {-slope:g} at EP" in note for note in loads(branch)] == [True] * (2 if slope else 0)
+
+
+@pytest.mark.parametrize(("phases", "sentence"), [
+    ("angle", "phases: 'angle' must be a list of names"), (["turn"], "phases: 'turn' must be one of angle"),
+    (["angle", "angle"], "phases: angle is given twice"),
+])  # fmt: skip
+def test_phases_that_are_none(phases, sentence):
+    """One sentence."""
+    with pytest.raises(contin.ProblemError, match=f"^{sentence}$"):
+        contin.VariationalProblem(
+            lambda t, x, w, p: w.x**2 / 2, ["x"], {"a": 1.0}, integrals={"angle": lambda t, x, w, p: x.x}, phases=phases
+        )

@@ -1,0 +1,103 @@
+"""Phases of open strips: those that load the strip are said, and those that a message recommends do not."""
+
+import ast
+import functools
+import math
+import re
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+
+import contin
+from contin import ProblemError
+from ribbon_model.ends import FREE_END
+from ribbon_model.material import Material
+from ribbon_model.open_strip import OpenStrip
+
+CUT = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8, "kappa_n": 2 * math.pi})
+STRAIGHT = Material("rod", {"B1": 1.0, "B2": 1.0, "C": 0.8})
+
+
+@functools.cache
+def shot(turn: float) -> float:
+    """The energy of a naturally circular isotropic rod, cut open, the last end turned: Kirchhoff's equations by shooting.
+
+    The columns of R are the directors on the axes of the first end; in the end R = exp(turn d3), where it began. The unknowns
+    are the moment at the first end and the force.
+    """
+    stiffness, natural = np.array([1, 1, 0.8]), np.array([2 * math.pi, 0, 0])
+
+    def rates(s, y, force):
+        R, moment = y[:9].reshape(3, 3), y[12:15]
+        strains = R.T @ moment / stiffness + natural
+        (a, b, c), energy = strains, (strains - natural) @ (stiffness * (strains - natural)) / 2
+        spin = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])
+        return np.concatenate([(R @ spin).ravel(), R[:, 2], np.cross(force, R[:, 2]), [energy]])
+
+    def end(z):
+        y = np.concatenate([np.eye(3).ravel(), np.zeros(3), z[:3], [0]])
+        return solve_ivp(rates, (0, 1), y, "DOP853", rtol=1e-12, atol=1e-13, args=(z[3:],)).y[:, -1]
+
+    def missed(z, turn):
+        y, (c, s) = end(z), (math.cos(turn), math.sin(turn))
+        relative = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ y[:9].reshape(3, 3)
+        return [*y[9:12], relative[2, 1] - relative[1, 2], relative[0, 2] - relative[2, 0], relative[1, 0] - relative[0, 1]]
+
+    z = np.zeros(6)
+    for part in (0.5, 1.0):
+        z = fsolve(missed, z, (part * turn,), xtol=1e-12)
+    return end(z)[-1]
+
+
+@pytest.mark.parametrize("phase", ["", "spin", "shift, right", "shift, left", "shift, two waves"])
+def test_a_cut_ring_with_an_end_turned(phase):
+    """No symmetry moves it: every phase is a load, which is said, with its multiplier. Without one the energy is right."""
+    strip = OpenStrip(CUT, phases=(phase,) if phase else ())
+    branch = contin.trace(strip.first_point(), free=["turn"], limits={"turn": (0, 1)})
+    point, right = branch[-1], shot(1.0)
+    if not phase:
+        assert abs(point["energy"] - right) < 1e-10 and not branch.notes
+        return
+    ((name, load),) = point.phase_loads().items()
+    assert point["energy"] > right + 0.1 and abs(load) > 10
+    assert branch.notes == [
+        f"phases: {name} = {load:.6g} at EP (turn = 1) and not zero, so the phase condition loads the structure; leave it out"
+    ]
+    assert name == "lam_phase_" + phase.replace(", ", "_").replace(" ", "_")
+
+
+def test_branch_points_that_a_phase_makes():
+    """An isotropic column buckles at pi^2 (j - 1/2)^2 in both planes; in one of them the phase moves the loads."""
+    strip = OpenStrip(STRAIGHT, finish=FREE_END, numbers={"force_tangent": -1.0}, phases=("spin",))
+    branch = contin.trace(strip.first_point(), free=["force_tangent"], direction=-1, limits={"force_tangent": (-60, 0)})
+    said = "".join(branch.notes)
+    false = [point for point in branch.labelled("BP") if f"BP (force_tangent = {point['force_tangent']:.10g})" in said]
+    true = [point for point in branch.labelled("BP") if point not in false]
+    assert len(false) == len(branch.notes) == 2
+    for point, order in zip(true, (1, 2), strict=True):
+        assert abs(point["force_tangent"] + math.pi**2 * (order - 0.5) ** 2) < 1e-9
+
+
+@pytest.mark.parametrize(("stiffness", "turn"), [(1.0, 14.5), (3.0, math.pi)], ids=["a ring that spins", "a band that shifts"])
+def test_the_phases_that_a_message_recommends_are_no_loads(stiffness, turn):
+    """All of them lead to states of one energy, on which none has a multiplier; nor on the branch of such states."""
+    material, numbers = Material("rod", {"B1": 1.0, "B2": stiffness, "C": 0.8}), {"distance": 0.0, "turn": turn}
+    strip, energies = OpenStrip(material, numbers=numbers), []
+    with pytest.raises(ProblemError) as error:
+        strip.first_point(strip.twisted_circle(turn / math.pi))
+    for text in re.findall(r"\[.*?\]", str(error.value)):
+        band = OpenStrip(material, numbers=numbers, phases=tuple(ast.literal_eval(text)))
+        branch = contin.trace(band.first_point(band.twisted_circle(turn / math.pi)), free=["C"], limits={"C": (0.8, 0.85)})
+        assert not branch.notes and not branch[-1].phase_loads()
+        energies.append(branch[0]["energy"])
+    assert energies and np.ptp(energies) < 1e-8
+
+
+def test_a_message_recommends_no_phase_where_none_fits():
+    """The guess is far from any state, and a phase would only load the strip."""
+    strip = OpenStrip(CUT, numbers={"turn": 1.0})
+    with pytest.raises(ProblemError) as error:
+        strip.first_point(strip.twisted(1.0))
+    assert "no equilibrium" in str(error.value) and "phases" not in str(error.value)
