@@ -1,4 +1,4 @@
-"""Random equilibrium problems with known spectra: every branch point of a trivial branch must be labelled, or noted.
+"""Random problems with known branch points: every one on a trivial branch must be labelled, or noted.
 
     python scripts/stress.py [--count 500] [--seed 0] [--first 0] [--most 30] [--verbose]
 
@@ -10,7 +10,14 @@ not. Number and size of the states, gaps, first steps and limits differ from pro
 - noted, if it has no label, and a note of the branch names an interval around it;
 - missed, invented or wrong otherwise.
 
-A cluster of eigenvalues may be labelled as one point if the error of that covers it. The exit code is 1 if anything is missed,
+A cluster of eigenvalues may be labelled as one point if the error of that covers it.
+
+Every fourth problem is a column (Euler's elastica with three kinds of ends) in place of that, of a degree from 2 to 7 or the
+default one. Its branches are known too: at one of its branch points it is turned from, either way, and must not return to the
+straight column nor meet anything; where it ends, the load must be that of the largest angle. Unknowns have sizes from 1e-9 to
+1e9.
+
+The exit code is 1 if anything is missed,
 invented or wrong. A problem that takes more than 4 GB in all fails.
 """
 
@@ -19,6 +26,7 @@ from __future__ import annotations
 import argparse
 import collections
 import functools
+import math
 import re
 import resource
 import sys
@@ -27,6 +35,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.special import ellipk
 
 sys.path[:0] = [str(Path(__file__).resolve().parent.parent)]
 
@@ -35,12 +44,60 @@ import contin  # noqa: E402
 #: Numbers of states: a dense matrix each; of the last, eigenvalues are looked for by iteration.
 SIZES = (2, 3, 4, 6, 9, 14, 30)
 #: Kinds of spectrum.
-KINDS = ("simple", "double", "several double", "triple", "clustered", "grid")
+KINDS = ("simple", "double", "several double", "column", "triple", "clustered", "grid", "column")
+#: Ends of columns: whether the angle is held at either, and the number of the loads (pi place)^2 that begins with so much.
+ENDS = {"clamped and free": ((True, False), 0.5), "pinned": ((False, False), 1.0), "clamped": ((True, True), 1.0)}
+#: Degrees of collocation of columns; None for the default.
+DEGREES = (None, 2, 3, 4, 5, 6, 7)
+#: The load at the end of a branch differs from that of the largest angle by this part at most; mesh and limits leave less.
+_LOAD_ERROR = 1e-6
 #: Largest size of the process in bytes: 500 problems of 30 states take 0.22 GB, of which 0.12 GB are compiled code and modules.
 #: Ten times more would let a machine swap before anybody sees it.
 MEMORY = 4 * 2**30
 #: An error may be so many times its estimate, as in the bank of reference problems; and this is round-off of eigenvectors.
 UNDERRATED, ROUND_OFF = 10.0, 1e-9
+
+
+@dataclass(frozen=True)
+class Column:
+    """One random column: angle'' = -(lam / load) sin(angle / unit) unit, and how it is run."""
+
+    number: int
+    ends: str
+    degree: int | None
+    load: float
+    unit: float
+    last: int  # loads below the limit
+    turned: int  # which of them is turned from
+    direction: int
+    kind: str = "column"
+
+    @property
+    def spectrum(self) -> np.ndarray:
+        """The loads, those and the next."""
+        return self.load * (np.pi * (ENDS[self.ends][1] + np.arange(self.last + 1))) ** 2
+
+    @property
+    def limit(self) -> float:
+        """Between the last load and the next one."""
+        return float(np.mean(self.spectrum[-2:]))
+
+    def describe(self) -> str:
+        """Return the problem in one line."""
+        return (f"{self.number}: column, {self.ends}, degree {self.degree}, load {self.load:.3g}, unit {self.unit:.3g}, "
+                f"{self.last} loads, from number {self.turned} in direction {self.direction}")  # fmt: skip
+
+    def statement(self) -> contin.BoundaryValueProblem:
+        """Return the problem: states angle and moment, the parameter lam, both in their units."""
+        held, (load, unit) = ENDS[self.ends][0], (self.load, self.unit)
+
+        def bent(t, u, p):
+            return u.moment, -p.lam / load * unit * math.sin(u.angle / unit)
+
+        def conditions(a, b, p):
+            return tuple(end.angle if is_held else end.moment for end, is_held in zip((a, b), held))
+
+        return contin.BoundaryValueProblem(bent, conditions, ["angle", "moment"], {"lam": 0.01 * load})
 
 
 @dataclass(frozen=True)
@@ -72,13 +129,19 @@ class Random:
         return f"{self.number}: {self.kind}, {len(self.spectrum)} states, {shape}, limit {self.limit:.3g}, step {self.step:.3g}"
 
 
-def problems(count: int, seed: int, first: int = 0, most: int = SIZES[-1]) -> list[Random]:
+def problems(count: int, seed: int, first: int = 0, most: int = SIZES[-1]) -> list[Random | Column]:
     """Return random problems of at most so many states; each depends on its number, that and the seed alone."""
     return [_problem(number, seed, most) for number in range(first, first + count)]
 
 
-def _problem(number: int, seed: int, most: int) -> Random:
+def _problem(number: int, seed: int, most: int) -> Random | Column:
     random = np.random.default_rng([seed, number])
+    if KINDS[number % len(KINDS)] == "column":
+        last = int(random.integers(1, 5))
+        return Column(
+            number, str(random.choice(list(ENDS))), DEGREES[random.integers(len(DEGREES))], *10 ** random.uniform(-9, 9, 2),
+            last, int(random.integers(last)), int(random.choice([-1, 1])),
+        )  # fmt: skip
     kind, n = KINDS[number % len(KINDS)], int(random.choice([size for size in SIZES if size <= most]))
     if kind == "triple":
         n = max(n, 3)
@@ -121,8 +184,11 @@ def statement(n: int, dynamics: bool) -> contin.AlgebraicProblem:
     return contin.AlgebraicProblem(_residual, n, dict.fromkeys(names, 0.0), dynamics=dynamics)
 
 
-def branch_of(problem: Random) -> contin.Branch:
+def branch_of(problem: Random | Column) -> contin.Branch:
     """Follow the trivial branch from lam = 0 to its limit."""
+    if isinstance(problem, Column):
+        start = contin.solve(problem.statement(), [0.0, 0.0], degree=problem.degree)
+        return contin.trace(start, free=["lam"], limits={"lam": (0, problem.limit)}, progress=False)
     n, matrix = len(problem.spectrum), problem.matrix
     q, c, drift = problem.coefficients
     d = drift * np.random.default_rng([problem.number, 2]).standard_normal(n) / problem.spectrum.max()
@@ -138,7 +204,27 @@ def _noted(branch: contin.Branch) -> list[tuple[float, float]]:
     return [(min(map(float, pair)), max(map(float, pair))) for pair in found]
 
 
-def outcomes(problem: Random, branch: contin.Branch) -> list[tuple[str, str]]:
+def turned(problem: Column, branch: contin.Branch) -> list[tuple[str, str]]:
+    """Return what is wrong with the branch that is turned from."""
+    point = min(branch.labelled("BP"), key=lambda point: abs(point["lam"] - problem.spectrum[problem.turned]))
+    bent = contin.trace(
+        point, branch=1, direction=problem.direction, limits={"lam": (0, 1.5 * point["lam"])}, progress=False
+    )  # fmt: skip
+    result = [
+        ("invented", f"{each.label} at {each['lam']:.9g} where it is bent")
+        for each in bent.points[1:]
+        if each.label not in ("", "EP")
+    ]
+    end = bent.points[-1]
+    angle, moment = end.system.states(end.x)[0] / problem.unit
+    height = moment**2 / (2 * end["lam"] / problem.load) + 1 - math.cos(angle)  # the same all along: 1 - cos(largest angle)
+    load = problem.spectrum[problem.turned] * (2 / math.pi * float(ellipk(height / 2))) ** 2  # Euler 1744
+    if abs(load / end["lam"] - 1) > _LOAD_ERROR:
+        result.append(("wrong", f"1 - cos(largest angle) = {height:.6g} at the end of the bent branch, {end['lam']:.9g}"))
+    return result if str(bent.stop).startswith("reached") else [*result, ("unfinished", f"bent: {bent.stop}")]
+
+
+def outcomes(problem: Random | Column, branch: contin.Branch) -> list[tuple[str, str]]:
     """Return what became of every branch point, and of every label: a word and where; words are those of the module's head."""
     result, left = [], problem.spectrum[problem.spectrum < problem.limit]
     for point in branch.labelled("BP"):
@@ -155,6 +241,8 @@ def outcomes(problem: Random, branch: contin.Branch) -> list[tuple[str, str]]:
     result += [("invented", f"{point.label} {point.name} at {point['lam']:.9g}") for point in others]
     if branch.stop is None or branch.stop.reason != "limit":
         result.append(("unfinished", str(branch.stop)))
+    if isinstance(problem, Column) and branch.labelled("BP"):
+        result += turned(problem, branch)
     return result
 
 

@@ -24,7 +24,7 @@ from contin import checks, threads
 from contin.arrays import Array
 from contin.continuation.corners import jump, unsettled, why_lost
 from contin.continuation.failure import no_convergence, shorter_steps
-from contin.continuation.scaling import outgrown, scaled
+from contin.continuation.scaling import outgrown, renewed, scaled
 from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
@@ -252,6 +252,8 @@ class Continuation:
     def _first(self, system: Discretization, x: Array, tangent: Array | None, singular: bool) -> State:
         settings = self.settings
         if tangent is not None:
+            system, carry = renewed(system, x)
+            x, tangent = carry(x), carry(tangent)
             unit = tangent / np.sqrt(inner(system, tangent, tangent))
             state = dataclasses.replace(standing_at(system, x, unit, settings.step), singular=singular)
             return state if singular else dataclasses.replace(state, sign=system.linearize(x, (state.row,))[1].sign)

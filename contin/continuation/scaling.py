@@ -80,7 +80,9 @@ def scaled(
     if np.any(sizes < USUAL[0]) or any(0 < size < USUAL[0] for size in held.values()):
         first = _FirstPoint(system, x, row, linear, primary, settings.newton)
         sizes = first.sizes(np.array([stated.get(name, 0.0) for name in names]), _said(primary, settings))
-        held = {name: size * first.counts(name, size, sizes) for name, size in held.items()}
+        small = [name for name, size in held.items() if 0 < size < USUAL[0]]
+        counting = first.counting(small, held, sizes) if small else small
+        held |= {name: 0.0 for name in small if name not in counting}
     alike: Mapping[str, str] = getattr(problem, "alike", {})
     sizes = np.array([stated.get(name, sizes[names.index(alike.get(name, name))]) for name in names])
     of_parameters = {**held, **stated, **dict(zip(system.free, sizes[len(states) :]))}
@@ -167,14 +169,13 @@ class _FirstPoint:
         """Factors where x differs by one unit in the last place: solves with both differ by round-off of the elimination."""
         return self.system.linearize(self._rounded(self.x), (self.row,))[1]
 
-    def counts(self, name: str, size: float, sizes: Array) -> bool:
-        """Return whether a small value of a parameter is more than nothing: without it, a state would change."""
-        if size >= USUAL[0] or not size:
-            return True
+    def counting(self, names: Sequence[str], values: Mapping[str, float], sizes: Array) -> set[str]:
+        """Return the parameters whose small values are more than nothing: without them, a state would change."""
         with np.errstate(all="ignore"):
-            column = self.system.parameter_columns(self.x, (name,))[:, 0]
-            change = size * self.system.largest(self._factors.solve(np.append(column, 0.0)))
-        return bool(np.any(change > _NOTHING * sizes))
+            columns = self.system.parameter_columns(self.x, names).T
+            changes = self._factors.solve(np.hstack([columns, np.zeros((len(names), 1))]))
+        return {name for name, change in zip(names, changes)
+                if np.any(values[name] * self.system.largest(change) > _NOTHING * sizes)}  # fmt: skip
 
     # --- the expansion -------------------------------------------------------------------------------------------
 
@@ -400,6 +401,23 @@ def _said(name: str, settings: Settings) -> float:
     """Return the smallest limit or value to be labelled of a parameter but zero; infinity where there is none."""
     said: Iterable[float] = (*settings.limits.get(name, ()), *settings.zeros.get(name, ()))
     return min((abs(float(number)) for number in said if number), default=np.inf)
+
+
+def renewed(system: Discretization, x: Array) -> tuple[Discretization, Carrier]:
+    """Return the system with the sizes that values have where a branch begins, and the carrier: smaller ones are past.
+
+    A trivial branch that begins at a small load leaves its size to the branches that turn off at loads of order one.
+    """
+    if not isinstance(system, System) or system.scales is None:
+        return system, np.array
+    names, count, scales = list(system.problem.parameters), len(system.problem.states), system.scales
+    largest = system.largest(x)
+    sizes = np.concatenate([scales.states, system.free_scales])
+    sizes = np.where(largest > 1, np.maximum(sizes, usual(largest * sizes)), sizes)
+    parameters = scales.parameters.copy()
+    parameters[[names.index(name) for name in system.free]] = sizes[count:]
+    other, _ = system.with_scales(x, sizes[:count], parameters)
+    return (system, np.array) if other is system else (other, system.carrier(other))
 
 
 def outgrown(
