@@ -32,6 +32,10 @@ class NoThreshold(ValueError):
     """A mode without a bifurcation on a circle on which the law is regular."""
 
 
+class TwoBendings(ValueError):
+    """A circle whose moment belongs to two bendings; the law takes the other one."""
+
+
 @dataclass(frozen=True)
 class Law:
     """A material law.

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ribbon_model import plate
+from ribbon_model import finite_width, plate
 from ribbon_model.finite_width import Section, ribbon_energy, section_derivatives, section_energy
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, LAWS, RIBBON, Law
 from ribbon_model.plate import RIGIDITIES
@@ -222,8 +222,8 @@ class Material:
         if self.orthotropic:
             return self._orthotropic_section()
         if law.has_width:
-            return lambda t, M1, M2, M3, kappa_n, p: (
-                complementary(M1, M2, M3, kappa_n, p.nu, p.Gamma * width(t, p) ** 2 / thickness(t, p)) - kappa_n * kappa_n / 2
+            return lambda t, M1, M2, M3, kappa_n, p: finite_width.complementary(
+                M1, M3, kappa_n, finite_width.isotropic(p.nu, p.Gamma * width(t, p) ** 2 / thickness(t, p))
             )
         return lambda t, M1, M2, M3, kappa_n, p: complementary(M1, M2, M3, kappa_n, p.nu) - kappa_n * kappa_n / 2
 
