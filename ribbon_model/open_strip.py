@@ -256,9 +256,21 @@ class OpenStrip:
                 and self._rigid_freedom(guess[1], self.parameters | (values or {}))
             ):
                 reason = RIGID  # round-off decides whether the solver or the index notices
-            raise ProblemError(reason) from error
-        self.check_determined(point)
+            raise ProblemError(self._law_at(guess) or reason) from error
+        try:
+            self.check_determined(point)
+        except ProblemError as error:
+            raise ProblemError(self._law_at(guess) or str(error)) from error
         return point
+
+    def _law_at(self, guess) -> str | None:
+        """Return that the law has no value at a guess, in a sentence; None where it has, or where the guess is a point."""
+        if isinstance(guess, Point):
+            return None
+        if not callable(guess):
+            return law_end.at_guess(self.material, guess[0], guess[1][:, :4])
+        times = np.linspace(0, 1, 401)
+        return law_end.at_guess(self.material, times, np.array([guess(t)[:4] for t in times]))
 
     def _natural_guess(self):
         s = np.linspace(0, 1, 401)
