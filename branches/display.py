@@ -64,6 +64,7 @@ class Display:
         self._silent = silent
         self._moving = not quiet and sys.stderr is not None and sys.stderr.isatty()
         self._label = self._first = self._most = 0
+        self._notes: list[str] = []
         self._began = self._shown = time.monotonic()
 
     def note(self, text: str) -> None:
@@ -152,6 +153,10 @@ class Display:
             f"  {'-' if point.index is None else point.index:>5}  {point.system.intervals:4d} {point.iterations:3d}"
         )
 
+    def stage_notes(self, number: int, notes: list[str]) -> None:
+        """Take what a stage saw and did not understand, for the summary."""
+        self._notes += [f"stage {number}: {note}" for note in notes]
+
     def stages_summary(self, config, events, count: int, seconds: float, path, ended) -> None:
         """What came out of all stages, in lines to quote; ``ended`` is the outcome and the reason of the stop."""
         self.clear()
@@ -163,7 +168,7 @@ class Display:
             lines.append(f"  interrupted; go on with --resume --out {shlex.quote(str(path))}")
         elif outcome == "lost":
             lines.append(f"  stopped: {stop}")
-        self.note("\n".join([*lines, f"  written to {path}"]))
+        self.note("\n".join([*lines, f"  written to {path}", *self._notes]))
 
     # --- diagrams ------------------------------------------------------------------------------------------------
 

@@ -269,6 +269,7 @@ def _followed(config: OpenConfig, begun, writer: BranchWriter, display) -> tuple
                     return "lost", stop
                 labelled.append([])
             ended = _through(config, run, labelled, writer, (display, interruption))
+            display.stage_notes(number, run.notes)
             if ended is not None:
                 return ended
         writer.checkpoint(run.start, "complete", run.stop)

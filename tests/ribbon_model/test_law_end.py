@@ -151,7 +151,7 @@ def test_a_run_that_fails_beside_the_end_of_the_law_is_said_to_end_there():
     assert 0 < margin.min() < 1e-4  # it came close to the end, and did not pass it
 
 
-# --- first states ---------------------------------------------------------------------------------------------------------------
+# --- first states ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kappa_n", [0.0, 1.0, 4.0])
@@ -164,7 +164,7 @@ def test_a_first_state_at_which_the_law_has_no_value(kappa_n):
     ):
         ribbon.first_point(ribbon.arch())
     if kappa_n == 0:
-        with pytest.raises(contin.ProblemError, match="'ribbon' has no value where the bending vanishes"):
+        with pytest.raises(contin.ProblemError, match=sentence):
             ribbon.first_point()
         wide = OpenStrip(Material("finite width", {"nu": 0.3, "Gamma": 10.0}), **ends)
         assert wide.first_point(wide.arch())["distance"] == 0.95
