@@ -159,9 +159,8 @@ def test_a_first_state_at_which_the_law_has_no_value(kappa_n):
     """A clamped arch turns from one side to the other. The law that the sentence names finds it."""
     ends = {"numbers": {"distance": 0.95}}
     ribbon = OpenStrip(Material("ribbon", {"nu": 0.3, "kappa_n": kappa_n}), **ends)
-    with pytest.raises(
-        contin.ProblemError, match="'ribbon' has no value where the bending vanishes .* take the law 'finite width'"
-    ):
+    sentence = "'ribbon' has no value where the bending vanishes .* take the law 'finite width'"
+    with pytest.raises(contin.ProblemError, match=sentence):
         ribbon.first_point(ribbon.arch())
     if kappa_n == 0:
         with pytest.raises(contin.ProblemError, match=sentence):
