@@ -65,6 +65,9 @@ class Law:
     parameters: tuple[str, ...] = ("nu",)
     energy: Callable[..., float] | None = None
 
+    def __repr__(self) -> str:
+        return f"<law {self.name!r}>"
+
     #: True if Gamma is a parameter.
     has_width: ClassVar[bool] = False
     #: True if the surface is ruled along d1 + eta d3, eta = omega_3/omega_1 (6a).

@@ -26,6 +26,7 @@ from ribbon_model.integral_conditions import PHASES, Roller
 from ribbon_model.loads import FORCES, LOADS, STROKE
 from ribbon_model.material import Material
 from ribbon_model.shape import Shape, shape_of
+from ribbon_model.shown import Shown
 
 #: Columns of the reactions.
 REACTIONS = tuple(
@@ -36,8 +37,8 @@ REACTIONS = tuple(
 _ZERO = 1e-10
 
 
-@dataclass(frozen=True)
-class OpenStrip:
+@dataclass(frozen=True, repr=False)
+class OpenStrip(Shown):
     """A strip between two ends.
 
     Attributes

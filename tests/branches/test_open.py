@@ -87,6 +87,16 @@ def test_the_file(tip):
         branch.solution(0)
 
 
+def test_the_file_is_printed_on_a_screen(tip):
+    branch = read_branch(tip)
+    lines = repr(branch).splitlines()
+    assert lines[0].startswith(f"OpenBranch({branch.about}: {len(branch.points)} points, complete; ")
+    assert len(lines) == 1 + len(branch.events) and "of stage 2" in lines[-1]
+    strip = branch.scene.strip()
+    for found in (strip, strip.problem, branch.shape(0)):
+        assert len(repr(found)) < 400 and "\n" not in repr(found) and " 0x" not in repr(found)
+
+
 def test_run_again_and_resume(tip, root, capsys):
     arguments = [str(root / "configs" / "open_tip.yaml"), "--out", str(tip)]
     assert run.main([*arguments, "--resume"]) == 0
