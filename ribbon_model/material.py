@@ -166,6 +166,16 @@ class Material:
         return {name: value for name, value in self.numbers.items() if math.isfinite(value)}
 
     @property
+    def stiffnesses(self) -> tuple[str, ...]:
+        """Names of the parameters that are stiffnesses; none where the bending modulus is one."""
+        return tuple(name for name in (*STIFFNESSES, "D11", "D22", "D66") if name in self.parameters)
+
+    @property
+    def stiffness(self) -> float:
+        """The smallest stiffness."""
+        return min((self.parameters[name] for name in self.stiffnesses), default=1.0)
+
+    @property
     def of_paper(self) -> Law | None:
         """The law of the paper; None for a rod."""
         return LAWS.get(self.law)

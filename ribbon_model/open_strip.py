@@ -339,6 +339,20 @@ class OpenStrip(Shown):
         motions = np.array([np.concatenate([_moved(states[i, :7], k, n) for i in (0, -1)]) for k in range(6)])
         return int(np.linalg.matrix_rank(by_ends @ motions.T, tol=LOOSE)) < 6
 
+    def sizes(self, system: Collocation, x: np.ndarray) -> dict[str, float]:
+        """Return the sizes of states and numbers for `contin.Settings.scales`, at a state.
+
+        The length of the strip is one, and so are the sizes of places and angles. All forces and moments have one size, that of
+        the smallest stiffness or of the largest among them: a component that is small here, or nothing but round-off, is not
+        small by its nature.
+        """
+        known = {**self.parameters, **dict(zip((*system.problem.states, *system.free), system.largest(x)))}
+        stiffness = min((known[name] for name in self.material.stiffnesses), default=1.0)
+        forces = [name for name in known if name.startswith(("lam_", "sigma_")) or name in LOADS]
+        force = max(stiffness, *(abs(known[name]) for name in forces))
+        places = [name for name in known if name not in (*forces, *self.material.parameters)]
+        return dict.fromkeys(places, 1.0) | dict.fromkeys(forces, force)
+
     # --- where the law ends -------------------------------------------------------------------------------------------
 
     def domain_tests(self) -> list[TestFunction]:

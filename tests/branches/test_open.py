@@ -1,6 +1,7 @@
 """Scenes of open strips: what is asked of them, their files, pictures and pages. Their numbers: test_open_independent."""
 
 import math
+import re
 import signal
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from browser import CHROMIUM, Browser
 
 import contin
-from branches import export, graph, open_graph, run
+from branches import export, graph, open_graph, open_job, run
 from branches.config import ConfigError, dump, load, parse
 from branches.display import Display
 from branches.explore import __main__ as page
@@ -352,3 +353,71 @@ def test_the_snap_of_the_clamped_strip(root, tmp_path):
     below = nearest["energy"] + nearest["M_tangent"] * (fold["turn"] - nearest["turn"])
     assert snap.released == pytest.approx(fold["energy"] - below, rel=1e-3)
     assert snap.to["M_tangent"] == pytest.approx(nearest["M_tangent"], abs=0.3)
+
+
+# --- sizes of states and numbers ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("B2", [1.0001, 1.001, 1.01])
+def test_a_strip_whose_components_are_small_at_first(B2, tmp_path):
+    """A rod that is nearly isotropic: half a twist leaves the circle plane but for (B2 - 1)**2, which is no size of its place.
+
+    At B2 = 1 bending and twist are even, and the energy is (2 pi)**2/2 + pi**2/2; at B2 = 10 it is that of the branch from 1.2
+    on, on 40 intervals.
+    """
+    text = (
+        f"material: {{law: rod, B1: 1, B2: {B2}, C: 1}}\nclosed: {{half_twists: 1}}\nbegin: circle\nphases: ['shift, left']\n"
+        "stages: [{follow: B2, to: 10}]\n"
+    )
+    assert run_stages(parse(text, "scene"), tmp_path / "moebius.h5", Display(silent=True)) == "complete"
+    branch = read_branch(tmp_path / "moebius.h5")
+    assert len(branch.points) < 40
+    first, last = branch.events[0], branch.events[-1]
+    assert first["energy"] == pytest.approx(2.5 * math.pi**2, rel=(B2 - 1))
+    assert last["energy"] == pytest.approx(37.24952826, abs=1e-8) and last["error_energy"] < 1e-10
+
+
+def test_a_stage_that_begins_at_round_off(tmp_path, capsys):
+    """A weight that was taken to zero and is 1e-29 there: the next stage goes on as from zero, and zero is what is printed."""
+    text = (
+        "material: {law: rod, B1: 1, B2: 4, C: 0.8}\nfinish: free\n"
+        "stages: [{follow: weight, to: 5}, {follow: weight, to: -5}, {follow: weight, to: 0}, {follow: weight, to: 3}]\n"
+    )
+    assert run_stages(parse(text, "scene"), tmp_path / "weight.h5", Display()) == "complete"
+    branch = read_branch(tmp_path / "weight.h5")
+    assert len(branch.points) < 60 and branch.events[-1]["weight"] == pytest.approx(3, rel=1e-15)
+    forth = [event["rise"] for event in branch.events if math.isclose(abs(event["weight"]), 5)]
+    assert forth == pytest.approx([-0.4959050446, -0.4959050446, 0.4959050446, 0.4959050446], abs=1e-9)
+    assert not re.search(r"(weight = |EP .*[ \d.])e-\d\d ", capsys.readouterr().out)
+
+
+def test_sizes_of_an_open_strip():
+    """Places and angles have the size of the length; forces and moments have one size."""
+    scene = parse(
+        "material: {law: rod, B1: 1.0e-3, B2: 2, C: 2.0e-3}\nnumbers: {distance: 0.9}\nbegin: arch\n"
+        "stages: [{follow: distance, to: 0.8}]\n", "scene"
+    )  # fmt: skip
+    strip, point = scene.strip(), first_state(scene)
+    sizes = strip.sizes(point.system, point.x)
+    assert {sizes[name] for name in ("q0", "q3", "x1", "x3", "distance", "turn")} == {1.0}
+    forces = {size for name, size in sizes.items() if name.startswith(("lam_", "sigma_"))}
+    states = point.system.states(point.x)
+    assert (
+        forces == {max(abs(states[:, 7:]).max(), *(abs(point[name]) for name in strip.problem.multipliers))}
+        and "B1" not in sizes
+    )
+
+
+def test_what_a_stage_notes_is_in_the_summary(tmp_path, monkeypatch, capsys):
+    """Notes of a run tell what it saw and did not understand; the stage is named."""
+    through = open_job._through
+
+    def noted(config, run, labelled, *others):
+        ended = through(config, run, labelled, *others)
+        run.notes.append(f"seen at {len(labelled)}")
+        return ended
+
+    monkeypatch.setattr(open_job, "_through", noted)
+    scene = TIP.replace("-6}", "-0.1}, {follow: force_width, to: -0.2}")
+    assert run_stages(parse(scene, "scene"), tmp_path / "tip.h5", Display(quiet=True)) == "complete"
+    assert capsys.readouterr().out.rstrip().endswith("\nstage 1: seen at 1\nstage 2: seen at 2")
