@@ -238,7 +238,7 @@ def test_the_scenes_that_come_with_it(root):
     ("settings", "words"),
     [
         (["strip.width=-1"], "strip: width: -1 must be positive and finite"),
-        (["strip.width=wide"], "strip: width: must be a number, not 'wide'"),
+        (["strip.width=wide"], "strip: width: 'wide' must be a number (in m), or one with a unit"),
         (["strip.width=true"], "strip: width: must be a number, not True"),
         (["strip.length=.inf"], "strip: length: inf must be positive and finite"),
         (["strip.poisson_ratio=.7"], "poisson_ratio: 0.7 must be greater than -1 and at most 0.5"),
@@ -262,7 +262,7 @@ def test_scenes_that_are_refused(settings, words):
     ("changed", "words"),
     [
         ({"--width": "0"}, "width: 0 must be positive and finite"),
-        ({"--width": "x"}, "argument --width: invalid float value: 'x'"),
+        ({"--width": "x"}, "argument --width: 'x' must be a number (in m), or one with a unit"),
         ({"--natural-radius": "nan"}, "natural_radius: nan must be positive"),
         ({"--yield-strain": "-1"}, "yield_strain: -1 must be positive and finite"),
         ({"--want": "0"}, "want: 0 must be positive and finite"),
