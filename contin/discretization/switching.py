@@ -13,6 +13,7 @@ closed form.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,15 +70,15 @@ class Switching(NamedTuple):
 NOWHERE = Switching(np.empty(0), np.empty(0), np.empty(0, dtype=bool), ())
 
 
-def switching(system: Any, selections: Selections, sizes: Array, x: Array) -> Switching:
+def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x: Array) -> Switching:
     """Return the places of a solution where conditions switch, without those of smooth selections.
 
     Parameters
     ----------
     system : Collocation
     selections : Selections
-    sizes : ndarray, shape (values,)
-        Sizes of what the values of the functions are integrated to.
+    sizes : callable
+        ``sizes()`` are those of what the values of the functions are integrated to, shape (values,).
     x : ndarray
         A solution.
     """
@@ -92,7 +93,7 @@ def switching(system: Any, selections: Selections, sizes: Array, x: Array) -> Sw
         """Return the largest gap of each switch at its times (K, parts), shape (K, parts)."""
         gaps = selections.gaps(times.ravel(), system.evaluate(x, times.ravel()), p)
         away = np.abs(times - places[:, None]) / (mesh[-1] - mesh[0])
-        return _of_selection(selections, gaps / sizes[selections.of_gaps[:, 1]], which, away)
+        return _of_selection(selections, gaps / units, which, away)
 
     def worst(places: Array, ends: Array, which: Indices) -> Array:
         """Return the largest gap of each switch between its place and an end, shape (K,)."""
@@ -103,6 +104,7 @@ def switching(system: Any, selections: Selections, sizes: Array, x: Array) -> Sw
         a, b, which = _brackets(*_sampled(system, selections, x, p))
         if not a.size:
             return NOWHERE
+        units = sizes()[selections.of_gaps[:, 1]]
         at = np.clip(np.searchsorted(mesh, (a + b) / 2, side="right") - 1, 0, mesh.size - 2)
         half = (mesh[at + 1] - mesh[at]) / 2
         ends = np.array([np.maximum(a - half, mesh[0]), np.minimum(b + half, mesh[-1])])

@@ -307,8 +307,31 @@ def test_the_place_of_a_smooth_selection_is_not_sought(monkeypatch):
         )
         solution = contin.solve(problem, lambda t: (t * (1 - t) / 2, 0.5 - t))
         sought.clear()
-        assert len(solution.system.switching(solution.x).places) == sum(passes)
+        assert len(solution.system.switching(solution.x * (1 + 1e-9)).places) == sum(passes)
         assert sought == passes
+
+
+def test_a_point_is_looked_at_once(monkeypatch):
+    """A run asks for the places of a point several times; other points and other meshes are looked at anew."""
+    law, levels = LAWS["maximum"]
+    looked, sampled = [], switching._sampled
+
+    def counted(system, selections, x, p):
+        looked.append(system.intervals)
+        return sampled(system, selections, x, p)
+
+    monkeypatch.setattr(switching, "_sampled", counted)
+    point = contin.solve(loaded(law), lambda t: (t * (1 - t), 1 - 2 * t))
+    system, x = point.system, point.x
+    looked.clear()
+    first = system.switching(x)
+    assert len(looked) <= 1 and system.switching(x.copy()) is first and len(looked) <= 1
+    moved = system.switching(x * 1.01)
+    assert moved is not first and not np.array_equal(moved.places, first.places)
+    again = system.switching(x)
+    assert again is not first and np.array_equal(again.places, first.places)
+    finer, carry = system.refined()
+    assert finer.switching(carry(x)).places == pytest.approx(first.places, abs=1e-6)
 
 
 def test_a_corner_in_python():
