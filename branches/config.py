@@ -14,6 +14,7 @@ import yaml
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from branches.fields import Interval, MeshConfig, StepConfig, Strict, show
+from branches.units import STRIP_UNITS, quantity
 from contin import exact_text
 from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, label
 
@@ -321,11 +322,18 @@ def _of_strip(values: dict, name: str) -> dict:
     for field in _FROM_STRIP:
         if field in values:
             raise ConfigError(f"{name}: {field}: must not be given together with strip, which determines it")
+    strip = dict(strip)
+    for field, value in strip.items():
+        if isinstance(value, str):
+            try:
+                strip[field] = quantity(value, STRIP_UNITS[field])
+            except ValueError as error:
+                raise ConfigError(f"{name}: strip: {field}: {error}") from error
     try:
         found = Strip(**strip)
     except ValueError as error:
         raise ConfigError(f"{name}: strip: {error}") from error
-    rest = values | dict(zip(_FROM_STRIP, (FINITE_WIDTH.name, found.poisson_ratio, found.Gamma)))
+    rest = {**values, "strip": strip} | dict(zip(_FROM_STRIP, (FINITE_WIDTH.name, found.poisson_ratio, found.Gamma)))
     zeros = rest.get("zeros", {})
     known = zeros.get("kappa_n", []) if isinstance(zeros, dict) else None
     if isinstance(known, list) and found.kappa_n not in known:  # otherwise the check of the field rejects it

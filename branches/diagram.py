@@ -96,12 +96,15 @@ def run_diagram(
     ExecutorError
         The scheduler cannot be used.
     """
-    began, folder, graph = time.perf_counter(), Path(folder), diagram_graph.new_graph(config.title)
+    began, folder = time.perf_counter(), Path(folder)
     prepare(folder / DIAGRAM)
     with only_run(folder / DIAGRAM):
         kept = {} if overwrite else _kept(config, folder)
         run = executor(scheduler, workers, time_limit)
-        failed, left_out = _compute_missing(config, folder, graph, display, run, kept)
+        courses, failed, left_out = _compute_missing(config, folder, display, run, kept)
+        graph = diagram_graph.new_graph(config.title)
+        for name, course in courses.items():
+            diagram_graph.add_course(graph, course, name)
         graph.graph.update({"config": dump(config), "failed": json.dumps(failed), "absent": json.dumps(config.absent)})
         diagram_graph.save(graph, folder)
     display.diagram_summary(_summary(config, graph, failed, left_out, time.perf_counter() - began, folder))
@@ -149,8 +152,18 @@ def _stored_scenes(config: DiagramConfig, folder: Path) -> dict[str, Config]:
         raise StoreError(f"{str(folder)!r} holds a diagram that is not a result of branches.run; {ANOTHER_DIAGRAM}") from error
 
 
-def _compute_missing(config, folder, graph, display, run, kept) -> tuple[dict[str, str], list[Config]]:
-    """Compute the missing branches; return the failed ones, by file name with the reason, and those left out as duplicates."""
+def _compute_missing(config, folder, display, run, kept) -> tuple[dict[str, Course], dict[str, str], list[Config]]:
+    """Compute the missing branches.
+
+    Returns
+    -------
+    courses, failed
+        Of all branches, and the reasons of those that failed, by file name; both in the order of the scene, whatever the order
+        in which processes were done.
+    left_out
+        Branches that are there from their other ends.
+    """
+    courses, graph = dict(kept), diagram_graph.new_graph()
     for name, course in kept.items():
         diagram_graph.add_course(graph, course, name)
     fresh = [one for one in config.branches if primary_file(one) not in kept]
@@ -165,9 +178,13 @@ def _compute_missing(config, folder, graph, display, run, kept) -> tuple[dict[st
                 problem = _take(folder, name, result, graph)
                 if problem:
                     failed[name] = problem
+                if not isinstance(result, BaseException):
+                    courses[name] = result[2]
                 nodes = [] if problem else [attributes for _, attributes in result[2].nodes]
                 display.branch_done(one, problem, nodes, done + len(plan.left_out))
-    return failed, plan.left_out
+    order = [primary_file(one) for one in config.branches]
+    in_order = [{name: found[name] for name in order if name in found} for found in (courses, failed)]
+    return in_order[0], in_order[1], plan.left_out
 
 
 def _summary(config, graph, failed, left_out, seconds, folder) -> list[str]:

@@ -12,7 +12,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from branches.labels import CONJUGATE, label_of
+from branches.labels import CONJUGATE, label_of, without_round_off
 
 if TYPE_CHECKING:  # nothing heavy is imported here: the command line uses this module before it knows what to do
     from contin import Point
@@ -64,6 +64,7 @@ class Display:
         self._silent = silent
         self._moving = not quiet and sys.stderr is not None and sys.stderr.isatty()
         self._label = self._first = self._most = 0
+        self._largest = 0.0  # value of the number that the stage follows
         self._began = self._shown = time.monotonic()
 
     def note(self, text: str) -> None:
@@ -134,6 +135,7 @@ class Display:
 
     def stage(self, config, number: int) -> None:
         """Say which stage begins."""
+        self._largest = abs(config.stages[number - 1].to)
         if not self._quiet:
             name, unit = config.stages[number - 1].follow, config.unit(config.stages[number - 1].follow)
             head = f"stage {number}: {name}{f' in {unit}' if unit else ''}"
@@ -141,12 +143,17 @@ class Display:
 
     def stage_point(self, config, stage, point: Point, number: int) -> None:
         """Show a point of a stage."""
+        self._largest = max(self._largest, abs(point[stage.follow] * config.factor(stage.follow)))
         if self._quiet or not (point.label or number % _EVERY == 0):
             return
         self._label += bool(point.label)
         label = f"{self._label:3d}" if point.label else "   "
-        force = config.strip().reactions(point)["F_tangent"] * config.factor("F_tangent")
-        value, energy = (point[name] * config.factor(name) for name in (stage.follow, "energy"))
+        strip = config.strip()
+        force, energy = (
+            without_round_off(found, strip.material.stiffness) * config.factor(name)
+            for name, found in (("F_tangent", strip.reactions(point)["F_tangent"]), ("energy", point["energy"]))
+        )
+        value = without_round_off(point[stage.follow] * config.factor(stage.follow), self._largest)
         self.note(
             f"{number:5d}  {point.label:2s}  {label}  {value:14.8g}  {energy:12.6g}  {force:12.6g}"
             f"  {'-' if point.index is None else point.index:>5}  {point.system.intervals:4d} {point.iterations:3d}"
@@ -158,7 +165,7 @@ class Display:
         outcome, stop = ended
         lines = [] if self._quiet else [""]
         lines.append(f"{config.title or config.name}: {count} points in {seconds:.2f} s")
-        lines += [f"  {_describe_stage(config, event)}" for event in events]
+        lines += [f"  {_describe_stage(config, event, _largest(config, events, event['stage']))}" for event in events]
         if outcome == "interrupted":
             lines.append(f"  interrupted; go on with --resume --out {shlex.quote(str(path))}")
         elif outcome == "lost":
@@ -219,13 +226,21 @@ def name_of(config) -> str:
     return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {exact_text(config.nu)}"
 
 
-def _describe_stage(config, event) -> str:
-    """A labelled point of an open strip in words."""
+def _largest(config, events, stage: int) -> float:
+    """Return the largest value at a labelled point of the number that a stage follows."""
+    name = config.stages[stage - 1].follow
+    return max(abs(event[name]) for event in events if event["stage"] == stage)
+
+
+def _describe_stage(config, event, largest: float) -> str:
+    """A labelled point of an open strip in words; ``largest`` is the largest value of its stage."""
     name = config.stages[event["stage"] - 1].follow
     label, error = event["label"].decode(), event[f"error_{name}"] * config.factor(name)
     found = label in ("LP", "BP") and not math.isnan(error)
     others = "".join(f", {text}" for text in (_with_error(config, event, column) for column in _shown(name)) if text)
-    place = f"{name} = {_rounded(event[name] * config.factor(name), error)}" + (f" (± {error:.0e})" if found else "")
+    place = f"{name} = {_rounded(without_round_off(event[name], largest) * config.factor(name), error)}" + (
+        f" (± {error:.0e})" if found else ""
+    )
     what = event["name"].decode()
     change = f", index {event['index_before']} -> {event['index_after']}" if event["index_before"] >= 0 else ""
     broken = f", breaks {event['breaks'].decode()}" if event["breaks"] else ""

@@ -123,6 +123,9 @@ class Computed:
     points: np.ndarray
     events: np.ndarray
 
+    def __repr__(self) -> str:
+        return f"Computed({len(self.points)} points, {len(self.events)} of them labelled, {self.status}; {self.stop})"
+
 
 def compute_branch(config: Config, display) -> Computed:
     """Return the branch of ``config``; no file is written.

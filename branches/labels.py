@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+#: Part of the range of a stage below which a value is what Newton's method leaves of zero. Ten times more hides nothing that is
+#: known: its tolerance is this part of the size of a number.
+_NOTHING = 1e-12
 # Okabe-Ito colours: told apart by the colour-blind, and in print
 FOLD, END, USER, SECONDARY = "#D55E00", "#000000", "#009E73", "#CC79A7"
 
@@ -80,3 +83,8 @@ def kind_of(label: str, name: str, reason: str, secondary: bool) -> str:
         return name
     kind = label_of(label).kind
     return "leaves" if kind == "end" and reason == "limit" else kind
+
+
+def without_round_off(value: float, largest: float) -> float:
+    """Return a value of a stage, 0 where it is round-off; ``largest`` is the largest one of the stage."""
+    return 0.0 if abs(value) <= _NOTHING * abs(largest) else value

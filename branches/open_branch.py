@@ -13,7 +13,7 @@ import numpy as np
 from branches.config import dump
 from branches.draw_strip import standing
 from branches.files import StoreError
-from branches.labels import CONJUGATE, SPECIAL
+from branches.labels import CONJUGATE, SPECIAL, without_round_off
 from branches.open_config import OpenConfig
 from branches.read_closed import StoredBranch
 from ribbon_model.ends import DIRECTIONS
@@ -171,7 +171,8 @@ class OpenBranch(StoredBranch):
         """Return where a labelled point is, in words; ``row`` counts labelled points from 0."""
         event = self.events[row]
         name = self.followed(int(event["stage"]))
-        return f"{name} = {event[name] * self.scene.factor(name):.4f} of stage {event['stage']}"
+        value = without_round_off(event[name], abs(self.points[name][self.points["stage"] == event["stage"]]).max())
+        return f"{name} = {value * self.scene.factor(name):.4f} of stage {event['stage']}"
 
     def followed(self, stage: int) -> str:
         """Return the number that a stage follows."""

@@ -13,9 +13,10 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.fields import Interval, MeshConfig, StepConfig, Strict, show
+from branches.units import STRIP_UNITS, quantity
 from contin import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
@@ -139,13 +140,18 @@ class RollerConfig(Strict):
 
 
 class DimensionsConfig(Strict):
-    """A strip in SI units."""
+    """A strip, in SI units or with units."""
 
     width: float = Field(gt=0)
     thickness: float = Field(gt=0)
     length: float = Field(gt=0)
     poisson_ratio: float = Field(gt=-1, le=0.5)
     youngs_modulus: float = Field(gt=0)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _in_si_units(cls, value, info):
+        return quantity(value, STRIP_UNITS[info.field_name]) if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _thin(self):

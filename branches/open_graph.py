@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from branches.diagram_graph import OPEN_FORMAT
-from branches.labels import SPECIAL, label_of
+from branches.labels import SPECIAL, label_of, without_round_off
 from branches.open_branch import OpenBranch
 from contin import exact_text
 
@@ -70,8 +70,10 @@ def listed(graph) -> Iterator[str]:
         for stage in sorted({data["stage"] for data in edges}):
             pieces = sorted((data for data in edges if data["stage"] == stage), key=lambda data: data["arclength"][0])
             name, factor = pieces[0]["followed"], pieces[0]["factor"]
-            points = [_number(pieces[0][name][0] * factor)]
-            points += [_point(graph.nodes[data["ends"][1]], data[name][-1] * factor) for data in pieces]
+            largest = max(abs(value) for data in pieces for value in data[name])
+            points = [_number(without_round_off(pieces[0][name][0], largest) * factor)]
+            ends = [(data["ends"][1], without_round_off(data[name][-1], largest) * factor) for data in pieces]
+            points += [_point(graph.nodes[end], value) for end, value in ends]
             yield f"  stage {stage}, {name}: {' -> '.join(points)}"
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from branches.advice import no_state, reached
 from branches.config import ConfigError, dump
 from branches.job import Interruption, is_done, writing
+from branches.labels import without_round_off
 from branches.layout import OPEN
 from branches.open_config import MEANINGS, OpenConfig, StageConfig
 from branches.open_errors import errors_of
@@ -27,6 +28,7 @@ from branches.store import BranchWriter, Kind, read_kept, read_state
 from contin import (
     Branch,
     BranchPoint,
+    Collocation,
     ContinError,
     Continuation,
     ConvergenceError,
@@ -131,8 +133,7 @@ def _resumed(config: OpenConfig, path: Path) -> tuple[Continuation, list[list[Po
         labelled.append(_points(config.strip(stage).problem, kept[f"stage {stage}"])[:count])
     strip, stage = config.strip(number), config.stages[number - 1]
     state, start, _, image = read_state(path, strip.problem, (stage.follow, *strip.problem.multipliers))
-    here = start[0].parameter(start[1], stage.follow)
-    run = Continuation(state.system, state.x, _settings(config, number, here), state=state, start=start)
+    run = Continuation(state.system, state.x, _settings(config, number, *start[:2]), state=state, start=start)
     return run, labelled, image
 
 
@@ -328,6 +329,7 @@ def _told(config: OpenConfig, number: int, run: Continuation, last: Point) -> St
         return Stop(run.stop.reason, law)
     if run.stop.reason == "no convergence":
         here = run.state.system.parameter(run.state.x, name)
+        here = without_round_off(here, max(map(abs, run.settings.limits[name])))
         return no_state(run, _shown(config, name, here))
     return reached(run.stop, last, run, functools.partial(_shown, config))
 
@@ -404,11 +406,11 @@ def _begun(config: OpenConfig, number: int, origin: Point) -> Continuation:
         return Continuation(origin.system, origin.x, *_switched(config, number, origin, changed))
     if not changed:
         system, x = origin.system.with_free((stage.follow, *strip.problem.multipliers), origin.x)
-        return Continuation(system, x, _settings(config, number, origin[stage.follow]))
+        return Continuation(system, x, _settings(config, number, system, x))
     numbers = {name: value / config.factor(name) for name, value in stage.numbers.items()}
     try:
         system, x = with_ends(strip, origin, stage.follow, numbers)
-        return Continuation(system, x, _settings(config, number, system.parameter(x, stage.follow)))
+        return Continuation(system, x, _settings(config, number, system, x))
     except ValueError as error:
         raise ConfigError(f"start, finish: {error}") from error
     except ConvergenceError as error:
@@ -440,13 +442,14 @@ def _switched(config: OpenConfig, number: int, origin: Point, changed: bool) -> 
             f"follow: {stage.follow!r}: a branch point is left with the number that led to it, {origin.system.free[0]}"
         )
     way = 1 if stage.way == "forward" else -1
-    settings = dataclasses.replace(_settings(config, number, origin[stage.follow]), direction=way)
+    settings = dataclasses.replace(_settings(config, number, origin.system, origin.x), direction=way)
     return settings, way * origin.details.tangents[1]
 
 
-def _settings(config: OpenConfig, number: int, here: float) -> Settings:
-    """Return the settings of a stage that starts where its number has the value ``here``."""
+def _settings(config: OpenConfig, number: int, system: Collocation, x: np.ndarray) -> Settings:
+    """Return the settings of a stage that starts at a state."""
     stage, steps = config.stages[number - 1], config.steps
+    here = system.parameter(x, stage.follow)
     to = stage.to / config.factor(stage.follow)
     reach = abs(to - here) or 1.0
     limits = {stage.follow: (min(to, here - reach), max(to, here + reach))}
@@ -456,4 +459,5 @@ def _settings(config: OpenConfig, number: int, here: float) -> Settings:
         primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
         max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits, zeros=zeros,
         mesh=_mesh_control(config), test_functions=config.strip(number).domain_tests(),
+        scales=config.strip(number).sizes(system, x),
     )  # fmt: skip

@@ -105,7 +105,7 @@ def _compute_missing(config: OpenSweep, folder: Path, display, run, kept: set[st
                     failed[name] = problem
                 settled += 1
                 display.sweep_done(_told(config, folder, name, problem), problem, settled)
-    return failed
+    return {name: failed[name] for name in config.branches if name in failed}
 
 
 def _told(config: OpenSweep, folder: Path, name: str, problem: str) -> list[str]:

@@ -17,8 +17,11 @@ from ribbon_model.laws import LAWS, label
 from ribbon_model.shape import Shape
 from ribbon_model.solution import Solution
 
+#: So many labelled points are shown at a prompt, a line each: a screen has 24 lines.
+_SHOWN = 20
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class StoredBranch:
     """A branch file in memory: the scene, the tables of points and of labelled points (structured arrays), the kept solutions.
 
@@ -36,6 +39,14 @@ class StoredBranch:
     t: np.ndarray
     states: np.ndarray
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        lines = [f"{type(self).__name__}({self.about}: {len(self.points)} points, {self.status}; {self.stop or 'not ended'})"]
+        for row, event in enumerate(self.events[:_SHOWN]):
+            label, name = event["label"].decode(), event["name"].decode()
+            lines.append(f"  point {event['point']:5d}  {label}  {self.place(row)}{f': {name}' if name else ''}")
+        more = len(self.events) - _SHOWN
+        return "\n".join([*lines, *([f"  ... {more} more in events"] if more > 0 else [])])
 
     def kept(self) -> np.ndarray:
         """Return the numbers of the points whose full solution is kept."""

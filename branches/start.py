@@ -7,7 +7,7 @@ import dataclasses
 from branches.config import Config, ConfigError
 from contin import BranchPoint, ContinError, Continuation, ConvergenceError, MeshControl, Newton, Settings, Stop
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
-from ribbon_model.laws import LAWS
+from ribbon_model.laws import LAWS, TwoBendings
 from ribbon_model.secondary import force, secondary_branch
 from ribbon_model.seeds import half_loop_branch, primary_branch
 from ribbon_model.solution import Solution
@@ -53,6 +53,8 @@ def seed(config: Config):
         system, x, tangent = _SEEDS[config.domain](
             LAWS[config.law], config.m, config.n, config.nu, config.mesh.intervals, config.mesh.degree, Gamma=config.Gamma
         )
+    except TwoBendings as error:
+        raise ConfigError(f"n: {error}") from error
     except (ConvergenceError, ValueError) as error:
         raise coarse from error
     expected = config.at_bifurcation()["kappa_n"]

@@ -7,6 +7,7 @@ from branches import interrupt
 if __name__ == "__main__":  # before the imports below, which take a second
     interrupt.begin(interrupt.NO_FILES)
 
+import argparse
 import math
 import sys
 from collections.abc import Sequence
@@ -14,9 +15,10 @@ from pathlib import Path
 
 from branches.display import Parser, complain, survive_any_encoding, write_output
 from branches.files import StoreError, check_picture
-from ribbon_model.strip import NAMES, Strip
+from branches.units import STRIP_UNITS, quantity
+from ribbon_model.strip import Strip
 
-_UNITS = {"poisson_ratio": "", "youngs_modulus": "Pa"}
+_HELP = {"": "Poisson's ratio", "Pa": "Pa, or with a unit as in 210GPa", "m": "m, or with a unit as in 5mm"}
 #: Most turns of a loop that --want and --chart take.
 _MOST_TURNS = 15
 
@@ -26,13 +28,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = Parser(
         prog="python -m branches.strip",
         description="A strip whose ends are joined: which circles are stable, what else there is, moments, energies, strains. "
-        "SI units.",
+        "Numbers are in SI units, or have a unit.",
     )
-    for name in NAMES:
-        unit = _UNITS.get(name, "m")
-        more = ", inf for a straight strip" if name == "natural_radius" else ""
-        help_text = f"{unit}{more}" if unit else "Poisson's ratio"
-        parser.add_argument(f"--{name.replace('_', '-')}", type=float, required=True, metavar="X", help=help_text)
+    for name, unit in STRIP_UNITS.items():
+        more = "; inf for a straight strip" if name == "natural_radius" else ""
+        parser.add_argument(
+            f"--{name.replace('_', '-')}", type=_Quantity(unit), required=True, metavar="X", help=f"{_HELP[unit]}{more}"
+        )
     parser.add_argument("--yield-strain", type=float, metavar="X", help="mark states with a larger strain")
     parser.add_argument("--want", type=float, metavar="J", help="which dimensions give a stable loop with a barrier of J")
     parser.add_argument("--chart", metavar="FILE", help="draw the barrier over width and natural curvature (.png, .pdf, .svg)")
@@ -48,6 +50,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         complain(f"error: {error}")
         return 2
     return _answer(strip, asked)
+
+
+class _Quantity:
+    """The type of an option with a unit."""
+
+    def __init__(self, unit: str):
+        self._unit = unit
+
+    def __call__(self, text: str) -> float:
+        try:
+            return quantity(text, self._unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _check(asked: dict) -> None:

@@ -56,7 +56,7 @@ def _law(strip: Strip) -> str:
 def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) -> str:
     """Return what the command prints, one screen; unless ``quiet``, a line of progress is shown meanwhile."""
     rings = circles(strip)
-    others, folds = buckled(strip, quiet)
+    others, folds, lost = buckled(strip, quiet)
     states = [*rings, *others]
     barriers = ways_out(states, quiet)
     foldings = by_hand(strip, states, barriers, quiet)
@@ -73,6 +73,7 @@ def answer(strip: Strip, yield_strain: float | None = None, quiet: bool = True) 
         ),
         "",
         *_buckled_lines(others, yield_strain),
+        *lost_lines(lost),
         *_fate(rings, [state for state in others if state.stable]),
         "",
         *_ways_out([state for state in states if state.stable], barriers),
@@ -134,6 +135,13 @@ def _buckled_lines(others: list[State], yield_strain) -> Iterator[str]:
     if rest:
         names = ", ".join(state.name.removeprefix("buckled ") for state in rest)
         yield f"{len(rest)} unstable buckled states here: {names}"
+
+
+def lost_lines(modes: list[tuple[int, int]]) -> Iterator[str]:
+    """Yield the branches that were not followed."""
+    if modes:
+        names = ", ".join(str(mode) for mode in modes)
+        yield f"not followed, because the law has two bendings for the moment where they begin: {names}"
 
 
 def _fate(rings: list[State], stable_others: list[State]) -> Iterator[str]:

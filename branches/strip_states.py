@@ -14,7 +14,7 @@ from ribbon_model import convexity, linear, stability
 from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.folding import Folding, folding
-from ribbon_model.laws import FINITE_WIDTH
+from ribbon_model.laws import FINITE_WIDTH, NoThreshold, TwoBendings
 from ribbon_model.second_variation import Equilibrium
 from ribbon_model.seeds import primary_branch
 from ribbon_model.segments import Strip as Segments
@@ -88,34 +88,45 @@ def _energy(strip: Strip, energy: float) -> float:
     return (energy + strip.kappa_n**2 / 2) * strip.energy_unit
 
 
-def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[str, float]]]:
+def buckled(strip: Strip, quiet: bool = True) -> tuple[list[State], list[tuple[str, float]], list[tuple[int, int]]]:
     """Return the states on the primary branches at the strip's natural curvature, and the folds on the branch (1, 2).
 
-    A fold is a pair (name, kappa_n). Unless ``quiet``, a line of progress is shown.
+    A fold is a pair (name, kappa_n). Third are the modes (m, n) whose branches begin where the law has two bendings for one
+    moment; they are not followed. Unless ``quiet``, a line of progress is shown.
     """
-    states, folds, seen = [], [], []
+    states, folds, lost, seen = [], [], [], []
     modes = [(m, n) for m in coverings(strip) for n in range(1, coverings(strip)[-1] + 2) if n != m]
     with Progress("branches", len(modes), quiet) as progress:
         for m, n in modes:
             progress.part(f"({m}, {n})")
             known = folds if (m, n) == (1, 2) else []
-            for point, equilibrium in at_natural_curvatures(m, n, [strip.kappa_n], strip.poisson_ratio, strip.Gamma, known):
+            try:
+                found = list(at_natural_curvatures(m, n, [strip.kappa_n], strip.poisson_ratio, strip.Gamma, known))
+            except TwoBendings:
+                found, lost = [], [*lost, (m, n)]
+            for point, equilibrium in found:
                 place = point["energy"], point["kappa_star"]
                 if not any(n == other and np.allclose(place, there, rtol=_SAME, atol=_SAME) for other, there in seen):
                     seen.append((n, place))
                     states.append(_state(strip, f"buckled ({m}, {n})", point, equilibrium))
             progress.part_done()
-    return states, folds
+    return states, folds, lost
 
 
 def at_natural_curvatures(
     m: int, n: int, kappas: Sequence[float], nu: float, Gamma: float, folds: list | None = None
 ) -> Iterator[tuple]:
-    """Yield the points of a branch at values of kappa_n, with their equilibria; its folds are added to ``folds``."""
+    """Yield the points of a branch at values of kappa_n, with their equilibria; its folds are added to ``folds``.
+
+    Raises
+    ------
+    TwoBendings
+        See `ribbon_model.seeds.primary_branch`.
+    """
     try:
         start = linear.thresholds(FINITE_WIDTH, m, n, nu, Gamma)[0]
-    except ValueError:
-        return  # no such bifurcation
+    except NoThreshold:
+        return
     limits = {"kappa_n": (min(start, *kappas) - _REACH, max(start, *kappas) + _REACH)}
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 8, 7, Gamma=Gamma)
     ends = convexity.test_functions(FINITE_WIDTH)

@@ -28,7 +28,7 @@ from ribbon_model.shape import Shape
 _NO_TURN = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StripProblem(BoundaryValueProblem):
     """The boundary value problem of a ``law`` ``on`` a domain."""
 

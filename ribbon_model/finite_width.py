@@ -251,12 +251,16 @@ def first_zero_of_t(nu: float, width: float) -> float | None:
 
 
 def hamiltonian(M1, M2, M3, kappa_n, nu, Gamma):
-    """Return H of an isotropic strip, the Legendre transform of U."""
-    return complementary(M1, M3, kappa_n, isotropic(nu, Gamma)) + kappa_n * kappa_n / 2
+    """Return H of an isotropic strip, the Legendre transform of U; lengths are in units of a single loop's radius."""
+    section = isotropic(nu, Gamma)
+    return complementary(M1, M3, kappa_n, section, section.C < _NARROW) + kappa_n * kappa_n / 2
 
 
-def complementary(M1, M3, kappa_n, section: Section):
+def complementary(M1, M3, kappa_n, section: Section, narrow=False):
     """Return the largest M.omega - U of a section near `start`; nan where U is not convex.
+
+    Where U - M.omega has two minima, a strip stays at the one from which it came. What is bent in the plane, from a circle or
+    from an arc, came from the outer one if it is wide, and from the inner one if it is ``narrow``.
 
     A search that starts like a ribbon does not cross omega_1 = 0 where U is concave there, since another minimum lies beyond.
     """
@@ -265,7 +269,7 @@ def complementary(M1, M3, kappa_n, section: Section):
     from contin import least  # loads compiled code, which circles do not need
 
     nu, plane, _, _, C = section
-    w1, w3, wide = start(M1, M3, kappa_n, section)
+    w1, w3, wide = start(M1, M3, kappa_n, section, narrow)
 
     def excess(w):
         squared = w[1] * w[1]
@@ -310,14 +314,13 @@ def ribbon_strains(M1, M3, kappa_n, section: Section):
     return w1 / stiff, eta * w1 / np.sqrt(stiff), (a > _LEAST * root) & (c > 0)
 
 
-def start(M1, M3, kappa_n, section: Section):
+def start(M1, M3, kappa_n, section: Section, narrow=False):
     """Return the strains at which the search for the minimum of U - M.omega starts, and whether they are the ribbon's.
 
     They are those of the ribbon where it is that wide, so that the search stays on the side omega_1 > 0 of the circles as
-    long as
-    there is a minimum. They are the flat rod's where the ribbon has none, and where the ribbon's other root, a < 0, has
-    omega_1 > 0
-    and M1 is negative: that root is no minimum of the ribbon's U, but a strip of finite width, nearly planar there, has one.
+    long as there is a minimum. They are the flat rod's where the ribbon has none, and where the ribbon's other root, a < 0, has
+    omega_1 > 0 and M1 is negative: that root is no minimum of the ribbon's U, but a strip of finite width, nearly planar there,
+    has one. If it is ``narrow`` the flat rod is stiffened there by its membrane.
     """
     import numpy as np
 
@@ -332,7 +335,7 @@ def start(M1, M3, kappa_n, section: Section):
     known = known & (section.C * w1 * w1 > _WIDE) & ~planar
     flat1, flat3 = flat_rod_strains(M1, M3, kappa_n, section)
     stiffer = section.C * (section.nu * kappa_n) ** 2 / (180 * section.plane)
-    flat1 = np.where(planar & (stiffer < _STIFF), flat1 / (1 + stiffer), flat1)
+    flat1 = np.where(planar & narrow, flat1 / (1 + stiffer), flat1)
     return np.where(known, w1, flat1), np.where(known, w3, flat3), known
 
 
@@ -346,9 +349,8 @@ _LEAST = 1e-12
 #: Rounds in which the strains of a ribbon are computed with the part of its membrane energy that a strip of this width has.
 #: With two, the branches (9, 5) and (1, 5) of the tests are followed; with none they end at jumps to another minimum.
 _ROUNDS = 2
-#: Stiffness of a small curvature by the membrane, g = 1/180, over that of the flat rod, below which U of a planar strip has one
-#: minimum or a second one that is shallow: the search then starts where this stiffness leads. Beyond, the circles may be the
-#: outer minimum (13 and more on (1, 5), (1, 7), (1, 10) of wide strips); on (2, 10), nu = .28, Gamma = 1.212, it is 2.9 to 4.
-_STIFF = 8.0
+#: x**4 of the single loop below which a strip is narrow: with less than 90, (1, 11) of nu = .1 is lost at its circle, with 100
+#: (1, 5) of nu = .49.
+_NARROW = 92.0
 #: x**4 from which the search starts like a ribbon.
 _WIDE = 1.0

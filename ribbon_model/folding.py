@@ -19,6 +19,7 @@ from contin import Collocation, Settings, follow
 from ribbon_model.domains import HALF_LOOP_BETWEEN_AXES
 from ribbon_model.equilibrium import directors
 from ribbon_model.laws import Law
+from ribbon_model.shown import Shown
 
 #: The free parameters with couples, at fixed kappa_n.
 _FREE = ("M2", "M1", "M3", "R1", "R3")
@@ -27,8 +28,8 @@ _INTERVALS, _DEGREE = 8, 7
 _LARGEST, _MOST = 100.0, 200
 
 
-@dataclass(frozen=True)
-class Folding:
+@dataclass(frozen=True, repr=False)
+class Folding(Shown):
     """The path from a circle to the first free state, with couples at two opposite points.
 
     Attributes

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from contin import Collocation, Continuation, TestFunction, Trial
-from ribbon_model.equilibrium import moment_on_directors
+from ribbon_model.equilibrium import moment_on_directors, strains_of
 from ribbon_model.laws import FINITE_WIDTH, RIBBON
 from ribbon_model.material import Material
 
@@ -57,6 +57,26 @@ def explained(material: Material, strains: Strains, run: Continuation) -> str | 
         if met or test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
             return f"{test.name}, {_REASONS[material.law]}"
     return None
+
+
+def at_guess(material: Material, times: np.ndarray, frames: np.ndarray) -> str | None:
+    """Return that the law of a ribbon has no value at a first guess, in a sentence; None where it has, and of other laws.
+
+    Parameters
+    ----------
+    times : ndarray, shape (K,)
+    frames : ndarray, shape (K, 4)
+        Quaternions of the guess.
+    """
+    if material.law != RIBBON.name:
+        return None
+    bending = strains_of((frames[1:] + frames[:-1]) / 2, np.diff(frames, axis=0) / np.diff(times)[:, None])[:, 0]
+    if bending.min() > _LEAST * abs(bending).max():
+        return None
+    return (
+        f"the law {RIBBON.name!r} has no value where the bending vanishes or is negative, as in this first state; take the law "
+        f"{FINITE_WIDTH.name!r}, which has a Gamma, or a first state that bends to the side of the normal all along"
+    )
 
 
 def _ribbon_margin(material: Material, trial: Trial) -> float:

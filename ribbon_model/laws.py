@@ -32,6 +32,10 @@ class NoThreshold(ValueError):
     """A mode without a bifurcation on a circle on which the law is regular."""
 
 
+class TwoBendings(ValueError):
+    """A circle whose moment belongs to two bendings; the law takes the other one."""
+
+
 @dataclass(frozen=True)
 class Law:
     """A material law.
@@ -60,6 +64,9 @@ class Law:
     constrained: bool
     parameters: tuple[str, ...] = ("nu",)
     energy: Callable[..., float] | None = None
+
+    def __repr__(self) -> str:
+        return f"<law {self.name!r}>"
 
     #: True if Gamma is a parameter.
     has_width: ClassVar[bool] = False

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ribbon_model import plate
+from ribbon_model import finite_width, plate
 from ribbon_model.finite_width import Section, ribbon_energy, section_derivatives, section_energy
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, LAWS, RIBBON, Law
 from ribbon_model.plate import RIGIDITIES
@@ -166,6 +166,16 @@ class Material:
         return {name: value for name, value in self.numbers.items() if math.isfinite(value)}
 
     @property
+    def stiffnesses(self) -> tuple[str, ...]:
+        """Names of the parameters that are stiffnesses; none where the bending modulus is one."""
+        return tuple(name for name in (*STIFFNESSES, "D11", "D22", "D66") if name in self.parameters)
+
+    @property
+    def stiffness(self) -> float:
+        """The smallest stiffness."""
+        return min((self.parameters[name] for name in self.stiffnesses), default=1.0)
+
+    @property
     def of_paper(self) -> Law | None:
         """The law of the paper; None for a rod."""
         return LAWS.get(self.law)
@@ -222,8 +232,8 @@ class Material:
         if self.orthotropic:
             return self._orthotropic_section()
         if law.has_width:
-            return lambda t, M1, M2, M3, kappa_n, p: (
-                complementary(M1, M2, M3, kappa_n, p.nu, p.Gamma * width(t, p) ** 2 / thickness(t, p)) - kappa_n * kappa_n / 2
+            return lambda t, M1, M2, M3, kappa_n, p: finite_width.complementary(
+                M1, M3, kappa_n, finite_width.isotropic(p.nu, p.Gamma * width(t, p) ** 2 / thickness(t, p))
             )
         return lambda t, M1, M2, M3, kappa_n, p: complementary(M1, M2, M3, kappa_n, p.nu) - kappa_n * kappa_n / 2
 

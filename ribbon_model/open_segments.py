@@ -24,13 +24,14 @@ from ribbon_model.open_strip import OpenStrip
 from ribbon_model.second_variation import cross_matrix
 from ribbon_model.segments import Chain
 from ribbon_model.shape import frames
+from ribbon_model.shown import Shown
 
 #: Tolerance of the conditions at the last end, the most Newton steps to it, and a violation from which none leads back.
 _HELD, _STEPS, _FAR = 1e-12, 12, 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class OpenChain(Chain):
+@dataclass(frozen=True, eq=False, repr=False)
+class OpenChain(Shown, Chain):
     """An open strip of N segments; length 1.
 
     Attributes

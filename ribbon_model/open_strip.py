@@ -27,6 +27,7 @@ from ribbon_model.integral_conditions import PHASES, Roller
 from ribbon_model.loads import FORCES, LOADS, STROKE
 from ribbon_model.material import Material
 from ribbon_model.shape import Shape, shape_of
+from ribbon_model.shown import Shown
 
 #: Columns of the reactions.
 REACTIONS = tuple(
@@ -39,8 +40,8 @@ _ZERO = 1e-10
 _MOST_PHASES = 2
 
 
-@dataclass(frozen=True)
-class OpenStrip:
+@dataclass(frozen=True, repr=False)
+class OpenStrip(Shown):
     """A strip between two ends.
 
     Attributes
@@ -261,11 +262,11 @@ class OpenStrip:
                 and self._rigid_freedom(guess[1], self.parameters | (values or {}))
             ):
                 reason = RIGID  # round-off decides whether the solver or the index notices
-            raise ProblemError(self._with_phases(reason, guess, values, options)) from error
+            raise ProblemError(self._law_at(guess) or self._with_phases(reason, guess, values, options)) from error
         try:
             self.check_determined(point)
         except ProblemError as error:
-            raise ProblemError(self._with_phases(str(error), guess, values, options)) from error
+            raise ProblemError(self._law_at(guess) or self._with_phases(str(error), guess, values, options)) from error
         return point
 
     def _with_phases(self, reason: str, guess, values: Mapping[str, float] | None, options: Mapping) -> str:
@@ -296,6 +297,15 @@ class OpenStrip:
         except ContinError:
             return False
         return not point.phase_loads()
+
+    def _law_at(self, guess) -> str | None:
+        """Return that the law has no value at a guess, in a sentence; None where it has, or where the guess is a point."""
+        if isinstance(guess, Point):
+            return None
+        if not callable(guess):
+            return law_end.at_guess(self.material, guess[0], guess[1][:, :4])
+        times = np.linspace(0, 1, 401)
+        return law_end.at_guess(self.material, times, np.array([guess(t)[:4] for t in times]))
 
     def _natural_guess(self):
         s = np.linspace(0, 1, 401)
@@ -362,6 +372,20 @@ class OpenStrip:
         by_ends = np.concatenate([jacobian[:count, :n], jacobian[:count, 2 * n : 3 * n]], axis=1)
         motions = np.array([np.concatenate([_moved(states[i, :7], k, n) for i in (0, -1)]) for k in range(6)])
         return int(np.linalg.matrix_rank(by_ends @ motions.T, tol=LOOSE)) < 6
+
+    def sizes(self, system: Collocation, x: np.ndarray) -> dict[str, float]:
+        """Return the sizes of states and numbers for `contin.Settings.scales`, at a state.
+
+        The length of the strip is one, and so are the sizes of places and angles. All forces and moments have one size, that of
+        the smallest stiffness or of the largest among them: a component that is small here, or nothing but round-off, is not
+        small by its nature.
+        """
+        known = {**self.parameters, **dict(zip((*system.problem.states, *system.free), system.largest(x)))}
+        stiffness = min((known[name] for name in self.material.stiffnesses), default=1.0)
+        forces = [name for name in known if name.startswith(("lam_", "sigma_")) or name in LOADS]
+        force = max(stiffness, *(abs(known[name]) for name in forces))
+        places = [name for name in known if name not in (*forces, *self.material.parameters)]
+        return dict.fromkeys(places, 1.0) | dict.fromkeys(forces, force)
 
     # --- where the law ends -------------------------------------------------------------------------------------------
 

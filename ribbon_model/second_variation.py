@@ -30,6 +30,7 @@ from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP, 
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
 from ribbon_model.shape import frames
+from ribbon_model.shown import Shown
 
 _HALF_TURN = np.array([1.0, -1.0, -1.0])  # about d1
 #: Degree on the mesh of a circle, and the phase in radians by which the highest wave of interest turns on an interval: there
@@ -70,8 +71,8 @@ class Symmetry:
         return self.mirror or self.axis
 
 
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(Shown):
     """A closed equilibrium, B = 1, L = 2 pi.
 
     Attributes

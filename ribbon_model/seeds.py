@@ -6,8 +6,12 @@ import numpy as np
 
 from contin import Collocation, locate_branch_point
 from ribbon_model.domains import CELL, HALF_LOOP
-from ribbon_model.laws import Law
+from ribbon_model.laws import Law, TwoBendings
 from ribbon_model.linear import circle, thresholds
+
+#: Difference of bendings, relative to that of the circle, up to which they are those of one minimum: it is 1e-9 at most there,
+#: where U is nearly not convex. Two minima differ by more than a tenth.
+_SAME_BENDING = 1e-3
 
 
 def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, degree: int = 4, root: int = 0, Gamma=None):
@@ -27,7 +31,8 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
     Raises
     ------
     ValueError
-        n = m, a threshold that does not exist, or m / n even.
+        n = m, a threshold that does not exist, or m / n even; `TwoBendings` where the law has another bending for the circle's
+        moment.
 
     Examples
     --------
@@ -40,7 +45,7 @@ def primary_branch(law: Law, m: int, n: int, nu: float, intervals: int = 10, deg
         raise ValueError(f"m = {m}, n = {n}: with m / n even the symmetry of the mode does not close the loop")
     kappa_n = thresholds(law, m, n, nu, Gamma)[root]
     system = CELL.discretize(law, intervals, degree, law.values(nu, Gamma) | CELL.wave(m, n, kappa_n))
-    return leave_circle(system, CELL.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
+    return leave_circle(system, CELL.circle(system, m, kappa_n, _moment(law, m, n, kappa_n, nu, Gamma)))
 
 
 def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, degree: int = 4, root: int = 0, Gamma=None):
@@ -55,7 +60,25 @@ def half_loop_branch(law: Law, m: int, n: int, nu: float, intervals: int = 40, d
     """
     kappa_n = thresholds(law, m, n, nu, Gamma)[root]
     system = HALF_LOOP.discretize(law, intervals, degree, law.values(nu, Gamma))
-    return leave_circle(system, HALF_LOOP.circle(system, m, kappa_n, circle(law, m, kappa_n, nu, Gamma)["M1"]))
+    return leave_circle(system, HALF_LOOP.circle(system, m, kappa_n, _moment(law, m, n, kappa_n, nu, Gamma)))
+
+
+def _moment(law: Law, m: int, n: int, kappa_n: float, nu: float, Gamma: float | None) -> float:
+    """Return the moment of a circle where its branch begins.
+
+    Raises
+    ------
+    TwoBendings
+        The law has another bending for it.
+    """
+    moment: float = circle(law, m, kappa_n, nu, Gamma)["M1"]
+    bending = law.linearized(np.array([[moment, 0.0, 0.0]]), kappa_n, *law.values(nu, Gamma).values())[0][0, 0]
+    if not abs(bending - m) < _SAME_BENDING * m:
+        raise TwoBendings(
+            f"m = {m}, n = {n}: the strain energy of the circle where the branch begins, at kappa_n = {kappa_n:.6g}, has two "
+            f"minima, and the law {law.name!r} takes the other one; it holds for smaller n"
+        )
+    return moment
 
 
 def leave_circle(system: Collocation, circle: np.ndarray):

@@ -18,6 +18,7 @@ from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import Law
 from ribbon_model.second_variation import Equilibrium, cross_matrix
 from ribbon_model.shape import Shape
+from ribbon_model.shown import Shown
 
 _CLOSED = 1e-12  # tolerance of the conditions of closure
 
@@ -158,8 +159,8 @@ class Chain:
 # --- the discrete strip -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class Strip(Chain):
+@dataclass(frozen=True, eq=False, repr=False)
+class Strip(Shown, Chain):
     """A strip of segments of constant strain; B = 1, L = 2 pi. The directors at S = 0 are the lab axes, x(0) is the origin.
 
     Attributes

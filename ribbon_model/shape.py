@@ -10,10 +10,11 @@ import numpy as np
 
 from contin import basis, interpolation
 from ribbon_model.equilibrium import directors
+from ribbon_model.shown import Shown
 
 
-@dataclass(frozen=True)
-class Shape:
+@dataclass(frozen=True, repr=False)
+class Shape(Shown):
     """A strip in space, or a part of it.
 
     Attributes

@@ -14,11 +14,12 @@ from ribbon_model.equilibrium import LENGTH, on_directors
 from ribbon_model.laws import Law
 from ribbon_model.second_variation import Equilibrium, from_solution
 from ribbon_model.shape import Shape, frames, interpolated, quadrature_centreline, quaternions
+from ribbon_model.shown import Shown
 from ribbon_model.stability import Stability
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(Shown):
     """An equilibrium of a closed strip, on the domain that it was computed on; B = 1, L = 2 pi.
 
     Attributes

@@ -225,6 +225,9 @@ class Continuation:
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
 
+    def __repr__(self) -> str:
+        return f"Continuation({self.state!r}; {self.stop or 'not ended'})"
+
     def _check(self, system: Discretization) -> None:
         threads.count()  # refuses a wrong number, also where the problem is too small to use it
         if len(system.free) != system.problem.free_size:

@@ -79,6 +79,9 @@ class Floquet:
     errors: Array
     unstable: int
 
+    def __repr__(self) -> str:
+        return f"Floquet({len(self.logarithms)} multipliers, {self.unstable} unstable; the largest {self.multipliers[0]:.6g})"
+
     @property
     def multipliers(self) -> ComplexArray:
         """The multipliers, shape (n,): infinite or zero where no number holds them."""

@@ -19,6 +19,9 @@ _IDLE = 1e3
 #: A value where the bracket closes is no zero if it is above this part of the larger one at its first ends: the function jumps.
 #: At a zero with an infinite slope, as of a square root, it is 1e-6 of them.
 _JUMP = 1e-3
+#: Part of the first bracket in which a function has come down to `_JUMP` of its values, even with the slope of a cube root, or
+#: jumps. Ten times larger saves three evaluations of 30 where it jumps, and takes such a root for a jump.
+_CLOSED = _JUMP**3
 #: A value at one end below this part of that at the other is round-off of zero.
 _NOISE = 1e-13
 #: A zero takes 4 evaluations on average; where as many as bisection to round-off would need do not do, the function jumps.
@@ -50,7 +53,7 @@ def find_zero(
     (a, fa), (b, fb) = left, right
     if fa == 0 or fb == 0:
         return a if fa == 0 else b
-    known = [left, right]
+    known, beyond, closed = [left, right], fa, _CLOSED * abs(b - a)
     best, idle, c, fc = (np.inf, b), 0, guess, np.nan
     small, least = _JUMP * max(abs(fa), abs(fb)), min(abs(fa), abs(fb))
     level = least / 2 if least > _NOISE * max(abs(fa), abs(fb)) else np.inf  # a value that stays above it has not come nearer
@@ -63,11 +66,13 @@ def find_zero(
         if fc == 0:
             return c
         if (fc < 0) != (fb < 0):
-            a, fa = b, fb
+            a, fa, beyond = b, fb, fb
         else:
             shrink = 1 - fc / fb
             fa *= shrink if shrink > 0 else 0.5
         b, fb = c, fc
+        if abs(b - a) < closed and min(abs(beyond), abs(fb)) > small:
+            break
         known = [*known[-2:], (c, fc)]
         following = _interpolated(known)
         if following is None:

@@ -66,6 +66,9 @@ class SecondVariation:
     _vectors: Array
     _profile: _Profile
 
+    def __repr__(self) -> str:
+        return f"SecondVariation({len(self.eigenvalues)} eigenvalues, {self.index()} of them negative)"
+
     def index(self, nullity: int = 0) -> int:
         """Return the number of negative eigenvalues, without the ``nullity`` ones that are nearest to zero."""
         values = self.eigenvalues[np.argsort(np.abs(self.eigenvalues))[nullity:]]

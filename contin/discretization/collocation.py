@@ -469,7 +469,18 @@ class Collocation(System):
 
     def switching(self, x: Array) -> Switching:
         """Return where conditions on states or free parameters switch along a solution, and the equations are not smooth."""
-        return joined([switching(self, *each, x) for each in self._with_sizes(x)]) if self._selections else NOWHERE
+        if not self._selections:
+            return NOWHERE
+        if not any(np.array_equal(x, known) for known, _ in self._switchings):
+            parts = [switching(self, each, functools.partial(self._sizes_of, name, x), x) for name, each in self._selections]
+            found = joined(parts)
+            self._switchings[:] = [(x.copy(), found)]
+        return self._switchings[0][1]
+
+    @functools.cached_property
+    def _switchings(self) -> list[tuple[Array, Switching]]:
+        """The solution that was looked at last, and where conditions switch along it: a point is asked for several times."""
+        return []
 
     def bends(self, x: Array) -> Array | None:
         """Return by how much the second derivatives of the states jump at the inner mesh points, relative to the largest ones.
@@ -513,19 +524,17 @@ class Collocation(System):
         found = [(name, self.problem.batch(name).selections(self._free)) for name in names]
         return [(name, each) for name, each in found if each is not None]
 
-    def _with_sizes(self, x: Array) -> list[tuple[Selections, Array]]:
-        """Return the conditions with the sizes of what the values of the functions are integrated to."""
+    def _sizes_of(self, name: str, x: Array) -> Array:
+        """Return the sizes of what the values of a function are integrated to."""
         sizes = self.largest(x)[: self._n] + 1
-        length, found = self.mesh[-1] - self.mesh[0], []
-        for name, each in self._selections:
-            with np.errstate(all="ignore"):
-                given = self._times, self.states_at_gauss_points(x), _NONE(self._n), self.all_parameters(x)
-                largest = length * np.nan_to_num(np.abs(self.problem.batch(name).values(*given)).max(axis=0))
-            largest[largest == 0] = 1.0
-            if name == "field":
-                largest[: self._n] = sizes if self.scales is None else sizes * self.scales.states
-            found.append((each, largest))
-        return found
+        with np.errstate(all="ignore"):
+            given = self._times, self.states_at_gauss_points(x), _NONE(self._n), self.all_parameters(x)
+            values = np.abs(self.problem.batch(name).values(*given)).max(axis=0)
+        largest: Array = (self.mesh[-1] - self.mesh[0]) * np.nan_to_num(values)
+        largest[largest == 0] = 1.0
+        if name == "field":
+            largest[: self._n] = sizes if self.scales is None else sizes * self.scales.states
+        return largest
 
     def on_breaks(self) -> Collocation:
         """Return the same problem on a mesh of as many intervals, with the breaks among its points."""

@@ -13,6 +13,7 @@ closed form.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,8 +21,9 @@ import numpy as np
 from contin.arrays import Array, Indices
 from contin.functions.batch import Selections
 
-#: Halvings of the part of an interval in which a switch happens: down to the last digit of its ends.
-_HALVINGS = 50
+#: Divisions of the part of an interval in which a switch happens into 32, down to the last digit of its ends. The 31 places
+#: between are one block of the interpreter: they take as long as one.
+_DIVISIONS, _DIVIDED = 10, np.arange(33) / 32
 #: Places on each side of a switch where the gap is looked at, as parts of the distance to the end.
 _PARTS = np.array([0.1, 0.4, 0.7, 1.0])
 #: Half an interval's cost, relative to the size of the state, below which a selection is smooth. It is round-off of the usual
@@ -68,15 +70,15 @@ class Switching(NamedTuple):
 NOWHERE = Switching(np.empty(0), np.empty(0), np.empty(0, dtype=bool), ())
 
 
-def switching(system: Any, selections: Selections, sizes: Array, x: Array) -> Switching:
+def switching(system: Any, selections: Selections, sizes: Callable[[], Array], x: Array) -> Switching:
     """Return the places of a solution where conditions switch, without those of smooth selections.
 
     Parameters
     ----------
     system : Collocation
     selections : Selections
-    sizes : ndarray, shape (values,)
-        Sizes of what the values of the functions are integrated to.
+    sizes : callable
+        ``sizes()`` are those of what the values of the functions are integrated to, shape (values,).
     x : ndarray
         A solution.
     """
@@ -85,28 +87,41 @@ def switching(system: Any, selections: Selections, sizes: Array, x: Array) -> Sw
     def sides(t: Array) -> Array:
         return selections.sides(t, system.evaluate(x, t), p)
 
+    mesh = system.mesh
+
+    def largest(times: Array, places: Array, which: Indices) -> Array:
+        """Return the largest gap of each switch at its times (K, parts), shape (K, parts)."""
+        gaps = selections.gaps(times.ravel(), system.evaluate(x, times.ravel()), p)
+        away = np.abs(times - places[:, None]) / (mesh[-1] - mesh[0])
+        return _of_selection(selections, gaps / units, which, away)
+
+    def worst(places: Array, ends: Array, which: Indices) -> Array:
+        """Return the largest gap of each switch between its place and an end, shape (K,)."""
+        found: Array = largest(places[:, None] + (ends - places)[:, None] * _PARTS, places, which).max(axis=1)
+        return found
+
     with np.errstate(all="ignore"):
-        places, which = _zeros(sides, _sampled(system, selections, x, p))
-        if not places.size:
+        a, b, which = _brackets(*_sampled(system, selections, x, p))
+        if not a.size:
             return NOWHERE
-        mesh = system.mesh
-        at = np.clip(np.searchsorted(mesh, places, side="right") - 1, 0, mesh.size - 2)
+        units = sizes()[selections.of_gaps[:, 1]]
+        at = np.clip(np.searchsorted(mesh, (a + b) / 2, side="right") - 1, 0, mesh.size - 2)
         half = (mesh[at + 1] - mesh[at]) / 2
-
-        def largest(times: Array) -> Array:
-            """Return the largest gap of each switch at its times (K, parts), shape (K, parts)."""
-            gaps = selections.gaps(times.ravel(), system.evaluate(x, times.ravel()), p)
-            away = np.abs(times - places[:, None]) / (mesh[-1] - mesh[0])
-            return _of_selection(selections, gaps / sizes[selections.of_gaps[:, 1]], which, away)
-
+        ends = np.array([np.maximum(a - half, mesh[0]), np.minimum(b + half, mesh[-1])])
+        # a selection that is smooth so far out needs no place: to find places costs most
+        rough = np.fmin(worst(a, ends[0], which), worst(b, ends[1], which)) * half > _SMOOTH
+        if not rough.any():
+            return NOWHERE
+        which, at, half = which[rough], at[rough], half[rough]
+        places = _narrowed(sides, a[rough], b[rough], which)
         ends = np.array([np.maximum(places - half, mesh[0]), np.minimum(places + half, mesh[-1])])
         inside = np.array([mesh[at], mesh[at + 1]])
-        worst = [largest(places[:, None] + (end - places)[:, None] * _PARTS).max(axis=1) for end in ends]
-        missed = [largest(places[:, None] + (end - places)[:, None] * _PARTS).max(axis=1) for end in inside]
-        beside = [largest((places + (end - places) * _AT_ONCE)[:, None])[:, 0] for end in ends]
-        kept = np.fmin(worst[0], worst[1]) * half > _SMOOTH
+        gap = np.fmin(*[worst(places, end, which) for end in ends])
+        missed = [worst(places, end, which) for end in inside]
+        beside = [largest((places + (end - places) * _AT_ONCE)[:, None], places, which)[:, 0] for end in ends]
+        kept = gap * half > _SMOOTH
         costs = np.fmin(missed[0] * (places - inside[0]), missed[1] * (inside[1] - places))
-        jumps = np.fmin(*beside) > _JUMP * np.fmin(*worst)
+        jumps = np.fmin(*beside) > _JUMP * gap
     edge = _APART * (mesh[-1] - mesh[0])
     known = np.concatenate([[mesh[0], mesh[-1]], system.breaks])
     kept &= (np.abs(places[:, None] - known) > edge).all(axis=1)
@@ -121,16 +136,23 @@ def _sampled(system: Any, selections: Selections, x: Array, p: Array) -> tuple[A
     return times, selections.sides(times, system.evaluate(x, times), p)
 
 
-def _zeros(sides: Any, sampled: tuple[Array, Array]) -> tuple[Array, Indices]:
-    """Return the times at which conditions switch, and the numbers of the conditions."""
-    times, there = sampled
+def _brackets(times: Array, there: Array) -> tuple[Array, Array, Indices]:
+    """Return the times before and behind each switch of a condition, and the numbers of the conditions."""
     at, which = np.nonzero(there[1:] != there[:-1])
-    a, b, first = times[at], times[at + 1], there[at, which]
-    for _ in range(_HALVINGS if at.size else 0):
-        middle = (a + b) / 2
-        same = sides(middle)[np.arange(at.size), which] == first
-        a, b = np.where(same, middle, a), np.where(same, b, middle)
-    return b, which
+    return times[at], times[at + 1], which
+
+
+def _narrowed(sides: Any, a: Array, b: Array, which: Indices) -> Array:
+    """Return the times between a and b at which conditions switch."""
+    each = np.arange(a.size)
+    first = sides(a)[each, which]
+    for _ in range(_DIVISIONS):
+        times = a[:, None] + (b - a)[:, None] * _DIVIDED
+        there = sides(times[:, 1:-1].ravel()).reshape(a.size, _DIVIDED.size - 2, -1)[each, :, which]
+        switched = np.column_stack([there != first[:, None], np.full(a.size, True)])
+        at = switched.argmax(axis=1)
+        a, b = times[each, at], times[each, at + 1]
+    return b
 
 
 def _of_selection(selections: Selections, gaps: Array, which: Indices, away: Array) -> Array:

@@ -21,7 +21,7 @@ from contin.problems.angles import angle_periods, check_periodic
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AlgebraicProblem(Restated):
     """F(u, p) = 0, or the equilibria of u' = F(u, p).
 

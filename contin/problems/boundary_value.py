@@ -16,7 +16,7 @@ from contin.functions.signature import Arguments, Signature, argument_count, res
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BoundaryValueProblem(Restated):
     """u' = rhs(t, u, p) on ``domain``, with conditions at both ends and under the integral.
 

@@ -57,6 +57,11 @@ class Restated:
 
     _stated: dict[str, Any]
 
+    def __repr__(self) -> str:
+        statement: Any = self
+        states, parameters = checks.listed(statement.states), checks.listed(statement.parameters)
+        return f"{type(self).__name__}(states {states}; parameters {parameters or 'none'})"
+
     def __new__(cls, *arguments: Any, **options: Any) -> Any:
         """Note the arguments."""
         made = super().__new__(cls)

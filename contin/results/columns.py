@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from contin import checks
 from contin.arrays import Array
 from contin.discretization.basis import basis
 from contin.results.storage import contents
@@ -53,6 +54,10 @@ class StoredColumns:
     stop: str
     states: tuple[str, ...]
     profiles: list[tuple[Array, Array]]
+
+    def __repr__(self) -> str:
+        labels = checks.listed(filter(None, self.labels))
+        return f"StoredColumns({len(self.labels)} points, columns {checks.listed(self.columns)}: {labels}; {self.stop})"
 
 
 def read_columns(path: str | Path) -> StoredColumns:

@@ -262,6 +262,28 @@ def test_how_processes_start_makes_no_difference(computed_here, tmp_path, monkey
     assert all(map(np.array_equal, computed_here, points_of(tmp_path)))
 
 
+def test_the_order_in_which_processes_are_done_makes_no_difference(tmp_path, monkeypatch):
+    """The same files, and the failed branches in the same order."""
+    scene, compute, files = parse("{m: [1, 3], n: [4, 5], stride: 20}", "scene"), diagrams.compute, []
+
+    def failing(config):
+        return RuntimeError(f"({config.m}, {config.n})") if config.n == 5 else compute(config)
+
+    for order in (list, reversed):
+
+        def finished(source, function, submit, limit, wait, order=order):
+            jobs = []
+            while (job := source([])) is not None:
+                jobs.append(job)
+            yield from [(job, failing(job)) for job in order(jobs)]
+
+        monkeypatch.setattr(diagrams, "run_jobs", finished)
+        folder = tmp_path / order.__name__
+        assert run_diagram(scene, folder, Display(silent=True), workers=1) == "lost"
+        files.append([(folder / name).read_bytes() for name in ("diagram.json", "diagram.graphml")])
+    assert files[0] == files[1]
+
+
 def test_two_runs_into_one_folder(tmp_path):
     scene = parse(PAIR, "scene")
     with only_run(tmp_path / "diagram.json"), pytest.raises(StoreError, match="another run"):

@@ -1,6 +1,7 @@
 """Scenes of open strips: what is asked of them, their files, pictures and pages. Their numbers: test_open_independent."""
 
 import math
+import re
 import signal
 
 import numpy as np
@@ -85,6 +86,16 @@ def test_the_file(tip):
     assert np.allclose(shape.centreline[-1], [last["shear"], last["rise"], last["distance"]], atol=1e-8)
     with pytest.raises(StoreError, match="films and loops"):
         branch.solution(0)
+
+
+def test_the_file_is_printed_on_a_screen(tip):
+    branch = read_branch(tip)
+    lines = repr(branch).splitlines()
+    assert lines[0].startswith(f"OpenBranch({branch.about}: {len(branch.points)} points, complete; ")
+    assert len(lines) == 1 + len(branch.events) and "of stage 2" in lines[-1]
+    strip = branch.scene.strip()
+    for found in (strip, strip.problem, branch.shape(0)):
+        assert len(repr(found)) < 400 and "\n" not in repr(found) and " 0x" not in repr(found)
 
 
 def test_run_again_and_resume(tip, root, capsys):
@@ -354,3 +365,56 @@ def test_notes_of_stages(tmp_path, capsys):
     assert [note[:31] for note in notes] == [f"stage {i}: phases: lam_phase_spin" for i in (1, 2, 2)]
     assert len(set(notes)) == 3 and all(note in shown for note in notes)
     assert "= -33.3853" in notes[-1]
+
+
+# --- sizes of states and numbers ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("B2", [1.0001, 1.001, 1.01])
+def test_a_strip_whose_components_are_small_at_first(B2, tmp_path):
+    """A rod that is nearly isotropic: half a twist leaves the circle plane but for (B2 - 1)**2, which is no size of its place.
+
+    At B2 = 1 bending and twist are even, and the energy is (2 pi)**2/2 + pi**2/2; at B2 = 10 it is that of the branch from 1.2
+    on, on 40 intervals.
+    """
+    text = (
+        f"material: {{law: rod, B1: 1, B2: {B2}, C: 1}}\nclosed: {{half_twists: 1}}\nbegin: circle\nphases: ['shift, left']\n"
+        "stages: [{follow: B2, to: 10}]\n"
+    )
+    assert run_stages(parse(text, "scene"), tmp_path / "moebius.h5", Display(silent=True)) == "complete"
+    branch = read_branch(tmp_path / "moebius.h5")
+    assert len(branch.points) < 40
+    first, last = branch.events[0], branch.events[-1]
+    assert first["energy"] == pytest.approx(2.5 * math.pi**2, rel=(B2 - 1))
+    assert last["energy"] == pytest.approx(37.24952826, abs=1e-8) and last["error_energy"] < 1e-10
+
+
+def test_a_stage_that_begins_at_round_off(tmp_path, capsys):
+    """A weight that was taken to zero and is 1e-29 there: the next stage goes on as from zero, and zero is what is printed."""
+    text = (
+        "material: {law: rod, B1: 1, B2: 4, C: 0.8}\nfinish: free\n"
+        "stages: [{follow: weight, to: 5}, {follow: weight, to: -5}, {follow: weight, to: 0}, {follow: weight, to: 3}]\n"
+    )
+    assert run_stages(parse(text, "scene"), tmp_path / "weight.h5", Display()) == "complete"
+    branch = read_branch(tmp_path / "weight.h5")
+    assert len(branch.points) < 60 and branch.events[-1]["weight"] == pytest.approx(3, rel=1e-15)
+    forth = [event["rise"] for event in branch.events if math.isclose(abs(event["weight"]), 5)]
+    assert forth == pytest.approx([-0.4959050446, -0.4959050446, 0.4959050446, 0.4959050446], abs=1e-9)
+    assert not re.search(r"(weight = |EP .*[ \d.])e-\d\d ", capsys.readouterr().out)
+
+
+def test_sizes_of_an_open_strip():
+    """Places and angles have the size of the length; forces and moments have one size."""
+    scene = parse(
+        "material: {law: rod, B1: 1.0e-3, B2: 2, C: 2.0e-3}\nnumbers: {distance: 0.9}\nbegin: arch\n"
+        "stages: [{follow: distance, to: 0.8}]\n", "scene"
+    )  # fmt: skip
+    strip, point = scene.strip(), first_state(scene)
+    sizes = strip.sizes(point.system, point.x)
+    assert {sizes[name] for name in ("q0", "q3", "x1", "x3", "distance", "turn")} == {1.0}
+    forces = {size for name, size in sizes.items() if name.startswith(("lam_", "sigma_"))}
+    states = point.system.states(point.x)
+    assert (
+        forces == {max(abs(states[:, 7:]).max(), *(abs(point[name]) for name in strip.problem.multipliers))}
+        and "B1" not in sizes
+    )

@@ -1,5 +1,6 @@
 """Result files: what they hold, that they are whole at any instant, and that docs/file-format.md tells the truth."""
 
+import dataclasses
 import errno
 import os
 import re
@@ -19,6 +20,7 @@ from branches.files import StoreError, prepare, write_bytes
 from branches.job import run_branch
 from branches.read import read_branch
 from branches.store import open_branch
+from ribbon_model.segments import discretized
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +69,22 @@ def test_solutions_belong_to_their_points(results):
         assert parameters["kappa_n"] == branch.points[point]["kappa_n"]
     with pytest.raises(StoreError, match="point 1 is not kept"):
         branch.solution(1)
+
+
+def test_a_result_is_printed_on_a_screen(results):
+    """The branch with its labelled points, and what is made of it: lines and no numbers of arrays."""
+    branch = read_branch(results / "m1_n2.h5")
+    lines = repr(branch).splitlines()
+    assert lines[0] == f"StoredBranch({branch.about}: {len(branch.points)} points, complete; {branch.stop})"
+    assert [line.split()[:3] for line in lines[1:]] == [
+        ["point", str(event["point"]), event["label"].decode()] for event in branch.events
+    ]
+    many = dataclasses.replace(branch, events=np.tile(branch.events, 30))
+    assert len(repr(many).splitlines()) <= 24 and repr(many).endswith("... 70 more in events")
+    solution = branch.solution(0)
+    equilibrium = solution.equilibrium()
+    for found in (solution, solution.shape(), equilibrium, discretized(equilibrium, 24), solution.law):
+        assert len(repr(found)) < 400 and "\n" not in repr(found) and " 0x" not in repr(found)
 
 
 def test_a_kept_solution_is_a_closed_strip(results):

@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from branches import strip_report, strip_states
 from branches.config import ConfigError, DiagramConfig, dump, load, parse
 from branches.strip import main
 from branches.strip_report import assumptions, deviations
 from branches.strip_states import buckled, circles, ways_out
 from branches.strip_wants import answer, barrier, barriers_at
+from branches.units import quantity
 from ribbon_model.exact_finite_width import curve
-from ribbon_model.laws import FINITE_WIDTH, RIBBON
+from ribbon_model.laws import FINITE_WIDTH, RIBBON, TwoBendings
 from ribbon_model.linear import energy_interval, thresholds
 from ribbon_model.strip import Strip
 
@@ -40,6 +42,57 @@ SCENE = (
 )
 
 
+@pytest.mark.parametrize(
+    ("text", "metres"),
+    [("5mm", 0.005), ("0.2m", 0.2), (" 30 mm ", 0.03), ("5.65 mm", 0.00565), ("3e1cm", 0.3), ("9um", 9e-6),
+     ("1 \u00b5m", 1e-6), (".5in", 0.0127), ("0.0127", 0.0127), ("inf", math.inf)],
+)  # fmt: skip
+def test_lengths_with_units(text, metres):
+    assert quantity(text, "m") == metres
+
+
+@pytest.mark.parametrize("text", ["5 furlong", "mm", "", "5 m m", "1,5mm", "5Mm", "5 GPa"])
+def test_lengths_that_are_none(text, capsys):
+    with pytest.raises(SystemExit):
+        main(["--width", text, *OPTIONS[2:]])
+    message = "must be a number (in m), or one with a unit: m, cm, mm, um or in"
+    assert f"error: argument --width: {text!r} {message}" in capsys.readouterr().err
+
+
+def test_dimensions_of_scenes_with_units():
+    units = {".016": "16 mm", ".00012": "0.12mm", ".6": "60 cm", ".03": "30mm", "200.0e9": "200 GPa"}
+    with_units = re.sub(r"[.\d]+(e9)?(?=[,}])", lambda found: units.get(found[0], found[0]), SCENE)
+    assert with_units.count("mm") == 3 and parse(with_units, "x") == parse(SCENE, "x")
+    with pytest.raises(ConfigError, match="x: strip: width: '16 mmm' must be a number"):
+        parse(with_units.replace("16 mm", "16 mmm"), "x")
+    scene = (
+        "dimensions: {width: 20 mm, thickness: .5mm, length: 300 mm, poisson_ratio: 0.3, youngs_modulus: 200 GPa}\n"
+        "material: {}\nnumbers: {distance: .29}\nbegin: arch\nstages: [{follow: distance, to: .2}]\n"
+    )
+    assert parse(scene, "x").dimensions.model_dump() == {
+        "width": 0.02, "thickness": 0.0005, "length": 0.3, "poisson_ratio": 0.3, "youngs_modulus": 200e9
+    }  # fmt: skip
+    with pytest.raises(ConfigError, match="dimensions.length: '300 apples' must be a number"):
+        parse(scene.replace("300 mm", "300 apples"), "x")
+
+
+def test_branches_that_are_not_followed_are_named(monkeypatch):
+    """Where the law has another bending for the moment of their circles; the others are there."""
+
+    def at(m, n, *_):
+        if n > 4:
+            raise TwoBendings("another")
+        yield from ()
+
+    monkeypatch.setattr(strip_states, "at_natural_curvatures", at)
+    monkeypatch.setattr(strip_states, "coverings", lambda strip: range(1, 6, 2))
+    states, folds, lost = buckled(TAPE)
+    assert not states and lost == [(1, 5), (1, 6), (3, 5), (3, 6), (5, 6)]
+    (line,) = strip_report.lost_lines(lost)
+    assert line.endswith("for the moment where they begin: (1, 5), (1, 6), (3, 5), (3, 6), (5, 6)")
+    assert not list(strip_report.lost_lines([]))
+
+
 def test_energies_and_moments_of_a_narrow_strip_are_those_of_a_beam():
     """Gamma = .1: E I (1/r - 1/R_n) and its square over 2 E I, times L, but for terms of order (nu Gamma)**2."""
     inertia = BLADE.width * BLADE.thickness**3 / 12
@@ -61,7 +114,7 @@ def test_a_wide_strip_has_the_ribbons_threshold_in_millimetres():
 @pytest.mark.full
 def test_buckled_states_are_those_of_the_quadrature():
     """The stable state of the tape on (1, 2), by the exact quadrature up to its own kappa_n."""
-    states, folds = buckled(TAPE)
+    states, folds, lost = buckled(TAPE)
     (stable,) = (state for state in states if state.stable)
     assert stable.name == "buckled (1, 2)"
     points = curve(1, 2, 0.3, TAPE.Gamma, kappa_limits=(-100.0, TAPE.kappa_n))
@@ -89,7 +142,7 @@ def saddle_energy(strip, m, n):
 @pytest.mark.full
 def test_barriers_are_those_of_the_quadrature():
     """The blade: its saddles lie on (1, 2), between one turn and three, and on (3, 4), between three and five."""
-    rings, (others, _) = circles(BLADE), buckled(BLADE)
+    rings, (others, _, _) = circles(BLADE), buckled(BLADE)
     ways = ways_out([*rings, *others])
     assert {name: (way.saddle, way.behind) for name, way in ways.items()} == {
         "single loop": ("buckled (1, 2)", "3-fold circle"),
@@ -185,7 +238,7 @@ def test_the_scenes_that_come_with_it(root):
     ("settings", "words"),
     [
         (["strip.width=-1"], "strip: width: -1 must be positive and finite"),
-        (["strip.width=wide"], "strip: width: must be a number, not 'wide'"),
+        (["strip.width=wide"], "strip: width: 'wide' must be a number (in m), or one with a unit"),
         (["strip.width=true"], "strip: width: must be a number, not True"),
         (["strip.length=.inf"], "strip: length: inf must be positive and finite"),
         (["strip.poisson_ratio=.7"], "poisson_ratio: 0.7 must be greater than -1 and at most 0.5"),
@@ -209,7 +262,7 @@ def test_scenes_that_are_refused(settings, words):
     ("changed", "words"),
     [
         ({"--width": "0"}, "width: 0 must be positive and finite"),
-        ({"--width": "x"}, "argument --width: invalid float value: 'x'"),
+        ({"--width": "x"}, "argument --width: 'x' must be a number (in m), or one with a unit"),
         ({"--natural-radius": "nan"}, "natural_radius: nan must be positive"),
         ({"--yield-strain": "-1"}, "yield_strain: -1 must be positive and finite"),
         ({"--want": "0"}, "want: 0 must be positive and finite"),

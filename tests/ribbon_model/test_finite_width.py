@@ -11,9 +11,9 @@ import contin
 from contin import Settings, follow
 from ribbon_model import convexity, exact_finite_width, finite_width
 from ribbon_model.domains import HALF_LOOP
-from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, from_label, label
+from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, TwoBendings, from_label, label
 from ribbon_model.linear import circle, covering, index, stability_interval, thresholds
-from ribbon_model.seeds import primary_branch
+from ribbon_model.seeds import half_loop_branch, primary_branch
 from ribbon_model.solution import Solution
 from ribbon_model.unfolding import factors, first_root, shooting_determinant
 
@@ -238,6 +238,32 @@ def test_a_second_minimum_that_is_shallow_is_not_taken(nu, Gamma, fold):
         system, x, tangent = primary_branch(FINITE_WIDTH, 2, 10, nu, intervals, degree, Gamma=Gamma)
         found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, test_functions=ends), tangent)
         assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([fold], abs=1e-6)
+
+
+@pytest.mark.parametrize("nu", [0.1, 0.3, 0.45])
+@pytest.mark.parametrize("Gamma", [1.0, 2.0, 4.0, 8.0, 11.0, 15.0, 50.0])
+def test_the_law_has_the_bending_of_the_single_loop(nu, Gamma):
+    """Where U - M.omega has two minima, the circle is the outer one of a wide strip and the inner one of a narrow one."""
+    for n in range(2, 11):
+        kappa_n = thresholds(FINITE_WIDTH, 1, n, nu, Gamma)[0]
+        moment = [circle(FINITE_WIDTH, 1, kappa_n, nu, Gamma)["M1"], 0.0, 0.0]
+        strains, _ = FINITE_WIDTH.linearized(np.array([moment]), kappa_n, nu, Gamma)
+        assert strains[0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-8)
+
+
+def test_the_outer_minimum_of_a_wide_strip_is_followed():
+    """(1, 4) of steel, 200 x 5 x .1 mm; the fold is that of `exact_finite_width.curve`, which is lost at 11.7665."""
+    found = followed(1, 4, 7.853981634, test_functions=convexity.test_functions(FINITE_WIDTH))
+    assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([17.723754], abs=1e-5)
+    assert found.points[-1]["kappa_n"] == pytest.approx(11.7665, abs=0.01) and convexity.NAME in found.stop.message
+
+
+def test_a_circle_at_the_other_minimum_is_refused():
+    with pytest.raises(TwoBendings, match=r"m = 2, n = 7: the strain energy of the circle .* has two minima"):
+        primary_branch(FINITE_WIDTH, 2, 7, 0.45, 10, 7, Gamma=6.0)
+    with pytest.raises(TwoBendings, match="it holds for smaller n"):
+        half_loop_branch(FINITE_WIDTH, 2, 7, 0.45, 10, 7, Gamma=6.0)
+    primary_branch(FINITE_WIDTH, 2, 5, 0.45, 10, 7, Gamma=6.0)
 
 
 def test_a_branch_on_which_the_energy_has_two_minima():

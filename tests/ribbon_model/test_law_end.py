@@ -149,3 +149,28 @@ def test_a_run_that_fails_beside_the_end_of_the_law_is_said_to_end_there():
     M1 = moment_on_directors(states.T[:4], states.T[7:11])[0]
     margin = M1 / (1 - np.linspace(0, 1, 201) / 2) ** 3 + 0.7
     assert 0 < margin.min() < 1e-4  # it came close to the end, and did not pass it
+
+
+# --- first states ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kappa_n", [0.0, 1.0, 4.0])
+def test_a_first_state_at_which_the_law_has_no_value(kappa_n):
+    """A clamped arch turns from one side to the other. The law that the sentence names finds it."""
+    ends = {"numbers": {"distance": 0.95}}
+    ribbon = OpenStrip(Material("ribbon", {"nu": 0.3, "kappa_n": kappa_n}), **ends)
+    sentence = "'ribbon' has no value where the bending vanishes .* take the law 'finite width'"
+    with pytest.raises(contin.ProblemError, match=sentence):
+        ribbon.first_point(ribbon.arch())
+    if kappa_n == 0:
+        with pytest.raises(contin.ProblemError, match=sentence):
+            ribbon.first_point()
+        wide = OpenStrip(Material("finite width", {"nu": 0.3, "Gamma": 10.0}), **ends)
+        assert wide.first_point(wide.arch())["distance"] == 0.95
+
+
+def test_a_failure_that_is_not_of_the_law_keeps_its_sentence():
+    """The natural arc bends to one side; its ends are far from the distance."""
+    ribbon = OpenStrip(Material("ribbon", {"nu": 0.3, "kappa_n": 3.0}), numbers={"distance": 0.99})
+    with pytest.raises(contin.ProblemError, match="no equilibrium was found near the first guess"):
+        ribbon.first_point()

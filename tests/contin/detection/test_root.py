@@ -107,6 +107,20 @@ def test_a_jump_is_no_zero(function):
         find_zero(function, (0.0, function(0.0)), (1.0, function(1.0)), 1e-12)
 
 
+def test_a_jump_is_seen_before_its_place_is_known_to_round_off():
+    """An equation that ends at a jump is looked at in each of the halved steps before it; bisection takes 53 evaluations."""
+    function, places = lambda x: 0.7 + 0.1 * x if x < 0.3141 else -1.0, []
+    with pytest.raises(ConvergenceError, match="no zero between"):
+        find_zero(counted(function, places), (0.0, 0.7), (1.0, -1.0), 1e-12)
+    assert len(places) <= 40
+
+
+@pytest.mark.parametrize("power", [1 / 2, 1 / 3])
+def test_a_root_with_an_infinite_slope_is_a_zero(power):
+    function = lambda x: math.copysign(abs(x - 0.3141) ** power, x - 0.3141)  # noqa: E731
+    assert find_zero(function, *ends(function, 0.0, 1.0), 1e-12) == pytest.approx(0.3141, abs=1e-9)
+
+
 def test_a_small_step_before_a_jump_is_no_zero():
     """1e-10 up to .3 and -1 beyond: small all along one side, it has no zero."""
     with pytest.raises(ConvergenceError, match="no zero"):

@@ -3,6 +3,8 @@
 Known values: integration from switch to switch with DOP853 at 1e-13 (SciPy), and closed forms.
 """
 
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,6 +12,7 @@ from scipy.optimize import brentq, fsolve, minimize_scalar
 
 import contin
 from contin import BoundaryValueProblem, CycleProblem
+from contin.discretization import switching
 from contin.discretization.basis import basis
 from contin.discretization.defect import split
 from contin.discretization.mesh import MeshControl, moved_to_breaks
@@ -284,6 +287,51 @@ def test_smooth_selections_are_no_corners():
     assert point.system.problem.batch("field").selections([]) is not None
     assert not len(found.places) or found.settled.all()  # mesh points at most
     assert not found.jumps.any()
+
+
+def test_the_place_of_a_smooth_selection_is_not_sought(monkeypatch):
+    """That takes most of the time of a point of a branch. The places of a corner are sought."""
+    sought, narrowed = [], switching._narrowed
+
+    def counted(sides, a, b, which):
+        sought.append(a.size)
+        return narrowed(sides, a, b, which)
+
+    def sine(x):  # the next term of the series is 1e-32 where they are joined
+        return x - x**3 / 6 + x**5 / 120 - x**7 / 5040 + x**9 / 362880 - x**11 / 39916800 if x < 0.02 else math.sin(x)
+
+    monkeypatch.setattr(switching, "_narrowed", counted)
+    for law, passes in ((sine, []), (lambda x: sine(x) + max(0, x - 0.1), [2])):
+        problem = BoundaryValueProblem(
+            lambda t, u, p, law=law: (u.v, -p.q - law(u.u)), lambda a, b, p: (a.u, b.u), ["u", "v"], {"q": 1.0}
+        )
+        solution = contin.solve(problem, lambda t: (t * (1 - t) / 2, 0.5 - t))
+        sought.clear()
+        assert len(solution.system.switching(solution.x * (1 + 1e-9)).places) == sum(passes)
+        assert sought == passes
+
+
+def test_a_point_is_looked_at_once(monkeypatch):
+    """A run asks for the places of a point several times; other points and other meshes are looked at anew."""
+    law, levels = LAWS["maximum"]
+    looked, sampled = [], switching._sampled
+
+    def counted(system, selections, x, p):
+        looked.append(system.intervals)
+        return sampled(system, selections, x, p)
+
+    monkeypatch.setattr(switching, "_sampled", counted)
+    point = contin.solve(loaded(law), lambda t: (t * (1 - t), 1 - 2 * t))
+    system, x = point.system, point.x
+    looked.clear()
+    first = system.switching(x)
+    assert len(looked) <= 1 and system.switching(x.copy()) is first and len(looked) <= 1
+    moved = system.switching(x * 1.01)
+    assert moved is not first and not np.array_equal(moved.places, first.places)
+    again = system.switching(x)
+    assert again is not first and np.array_equal(again.places, first.places)
+    finer, carry = system.refined()
+    assert finer.switching(carry(x)).places == pytest.approx(first.places, abs=1e-6)
 
 
 def test_a_corner_in_python():

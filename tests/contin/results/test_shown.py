@@ -53,6 +53,24 @@ def test_what_is_printed_fits_on_a_screen(column, diagram):
     assert repr(diagram).startswith("Diagram of 120 branches and 1 junction\n") and "... 100 more" in repr(diagram)
 
 
+def test_problems_and_runs_are_printed_by_names(column):
+    """By those of states and parameters, without functions; a run by where it is."""
+    problem = column[0].system.problem
+    assert repr(problem) == "BoundaryValueProblem(states u, v; parameters P)"
+    many = contin.AlgebraicProblem(lambda u, p: u, [f"u{i}" for i in range(500)], {})
+    assert repr(many).endswith("u19 and 480 more; parameters none)")
+    run = contin.Continuation(column[0].system, column[0].x)
+    assert repr(run).startswith("Continuation(State(") and repr(run).endswith("not ended)")
+    cycle = contin.CycleProblem(lambda u, p: (u.y, -u.x), ["x", "y"], {})
+    assert repr(cycle) == "CycleProblem(states x, y; parameters period)"
+
+
+def test_a_stored_table_is_printed_on_a_line(column, tmp_path):
+    contin.save(column, tmp_path / "column.npz")
+    text = repr(contin.read_columns(tmp_path / "column.npz"))
+    assert text.startswith(f"StoredColumns({len(column)} points, columns ") and "EP, BP, BP, EP; reached P = 45)" in text
+
+
 def test_a_point_with_a_large_kernel_is_printed():
     pair = contin.AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2), u.y * (p.a - u.y**2)), ["x", "y"], {"a": -1.0})
     (point,) = contin.trace(contin.solve(pair, [0.0, 0.0]), free=["a"], limits={"a": (-1, 1)}).labelled("BP")

@@ -1,0 +1,45 @@
+"""Numbers with units, as in ``5 mm``, in SI units."""
+
+from __future__ import annotations
+
+import re
+from decimal import Decimal, InvalidOperation
+
+#: The SI unit of each dimension of a strip.
+STRIP_UNITS = {
+    "width": "m", "thickness": "m", "length": "m", "natural_radius": "m", "poisson_ratio": "", "youngs_modulus": "Pa",
+}  # fmt: skip
+#: Units by the SI unit; the sign of a micrometre is one of two characters in Unicode.
+_UNITS = {
+    "m": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "\u00b5m": "1e-6", "\u03bcm": "1e-6", "in": "0.0254"},
+    "Pa": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9"},
+    "": {},
+}
+
+
+def quantity(text: str, unit: str) -> float:
+    """Return a number as it is, or one with a unit in the SI ``unit``.
+
+    Raises
+    ------
+    ValueError
+        Neither.
+
+    Examples
+    --------
+    >>> quantity("5mm", "m"), quantity(" .2 ", "m"), quantity("210 GPa", "Pa"), quantity("inf", "m")
+    (0.005, 0.2, 210000000000.0, inf)
+    """
+    units = _UNITS[unit]
+    try:
+        return float(text)
+    except ValueError:
+        digits, name = re.fullmatch(r"(.*?)\s*([^\W\d]*)\s*", text, re.DOTALL).groups()
+    if name in units:
+        try:
+            return float(Decimal(digits) * Decimal(units[name]))  # as if it were written in SI units
+        except InvalidOperation:
+            pass
+    known = [name for name in units if name.isascii()]
+    more = f" (in {unit}), or one with a unit: {', '.join(known[:-1])} or {known[-1]}" if known else ""
+    raise ValueError(f"{text!r} must be a number{more}")
