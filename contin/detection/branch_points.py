@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 
 import numpy as np
 
@@ -47,7 +48,12 @@ class BranchPointSearch:
 
     def __init__(self, segment: Segment) -> None:
         self.segment = segment
-        self._share, self._spread = 0.5, 0.0  # at which part of the step branch points are expected, and how far apart
+        self._shares: Array = np.empty(0)  # at which parts of the step branch points are expected, in order
+
+    @property
+    def _share(self) -> float:
+        """Where branch points are expected, as a part of the step."""
+        return float(np.mean(self._shares)) if len(self._shares) else 0.5
 
     @functools.cached_property
     def count(self) -> tuple[int, bool]:
@@ -64,9 +70,7 @@ class BranchPointSearch:
         before.refactor(row)
         trial.sharpen_factors(row)
         values = quotients(before.factors, trial.factors, size)
-        shares = _shares(values[values.real < 0])
-        if len(shares):
-            self._share, self._spread = float(np.mean(shares)), float(np.ptp(shares))
+        self._shares = np.sort(_shares(values[values.real < 0]))
         count, clear = crossings(values)
         if (count > 1 or not clear) and self._without_smallest():
             return int(self.sign_changes), True
@@ -82,7 +86,8 @@ class BranchPointSearch:
             M = [ A    u ]       M [x; g] = [0; 1],    det A = g det M
                 [ v^T  0 ]
 
-        So the sign of A is that of g, as long as no singular value of M passes zero.
+        So the sign of A is that of g, as long as no singular value of M passes zero. Two zeros of g in the step would leave its
+        sign as it was: it is looked at between the places where they are expected.
         """
         segment, system = self.segment, self.segment.state.system
         size, unit = system.size, np.zeros(system.size + 1)
@@ -97,7 +102,14 @@ class BranchPointSearch:
         g = [factors.solve(unit)[-1] for factors in (first, last)]
         if not np.isfinite(g).all() or (g[0] * g[1] < 0) != self.sign_changes:
             return False
-        return crossings(quotients(first, last, size + 1)) == (0, True)
+        if crossings(quotients(first, last, size + 1)) != (0, True):
+            return False
+        with contextlib.suppress(ConvergenceError):
+            places = [segment.at(segment.step * (a + b) / 2).x for a, b in itertools.pairwise(self._shares)]
+            between = [system.linearize(x, rows, column)[1].solve(unit)[-1] for x in places]
+            signs = np.sign([g[0], *between, g[1]])
+            return int(np.count_nonzero(np.diff(signs))) == int(self.sign_changes)
+        return False
 
     @property
     def _gap(self) -> float:
@@ -144,7 +156,7 @@ class BranchPointSearch:
         state, step = segment.state, segment.step
         count, middle = self.count[0], segment.low + self._share * (step - segment.low)
         with contextlib.suppress(ConvergenceError):
-            if self._spread < _TOGETHER and not self._apart(middle):
+            if np.ptp(self._shares) < _TOGETHER and not self._apart(middle):
                 found = locate_multiple_point(state.system, segment.guess(middle), state.row, count, segment.newton)
                 assert found.x is not None
                 at = inner(state.system, state.tangent, found.x - state.x)
