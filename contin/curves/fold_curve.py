@@ -123,7 +123,7 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
         return float(system.gradient(trial.x, v, w) @ v)
 
     found = [
-        TestFunction("CP", "cusp", cusp, search=lambda segment, _: None if _singular_point(segment) is None else []),
+        TestFunction("CP", "cusp", cusp, search=lambda segment, _: None if _may_be_cusp(segment) else []),
         _MEETS,
     ]
     if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
@@ -131,6 +131,17 @@ def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
     if isinstance(system.base, PeriodicCollocation | MapSystem):
         found += _of_cycles(system.base)
     return found
+
+
+def _may_be_cusp(segment: Segment) -> bool:
+    """Return whether the parameters reverse inside a step, as they do at a cusp, where they stand still.
+
+    w.F_zz v v vanishes, too, where solutions have v as a symmetry, as the phase of a forced cycle whose forcing vanishes: there
+    the parameters go on. At a pitchfork of the folds they reverse as well.
+    """
+    places = [segment.state.system.state_size, segment.state.system.size - 1]
+    before, behind = (trial.tangent[places] for trial in (segment.before, segment.trial))
+    return bool(before @ behind < 0) and _singular_point(segment) is None
 
 
 def _by_first(trial: Trial) -> float:

@@ -180,3 +180,20 @@ def test_torus_bifurcations_end_on_a_symmetric_cycle(m1):
 
     for name, value in zip(("m1", "m2"), symmetric(point, half, ("m1", "m2"))):
         assert point[name] == pytest.approx(value, abs=1e-10) and point.errors[name] < 1e-10
+
+
+def test_folds_go_through_a_forcing_that_vanishes():
+    """Van der Pol's oscillator, locked 1:1: at g = 0 the phase is free, and the curve goes on as its image u(t + T / 2) at -g.
+
+    Four cusps, two at each sign of g, and none at 0, where w.F_zz v v changes its sign, too.
+    """
+    field = lambda t, u, p: (u.v, 0.3 * (1 - u.x**2) * u.v - u.x + p.g * math.cos(p.w * t))  # noqa: E731
+    problem = contin.CycleProblem(field, ["x", "v"], {"g": 0.3, "w": 1.0}, period=around)
+    locked = contin.solve(problem, lambda t: (2 * math.sin(2 * math.pi * t), 2 * math.cos(2 * math.pi * t)))
+    fold = contin.trace(locked, free=["w"], limits={"w": (0.3, 1.5)}).labelled("LP")[0]
+    curve = contin.curve(fold, free=["w", "g"], limits={"w": (0.5, 2), "g": (-0.5, 2)})
+    assert str(curve.stop) == "the branch closed on its first point" and not curve.notes
+    cusps = sorted((point["g"], point["w"]) for point in curve.labelled("CP"))
+    (low, first), (higher, second), (third_g, third), (high, last) = cusps
+    assert (low, higher) == pytest.approx((-high, -third_g), abs=1e-9) and third_g > 0.3
+    assert (first, second) == pytest.approx((last, third), abs=1e-9)
