@@ -7,7 +7,7 @@ eigenvalues of A, of the dimension of their multiplicity. The eigenvalues are ch
 not. Number and size of the states, gaps, first steps and limits differ from problem to problem. A branch point is
 
 - right, if its parameter is the eigenvalue, its dimension the multiplicity, and its error within ten times its ±;
-- noted, if it has no label, and a note of the branch names an interval around it;
+- noted, if it has no label, and a note of the branch names an interval around it, or if its ± is not known, which a note says;
 - missed, invented or wrong otherwise.
 
 A cluster of eigenvalues may be labelled as one point if the error of that covers it.
@@ -229,8 +229,9 @@ def outcomes(problem: Random | Column, branch: contin.Branch) -> list[tuple[str,
     result, left = [], problem.spectrum[problem.spectrum < problem.limit]
     for point in branch.labelled("BP"):
         dimension, error = getattr(point.details, "dimension", 1), point.errors["lam"]
-        mine = np.abs(left - point["lam"]) <= UNDERRATED * error + ROUND_OFF * problem.spectrum.max()
-        word = "right" if np.count_nonzero(mine) == dimension else "wrong" if np.any(mine) else "invented"
+        mine = np.abs(left - point["lam"]) <= UNDERRATED * np.nan_to_num(error) + ROUND_OFF * problem.spectrum.max()
+        counted = "right" if np.count_nonzero(mine) == dimension else "wrong" if np.any(mine) else "invented"
+        word = "noted" if np.isnan(error) and counted == "right" else counted
         result.append((word, f"{dimension} of {np.count_nonzero(mine)} at {point['lam']:.10g} ± {error:.1e}"))
         left = left[~mine]
     for value in left:

@@ -1,4 +1,4 @@
-"""Some problems of scripts/stress.py: random equilibria of known spectra; no branch point is missed, invented or wrong."""
+"""Some problems of scripts/stress.py: random problems of known branch points; none is missed, invented or wrong."""
 
 import subprocess
 import sys
@@ -16,6 +16,13 @@ def test_some_problems(request):
     done = stress("--count", count, "--first", "96", "--most", most)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     assert f"{count} problems, " in done.stdout and "0 problems with faults" in done.stdout
+
+
+def test_two_branch_points_in_a_step_that_begins_beside_the_first():
+    """Problem 53: one singular value is smaller than the others by far, and two pass zero one after the other."""
+    done = stress("--count", "1", "--first", "53", "--verbose")
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert "4 right or noted" in done.stdout and "0 noted" in done.stdout
 
 
 def test_bad_usage():

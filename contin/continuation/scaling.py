@@ -41,6 +41,8 @@ from contin.stepping.trial import Linearization, Trial, linearization
 #: Iterations of the power method. Sizes are powers of two: the distance to the nearest singular point needs no digits. Ten
 #: times more separate eigenvalues that differ by a tenth.
 _ITERATIONS = 12
+#: Largest Krylov space that parts close eigenvalues: those that differ by a tenth. Twice as many part some that differ by 1e-2.
+_KRYLOV = 12
 #: A mean growth below this part of the largest one is round-off of a nilpotent matrix: its eigenvalues are zero.
 _NILPOTENT = 1e-6
 #: Largest error of a state in an eigenvector, relative to that state. The power method leaves .03 of eigenvalues that are
@@ -240,26 +242,54 @@ class _FirstPoint:
                 rate = float(np.exp(np.mean(np.log(growth[-4:]))))
                 nearer = found is None or rate ** (-1 / order) < found.distance
                 if rate > _NILPOTENT * max(growth[2:]) and nearer:
-                    found = _Mode(self._eigenvector(v, direction, rate, order), rate, order)
+                    found = self._mode(v, direction, rate, order)
         return found
 
     def _changed(self, v: Array, direction: Array, order: int) -> Array:
         """Return F_x^-1 of the change of F_x v in a direction, of first or second order."""
         return self._solved([*[direction] * order, v]) / math.factorial(order)
 
-    def _eigenvector(self, v: Array, direction: Array, rate: float, order: int) -> Array:
+    def _mode(self, v: Array, direction: Array, rate: float, order: int) -> _Mode:
         """Return the part of v that belongs to the eigenvalue ``rate`` or its negative; zeros for complex ones.
 
-        Both occur, where the parameter couples two states only; v is then in turn of one state and of the other.
+        Both occur, where the parameter couples two states only; v is then in turn of one state and of the other. Where other
+        eigenvalues are close, the power method has left of theirs too: then Arnoldi's method parts them.
         """
         image = self._changed(v, direction, order) / rate
         mode, sign = max(((v + image, 1.0), (v - image, -1.0)), key=lambda pair: float(np.linalg.norm(pair[0])))
         missed = self._changed(mode, direction, order) / rate - sign * mode
+        if np.any(self.system.largest(missed) > _LASTS**2 * self.system.largest(mode)):
+            parted = self._parted(v, direction, order)
+            if parted is not None:
+                mode, value = parted
+                v, rate, image = mode, abs(value), self._changed(mode, direction, order) / abs(value)
+                missed = image - math.copysign(1.0, value) * mode
         noise = self._changed(self._rounded(v), direction, order) / rate - image
         errors = np.maximum(self.system.largest(missed) / _LASTS, UNITS * self.system.largest(noise))
         found = self._kept(mode, self.system.largest(mode) > errors)
         alone, left_out = (self.system.largest(each) for each in (found, self._changed(found, direction, order)))
-        return np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found
+        return _Mode(np.zeros_like(v) if np.any((alone == 0) & (left_out > 0)) else found, rate, order)
+
+    def _parted(self, v: Array, direction: Array, order: int) -> tuple[Array, float] | None:
+        """Return the eigenvector of the largest eigenvalue in the Krylov space of v, and that; None where it is complex."""
+        basis, matrix = [v / np.linalg.norm(v)], np.zeros((_KRYLOV + 1, _KRYLOV))
+        for place in range(_KRYLOV):
+            image = self._changed(basis[-1], direction, order)
+            size = np.linalg.norm(image)
+            for _ in range(2):
+                shares = np.array([known @ image for known in basis])
+                image = image - shares @ np.array(basis)
+                matrix[: len(basis), place] += shares
+            matrix[place + 1, place] = np.linalg.norm(image)
+            if not matrix[place + 1, place] > _NOTHING * size:
+                break
+            basis.append(image / matrix[place + 1, place])
+        count = place + 1
+        values, vectors = np.linalg.eig(matrix[:count, :count])
+        largest = int(np.abs(values).argmax())
+        if values[largest].imag != 0 or values[largest] == 0:
+            return None
+        return vectors[:, largest].real @ np.array(basis[:count]), float(values[largest].real)
 
     def _settled_branch(self, mode: _Mode) -> tuple[list[Array], float]:
         """Return what `_branch` does, without states that change with the next iterations of the null vector.

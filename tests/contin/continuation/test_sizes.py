@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.special import jn_zeros
+from scipy.special import ellipk, jn_zeros
 
 import contin
 from contin import AlgebraicProblem, BoundaryValueProblem, ConnectionProblem, solve, trace
@@ -256,3 +256,30 @@ def test_a_small_closed_curve_of_a_boundary_value_problem(radius):
     branch = trace(start, free=["a"], limits={"a": (-1, 1)})
     assert [point.label for point in branch if point.label] == ["EP", "LP", "LP", "EP"]
     assert [point["a"] / radius for point in branch.labelled("LP")] == pytest.approx([1, -1], rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_states_of_modes_that_are_close(seed):
+    """Branches leave at eigenvalues that differ by a tenth, at an amplitude of 1e-9: the branch points are the eigenvalues."""
+    random, count = np.random.default_rng(seed), 12
+    basis = np.linalg.qr(random.standard_normal((count, count)))[0]
+    loads = 1.1 ** np.arange(count)
+    matrix = basis @ np.diag(loads) @ basis.T
+    problem = AlgebraicProblem(lambda u, p: p.lam * u + 1e9 * u * u - 1e18 * u**3 - matrix @ u, count, {"lam": 0.0})
+    branch = trace(solve(problem, [0.0] * count), free=["lam"], limits={"lam": (-1, 3)})
+    found, error = located(branch, "lam", 1.0, count)
+    assert found == pytest.approx(loads, rel=1e-12) and error < 1e-11 and not branch.notes
+    assert np.all(branch[0].system.scales.states < 1e-7)
+
+
+@pytest.mark.parametrize("height", [0.02, 0.05])
+def test_a_branch_that_begins_where_the_load_has_grown(height):
+    """The trivial branch begins at a load of .008, and branches turn off at 8: steps are as long as the new load allows."""
+    start = solve(column(0.8, height), [0, 0], {"P": 0.008})
+    first = trace(start, free=["P"], limits={"P": (0, 20)}).labelled("BP")[0]
+    assert first["P"] == pytest.approx(0.8 * math.pi**2, rel=1e-11)
+    bent = trace(first, branch=1, limits={"P": (0, 12)})
+    assert str(bent.stop) == "reached P = 12" and not bent.notes and len(bent) < 40
+    slope = bent[-1].system.states(bent[-1].x)[0, 1]
+    half = 0.5 * slope**2 / height**2 / (12 / 0.8)  # v^2 / 2 = P (1 - cos(largest angle)) where u = 0
+    assert 12 / 0.8 == pytest.approx((2 * ellipk(half / 2)) ** 2, rel=1e-9)
