@@ -46,6 +46,11 @@ _DIRECTIONS = 300
 _SPHERES = 0.02, 0.01
 #: Newton's method on a sphere: its longest step, the step at which it has settled, and its iterations at most.
 _LONGEST, _SETTLED, _MOST_ITERATIONS = 0.5, 1e-12, 50
+#: Distances beyond a cluster at which the branch is looked at: the first, and the least. Where a branch with a double point is
+#: curved, G gives it a length of the square of that, up to 200 times as large.
+_AWAY, _NEAREST = 1e-3, 1e-5
+#: The branch is looked at so many times further off than a cluster is long, at so many distances at most.
+_BEYOND, _LOOKS = 10.0, 5
 #: Directions closer than this are one.
 _SAME = 1e-3
 
@@ -238,7 +243,8 @@ def _described(manifold: _Manifold, s: Array, row: Array, slopes: Array) -> Mult
     cosines = [inner(system, tangent, ours) for tangent in tangents]
     tangents = [oriented_along(tangents[i], cosines[i]) for i in ordered(tangents, cosines)] or [ours]
     across = canonical_basis(np.linalg.svd(along[None])[2][1:] @ basis, system.weights)
-    spread = _spread(G, slopes, manifold.phi @ (system.weights * ours))
+    a = manifold.phi @ (system.weights * ours)
+    spread = max(_spread(G, slopes, a), _spread_on_branch(manifold, s, a))
     return MultiplePoint(manifold.d, across, x, tuple(tangents), continuum, spread)
 
 
@@ -256,6 +262,37 @@ def _spread(G: Array, slopes: Array, a: Array) -> float:
     except np.linalg.LinAlgError:
         return least
     return max(least, float(distances.max()))
+
+
+def _spread_on_branch(manifold: _Manifold, s: Array, a: Array) -> float:
+    """Return the same, from the branch: the largest distance from s to the zeros of G on it; 0 where they are not resolved.
+
+    It is looked at a little beyond them: there it is a zero of beta that Newton's method finds, and G is nearly linear.
+    """
+    across, away, found = np.linalg.svd(a[None])[2][1:].T, _AWAY, 0.0
+    here = (s @ a) * a
+    for _ in range(_LOOKS):
+        here = here - (here @ a) * a + (s @ a + away) * a
+        try:
+            for _ in range(_MOST_STEPS):
+                _, beta, G = manifold.at(here)
+                update = np.linalg.solve(G @ across, beta)
+                here = here - across @ update
+                if np.max(np.abs(update)) < _ROUND_OFF * away:
+                    break
+            else:
+                return found
+            change = manifold.second()[1] @ a @ across
+            places = away - np.linalg.eigvals(np.linalg.solve(change, G @ across))
+        except (ConvergenceError, np.linalg.LinAlgError):
+            return found
+        distance = float(np.abs(places).max())
+        if _BEYOND * distance < _NEAREST:
+            return 0.0
+        found, before, away = distance, away, _BEYOND * distance
+        if 0.5 < away / before < 2:
+            return found
+    return found
 
 
 @functools.singledispatch

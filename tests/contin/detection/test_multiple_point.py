@@ -9,6 +9,7 @@ branch point.
 import itertools
 import math
 
+import numpy as np
 import pytest
 from scipy.optimize import brentq
 
@@ -124,3 +125,17 @@ def test_a_circle_of_branches_is_said_to_be_one():
     branch = contin.trace(contin.solve(problem, [0.0, 0.0]), free=["a"], limits={"a": (-1, 1)})
     (point,) = branch.labelled("BP")
     assert abs(point["a"]) < 1e-9 and point.details.continuum and branch.stop.reason == "limit"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_error_of_a_cluster_reaches_its_ends(seed):
+    """Eigenvalues that differ by 3e-6 are found as one point, moved off the branch by Gauss-Newton: both are within its ±."""
+    random, gap = np.random.default_rng(seed), 3e-6
+    basis = np.eye(4) + 0.15 * random.standard_normal((4, 4))
+    matrix = basis @ np.diag([1, 1 + gap, 2, 3]) @ np.linalg.inv(basis)
+    problem = contin.AlgebraicProblem(lambda u, p: p.lam * u + u * u - u**3 - matrix @ u, 4, {"lam": 0.0})
+    branch = contin.trace(contin.solve(problem, [0.0] * 4), free=["lam"], limits={"lam": (-1, 1.5)}, step=0.5)
+    (point,) = branch.labelled("BP")
+    assert point.details.dimension == 2
+    furthest = max(abs(point["lam"] - 1), abs(point["lam"] - 1 - gap))
+    assert furthest < 1.001 * point.errors["lam"] < 3e-6
