@@ -160,17 +160,20 @@ def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:
 
     def change(tangent: Array) -> float:
         first, second = np.split(twice.states(tangent), 2)
-        return float(np.abs(second - first).max() / np.abs(first).max())
+        return float(np.abs(second - first).max())
 
     return twice, found.x, max(found.tangents, key=change)
 
 
 def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) -> Array:
-    """Return the tangent that changes most from one round to the next, turned by the symmetry."""
+    """Return the unit tangent that changes most from one round to the next, turned by the symmetry.
+
+    The states of the other one may be round-off, as where the cycles do not depend on the parameter: a share of them tells nothing.
+    """
     half = twice.nodes.size // 2
 
     def change(tangent: Array) -> float:
         states = twice.states(tangent)
-        return float(np.abs(states[: half + 1] @ turn.T - states[half:]).max() / np.abs(states).max())
+        return float(np.abs(states[: half + 1] @ turn.T - states[half:]).max())
 
     return max(found.tangents, key=change)
