@@ -168,7 +168,7 @@ def _doubled_map(system: MapSystem, x: Array) -> tuple[MapSystem, Array, Array]:
 def _alternating(twice: PeriodicCollocation, found: BranchPoint, turn: Array) -> Array:
     """Return the unit tangent that changes most from one round to the next, turned by the symmetry.
 
-    The states of the other one may be round-off, as where the cycles do not depend on the parameter: a share of them tells nothing.
+    The states of the other one may be round-off, as where the cycles do not depend on the parameter: no share of them tells.
     """
     half = twice.nodes.size // 2
 
