@@ -63,8 +63,6 @@ from contin.stepping.step import (
     judged,
     located,
     predict,
-    sharpened,
-    tangent_error,
     trial_of,
     up_to_limits,
 )
@@ -74,13 +72,6 @@ from contin.stepping.trial import Linearization, TestFunction, Trial, linearizat
 _FINEST = 1e-3
 #: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
 _ASTRAY = 2.5
-#: A tangent's component with a larger estimated error than this, relative to itself, may have the wrong sign.
-_DOUBT = 0.2
-#: A component above this is never in doubt: tangents are better known than that.
-_STEEP = 0.3
-#: Nor is one that differs by less than this part of itself from what the parameter's own values say. Ten times larger, folds
-#: on both sides of a pitchfork are seen where there are none.
-_EVEN = 0.02
 #: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
 #: The next one is taken where the equations are still too nearly singular for Newton's method.
 _ASIDE = (0.01, 0.1, 0.5)
@@ -512,11 +503,8 @@ class Continuation:
         return system.adapted(x, dataclasses.replace(control, min_intervals=count, max_intervals=count))
 
     def _step(self, state: State) -> Step:
-        """Predict and correct, halving the step until the corrected point can be believed.
-
-        At the first failure the state's tangent is taken anew, right at its point.
-        """
-        step, settings, exact = up_to_limits(state, self.settings.limits, self.settings.min_step), self.settings, False
+        """Predict and correct, halving the step until the corrected point can be believed."""
+        step, settings = up_to_limits(state, self.settings.limits, self.settings.min_step), self.settings
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
@@ -530,8 +518,6 @@ class Continuation:
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
-            if not exact and not state.singular:
-                state, exact = dataclasses.replace(state, tangent=self._exact_tangent(state)), True
             step /= 2
             if step < settings.min_step:
                 raise problem
@@ -546,8 +532,6 @@ class Continuation:
         settings = self.settings
         guess = predict(state, step)
         trial = corrected(state, guess, step, settings.newton)
-        if not self._is_finite(trial):
-            raise ConvergenceError("the equations are not finite at the corrected point")
         if collapsed(state.system, state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         judgement = judged(state, guess, trial)
@@ -556,10 +540,6 @@ class Continuation:
                 f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
                 f"{judgement.missed / step:.2f} of it"
             )
-        if judgement.hidden_turn > settings.angle:
-            raise ConvergenceError("the corrected point does not lie where the tangents at both ends lead")
-        if self._fold is not None and self._may_turn(state, trial, step):
-            trial = sharpened(state, trial)
         if self._fold is not None and self._jumped(state, guess, trial, step):
             raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
         low, before = self._before(state, step)
@@ -603,28 +583,6 @@ class Continuation:
                 problem = error
         raise problem
 
-    def _is_finite(self, trial: Trial) -> bool:
-        """Return whether the equations are finite at a point: they are where its discretization error is."""
-        if trial.system.intervals and np.isfinite(trial.discretization_error):
-            return True
-        return bool(np.isfinite(trial.system.residual(trial.x)).all())
-
-    def _may_turn(self, state: State, trial: Trial, step: float) -> bool:
-        """Return whether the primary parameter is so near to a fold that an approximate tangent may have the wrong sign.
-
-        It has not where the parameter itself says the same: at the end of a step its rate is twice the mean rate less that at
-        the beginning, if it changes evenly.
-        """
-        at = trial.system.parameter_index(self.primary)
-        component = abs(trial.tangent[at])
-        if component >= _STEEP:
-            return False
-        rate = trial.tangent[at] / inner(state.system, state.tangent, trial.tangent)
-        expected = 2 * (trial.x[at] - state.x[at]) / step - state.tangent[at]
-        if abs(rate - expected) < _EVEN * abs(rate):
-            return False
-        return not abs(tangent_error(trial, trial.system.residual(trial.x))[at]) < _DOUBT * component
-
     def _jumped(self, state: State, guess: Array, trial: Trial, step: float) -> bool:
         """Return whether the primary parameter misses its prediction by much of what it changes at all.
 
@@ -646,11 +604,6 @@ class Continuation:
     def _sense(self, trial: Trial) -> float:
         """Return the sense in which the primary parameter goes; zero where that cannot be told, or is not wanted."""
         return 0.0 if self._fold is None else sense(trial, self._fold, self.settings.newton)
-
-    def _exact_tangent(self, state: State) -> Array:
-        """Return the tangent right at the state's point (the one it came with is from where Newton last took the Jacobian)."""
-        tangent = linearization(state.system, state.x, state.row).tangent
-        return tangent if np.isfinite(tangent).all() else state.tangent
 
     def _accept(self, segment: Segment, judgement: Judgement, turned: bool) -> State:
         """Return the next state, its step chosen so that the predictor's error is ``accuracy`` of it.
@@ -824,11 +777,11 @@ class Continuation:
             return True
         try:
             done = correct(system, x, row, row @ x, self.settings.newton)
+            end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0), row)
         except ConvergenceError:
             return False  # the old mesh still serves; the step control will notice if it does not
         if collapsed(system, x, done.x):
             return False
-        end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0))
         before = self._before(state, state.step)[1]
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self._comparable):
             return False  # the next point will do as well

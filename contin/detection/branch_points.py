@@ -57,10 +57,7 @@ class BranchPointSearch:
 
     @functools.cached_property
     def count(self) -> tuple[int, bool]:
-        """How many branch points the step passes, and whether that is clear.
-
-        Factors from Newton's last iterates do where nothing happens; the rest is decided by those right at both ends.
-        """
+        """How many branch points the step passes, and whether that is clear."""
         state, before, trial = self.segment.state, self.segment.before, self.segment.trial
         row, size = state.row, state.system.size
         if before.factors is None:
@@ -68,7 +65,6 @@ class BranchPointSearch:
         if before.sign == trial.sign and calm(before.factors, trial.factors, size):
             return 0, True
         before.refactor(row)
-        trial.sharpen_factors(row)
         values = quotients(before.factors, trial.factors, size)
         self._shares = np.sort(_shares(values[values.real < 0]))
         count, clear = crossings(values)
@@ -118,11 +114,8 @@ class BranchPointSearch:
 
     @property
     def sign_changes(self) -> bool:
-        """The determinant's sign changes inside the step, as that right at its end says."""
-        before, trial = self.segment.before, self.segment.trial
-        if before.sign != trial.sign:
-            trial.sharpen_factors(self.segment.state.row)
-        return sign_changed(before.sign, trial.sign)
+        """The determinant's sign changes inside the step."""
+        return sign_changed(self.segment.before.sign, self.segment.trial.sign)
 
     @functools.cached_property
     def simple(self) -> SpecialPoint:

@@ -22,7 +22,6 @@ from contin.detection.folds import FoldSearch
 from contin.detection.hopf_end import own_home
 from contin.detection.phase import in_phase, lasting
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
-from contin.detection.significance import senses
 from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
 from contin.stepping.settings import Settings
@@ -111,8 +110,6 @@ class Inspection:
             return "the linearized equations come close to singular: branch points may have been passed"
         if self._home is not None and not self._home.is_located:
             return f"{self.settings.trivial} changes its sign, and no zero of it was found on the branch"
-        if not self._is_steady():
-            return "the primary parameter does not go where the tangents say: folds may have been passed"
         if not self.settings.branch_points:
             return ""
         if count > 1:
@@ -135,23 +132,6 @@ class Inspection:
             if point.is_located and (point.label == "BP" or ends):
                 return ""
         return "" if self._branch_points.simple.is_located else _STRAYS
-
-    def _is_steady(self) -> bool:
-        """Return whether the primary parameter goes, between its folds, the way that the tangents say."""
-        if self.fold is None:
-            return True
-        before, trial = self.segment.before, self.segment.trial
-        if not all(senses(self.segment, self.fold)):
-            return True  # it stands still as far as can be told
-        knots = [before, *[fold.trial for fold in self._folds], trial]
-        at = trial.system.parameter_index(self.fold.name)
-        sense = math.copysign(1.0, before.value(self.fold))
-        noise = _STANDS + 2 * trial.newton_error
-        for left, right in itertools.pairwise(knots):
-            if sense * (right.x[at] - left.x[at]) < -noise * (1 + abs(right.x[at])):
-                return False
-            sense = -sense
-        return True
 
     # --- special points ------------------------------------------------------------------------------------------
 

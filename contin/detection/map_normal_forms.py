@@ -62,7 +62,8 @@ def _coefficient(system: MapSystem, x: Array, terms: Callable[[_Forms], Array]) 
     if system.state_size > _MOST:
         return None
     try:
-        return Coefficient.of(lambda point: terms(_Forms(system, point)), x, system)
+        with np.errstate(divide="ignore", invalid="ignore"):  # of a double multiplier w.v vanishes: there is no coefficient
+            return Coefficient.of(lambda point: terms(_Forms(system, point)), x, system)
     except np.linalg.LinAlgError:
         return Coefficient(float("nan"), float("nan"), float("nan"))
 

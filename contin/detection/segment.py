@@ -13,15 +13,19 @@ from contin.arrays import Array
 from contin.detection.root import find_zero
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
-from contin.stepping.newton import Newton
+from contin.stepping.newton import Newton, correct
 from contin.stepping.settling import settled
 from contin.stepping.state import State, Stop
 from contin.stepping.step import located
-from contin.stepping.trial import Linearization, TestFunction, Trial
+from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
 
 #: Part of a step, and part of the corrector's tolerance of it, to which a zero is located: round-off of the place and, of the
 #: function, what the corrector leaves.
 _PRECISE, _SHARE = 1e-12, 1e-2
+#: Part of a step to which the place is known from which Newton's method begins that holds an unknown: it does the rest.
+_ROUGH = 1e-3
+#: What that finds lies no further off the cubic than this part of the step, as branch points do.
+_OFF = 0.1
 #: Least cosine between the tangents at both ends that the cubic is made with: accepted steps turn by less.
 _LEAST_COSINE = 0.1
 
@@ -176,6 +180,10 @@ class Segment:
         (a, first), (b, last) = left, right
         ends, name = (first.value(test), last.value(test)), test.name
         try:
+            if test.value is not None and test.column in first.system.free and ends[0] * ends[1] < 0:
+                held = self._held(test.column, test.value, left, right)
+                if held is not None:
+                    return SpecialPoint(held[0], test.label, name, held[1], stop_of(test), None, test)
             if np.sign(ends[0]) == np.sign(ends[1]) or ends[0] == 0:  # a limit that the run starts on
                 at, there = a, first
             else:
@@ -185,6 +193,37 @@ class Segment:
             at, there, name = b, last, f"possible {test.name}"
         details = None if test.describe is None else test.describe(there)
         return SpecialPoint(at, test.label, name, there, stop_of(test), details, test)
+
+    def _held(self, name: str, value: float, left: Place, right: Place) -> Place | None:
+        """Return the place between two where a free parameter has a value, with that held; None if it is not found.
+
+        It begins where the cubic has the value. It finds no other place than one between the two, near the cubic.
+        """
+        state, system = self.state, self.state.system
+        at = system.parameter_index(name)
+        value /= system.free_scales[at - system.state_size]
+        one, two, three, four = self._cubic[:, at].tolist()
+
+        def gap(distance: float) -> float:
+            s = distance / self.step
+            return float(one + s * (two + s * (three + s * four)) - value)
+
+        ends = (left[0], gap(left[0])), (right[0], gap(right[0]))
+        if not ends[0][1] * ends[1][1] < 0:
+            return None
+        row = np.zeros(system.size)
+        row[at] = 1.0
+        try:
+            place = find_zero(gap, *ends, _ROUGH * self.step)
+            done = correct(system, self.guess(place), row, value, self.newton)
+        except ConvergenceError:
+            return None
+        place = inner(system, state.tangent, done.x - state.x)
+        inside = left[0] < place < right[0] and self.distance(done.x, place) < _OFF * self.step
+        if not inside or (self.settles and system.on_switches(done.x) is not None):
+            return None
+        there = Trial(system, done.x, lambda: linearization(system, done.x, state.row), done.iterations, done.error)
+        return place, there
 
 
 def stop_of(test: TestFunction) -> Stop | None:

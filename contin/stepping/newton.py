@@ -82,15 +82,12 @@ class Corrected:
     iterations : int
     error : float
         Estimated error left, the largest component relative to 1 + |x|.
-    along : ndarray, shape (size,), or None
-        The vector t with F_x t = 0 and row.t = 1 that this factorization gives, where it is at hand.
     """
 
     x: Array
     factors: Factors
     iterations: int
     error: float
-    along: Array | None = None
 
 
 def correct(
@@ -139,10 +136,9 @@ def _newton(
     system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes | None
 ) -> Corrected:
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
-    rows, bordered = ((), 0) if row is None else ((row,), 1)
+    rows = () if row is None else (row,)
     x, progress = np.array(guess, dtype=float), _Progress(newton.tolerance)
     factors: Factors | None = None
-    along: Array | None = None
     with np.errstate(all="ignore"):
         for _ in range(newton.max_iterations):
             fresh = factors is None
@@ -150,14 +146,7 @@ def _newton(
                 residual, factors = system.linearize(x, rows)
             else:
                 residual = system.residual(x)
-            right = np.zeros((1 + (bordered and fresh), residual.size + bordered))
-            right[0, : residual.size] = residual
-            if row is not None:
-                right[0, -1] = row @ x - target
-            if len(right) > 1:  # the direction along the curve comes with the update, at next to no cost
-                right[1, -1] = 1.0
-            found = factors.solve(right)
-            update, along = found[0], found[1] if len(right) > 1 else along
+            update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
             size = _move(x, update)
             if not math.isfinite(size):
                 break
@@ -165,7 +154,7 @@ def _newton(
             if progress.converged or (progress.stagnates and _is_noise(system, x, update, rows, _ROUND_OFF)):
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
-                    return Corrected(x, factors, len(progress.sizes), progress.error, along)
+                    return Corrected(x, factors, len(progress.sizes), progress.error)
                 return _settled(system, x, row, target, newton, sizes, progress.sizes)
             if progress.diverges:
                 break

@@ -43,9 +43,9 @@ def settled(trial: Trial, along: Array, newton: Newton) -> Trial:
         row = system.weights * tangent / np.sqrt(inner(system, tangent, tangent))
         try:
             done = correct(system, x, row, row @ x, newton)
+            found = trial_of(system, dataclasses.replace(done, iterations=trial.iterations, error=trial.newton_error), row)
         except ConvergenceError:
             break
-        found = trial_of(system, dataclasses.replace(done, iterations=trial.iterations, error=trial.newton_error))
     return trial if found is trial else _carried_back(trial, found)
 
 

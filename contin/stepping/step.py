@@ -14,19 +14,16 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.discretization.protocol import Discretization
+from contin.errors import ConvergenceError
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import ReadOnlyVector, Vector
 from contin.linalg.factors import Factors
 from contin.stepping.newton import Corrected, Newton, correct
 from contin.stepping.state import State
-from contin.stepping.trial import Linearization, Trial, linearization, unit_tangent
+from contin.stepping.trial import Trial, linearization, linearization_of
 
 #: Share of the states in a unit tangent below which their direction is not compared: the states hardly take part in the step.
 _STILL = 0.01
-#: Length over which a difference of residuals stands for the product of Jacobian and tangent: the square root of round-off,
-#: times a hundred for large states. The curvature over it adds an error as large.
-_NEAR = 1e-6
-
 #: A step ends at this many times the distance to a limit, along the tangent, at most: beyond it, and not much. Ten times
 #: larger, a parameter that the equations divide by went through zero, and three branch points before it were lost.
 _BEYOND = 1.25
@@ -62,19 +59,28 @@ def up_to_limits(state: State, limits: Mapping[str, Sequence[float]], least: flo
 
 
 def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
-    """Return the point of the curve at ``step`` along the state's tangent; its tangent comes from Newton's last factors.
+    """Return the point of the curve at ``step`` along the state's tangent, linearized right there.
 
     Raises
     ------
     ConvergenceError
+        It is not found, or the equations are not finite there.
     """
-    return trial_of(state.system, _corrected(state, guess, step, newton))
+    return trial_of(state.system, _corrected(state, guess, step, newton), state.row)
 
 
-def trial_of(system: Discretization, done: Corrected) -> Trial:
-    """Return the trial of a corrected point, with Newton's last factors."""
-    tangent = unit_tangent(system, done.factors, done.along)
-    return Trial(system, done.x, Linearization(tangent, done.factors.sign, done.factors), done.iterations, done.error)
+def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
+    """Return the trial of a corrected point, linearized right there: Newton's last factors are those of an iterate before.
+
+    Raises
+    ------
+    ConvergenceError
+        The equations are not finite there.
+    """
+    residual, factors = system.linearize(done.x, (row,))
+    if not np.isfinite(residual).all():
+        raise ConvergenceError("the equations are not finite at the corrected point")
+    return Trial(system, done.x, linearization_of(system, factors), done.iterations, done.error)
 
 
 def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Trial:
@@ -95,21 +101,6 @@ def _corrected(state: State, guess: Array, step: float, newton: Newton, factors:
     return correct(state.system, guess, row, row @ state.x + step, newton, factors)
 
 
-def sharpened(state: State, trial: Trial) -> Trial:
-    """Return the same point linearized right there (Newton leaves the factors of the iterate before)."""
-    return trial.sharpened(linearization(state.system, trial.x, state.row))
-
-
-def tangent_error(trial: Trial, residual: Array) -> Array:
-    """Return an estimate of the error of a trial's tangent, shape (size,); ``residual`` is that at its x.
-
-    One step of iterative refinement, with the product of Jacobian and tangent by a difference.
-    """
-    bent = (trial.system.residual(trial.x + _NEAR * trial.tangent) - residual) / _NEAR
-    error: Array = trial.factors.solve(np.append(bent, 0.0))
-    return error
-
-
 class Judgement(NamedTuple):
     """What a step is judged by.
 
@@ -120,27 +111,23 @@ class Judgement(NamedTuple):
     turn : float
         Angle between the tangents at both ends: the larger of the whole one and half that of the states alone. Where parameters
         are large they dominate the norm, and tangents of different branches can look parallel.
-    hidden_turn : float
-        Angle by which the cubic through both ends, along their tangents, turns away from them in its middle.
     length : float
         Distance between both ends.
     """
 
     missed: float
     turn: float
-    hidden_turn: float
     length: float
 
 
 def judged(state: State, guess: Array, trial: Trial) -> Judgement:
     """Return what the step from a state to a corrected point is judged by."""
-    system, sums = state.system, np.empty(7)
+    system, sums = state.system, np.empty(6)
     fill_sums(Arc(state.x, state.tangent, trial.x, trial.tangent, guess), system.weights, system.state_size, sums)
-    missed, whole, part, first, last, chord, across = sums.tolist()
+    missed, whole, part, first, last, chord = sums.tolist()
     sizes = math.sqrt(first), math.sqrt(last)
     cosine = part / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
-    hidden = 1.5 * math.sqrt(across / chord) if chord else math.nan
-    return Judgement(math.sqrt(missed), max(_angle(whole), _angle(cosine) / 2), hidden, math.sqrt(chord))
+    return Judgement(math.sqrt(missed), max(_angle(whole), _angle(cosine) / 2), math.sqrt(chord))
 
 
 class Arc(NamedTuple):
@@ -157,31 +144,24 @@ class Arc(NamedTuple):
 def fill_sums(arc: Arc, weights: ReadOnlyVector, states: int, sums: Vector) -> None:
     """Fill the weighted inner products that `judged` uses.
 
-    |guess - last|^2, t.T of the tangents, and of the states alone t.T, |t|^2, |T|^2; |c|^2 of the chord, and the same of its
-    part across t + T.
+    |guess - last|^2, t.T of the tangents, and of the states alone t.T, |t|^2, |T|^2; |c|^2 of the chord.
     """
     x, tangent, last, last_tangent, guess = arc
-    missed, whole, along, mean, chord = 0.0, 0.0, 0.0, 0.0, 0.0
+    missed, whole, chord = 0.0, 0.0, 0.0
     part, first_size, last_size = 0.0, 0.0, 0.0
     for i in range(x.size):
         weight, one, other = weights[i], tangent[i], last_tangent[i]
-        gap, gone, both = guess[i] - last[i], last[i] - x[i], one + other
+        gap, gone = guess[i] - last[i], last[i] - x[i]
         missed += weight * gap * gap
         whole += weight * one * other
-        along += weight * gone * both
-        mean += weight * both * both
         chord += weight * gone * gone
     for i in range(states):
         weight, one, other = weights[i], tangent[i], last_tangent[i]
         part += weight * one * other
         first_size += weight * one * one
         last_size += weight * other * other
-    share, across = along / mean, 0.0
-    for i in range(x.size):
-        aside = last[i] - x[i] - share * (tangent[i] + last_tangent[i])
-        across += weights[i] * aside * aside
     sums[0], sums[1], sums[2], sums[3] = missed, whole, part, first_size
-    sums[4], sums[5], sums[6] = last_size, chord, across
+    sums[4], sums[5] = last_size, chord
 
 
 def _angle(cosine: float) -> float:

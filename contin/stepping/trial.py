@@ -17,7 +17,7 @@ from contin.linalg.factors import Factors
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """The tangent of a curve at a point, and the factored matrix [F_x; row] that it came from.
+    """The tangent of a curve at a point, and the factored matrix [F_x; row] right there that it came from.
 
     Attributes
     ----------
@@ -26,30 +26,22 @@ class Linearization:
     sign : float
         Sign of the determinant of [F_x; row].
     factors : Factors or None
-    exact : bool
-        The matrix was taken right at the point, and not at the iterate before it.
     """
 
     tangent: Array
     sign: float
     factors: Factors | None = None
-    exact: bool = False
 
 
 def linearization(system: Discretization, x: Array, row: Array) -> Linearization:
-    """Return the linearization right at x, its tangent with row.tangent > 0."""
-    factors = system.linearize(x, (row,))[1]
-    return Linearization(unit_tangent(system, factors), factors.sign, factors, exact=True)
+    """Return the linearization at x, its tangent with row.tangent > 0."""
+    return linearization_of(system, system.linearize(x, (row,))[1])
 
 
-def unit_tangent(system: Discretization, factors: Factors, along: Array | None = None) -> Array:
-    """Return the unit tangent from factors of [F_x; row], with row.tangent > 0.
-
-    ``along`` is the solution of [F_x; row] t = [0; 1], where it is known already.
-    """
-    tangent = factors.solve(np.append(np.zeros(system.equations), 1.0)) if along is None else along
-    unit: Array = tangent / np.sqrt(inner(system, tangent, tangent))
-    return unit
+def linearization_of(system: Discretization, factors: Factors) -> Linearization:
+    """Return the linearization that factors of [F_x; row] give, its tangent with row.tangent > 0."""
+    tangent = factors.solve(np.append(np.zeros(system.equations), 1.0))
+    return Linearization(tangent / np.sqrt(inner(system, tangent, tangent)), factors.sign, factors)
 
 
 class Trial:
@@ -126,17 +118,8 @@ class Trial:
         return (self._linear or self.linear).factors
 
     def refactor(self, row: Array) -> None:
-        """Take the factors anew, right at x, bordered by ``row``; tangent and sign stay."""
-        self._linear = dataclasses.replace(self.linear, factors=self._at_x(row))
-
-    def sharpen_factors(self, row: Array) -> None:
-        """Take the factors right at x unless they are from there, and the sign with them; the tangent stays."""
-        if not self.linear.exact:
-            factors = self._at_x(row)
-            self._linear = dataclasses.replace(self.linear, sign=factors.sign, factors=factors, exact=True)
-
-    def _at_x(self, row: Array) -> Factors:
-        return self.system.linearize(self.x, (row,))[1]
+        """Take the factors anew, bordered by ``row``; tangent and sign stay."""
+        self._linear = dataclasses.replace(self.linear, factors=self.system.linearize(self.x, (row,))[1])
 
     def value(self, test: TestFunction) -> float:
         """Return the value of a test function, computed once: a point that two steps share has one value for both."""
@@ -162,12 +145,6 @@ class Trial:
                 self.refactor(self.system.weights * self.tangent)
             self._discretization_error = self.system.discretization_error(self.x, self.factors, self.functionals)
         return self._discretization_error
-
-    def sharpened(self, linear: Linearization) -> Trial:
-        """Return the same point with a better linearization; what was computed of it is kept."""
-        other = Trial(self.system, self.x, linear, self.iterations, self.newton_error)
-        other._functionals, other._discretization_error = self._functionals, self._discretization_error
-        return other
 
     def __getitem__(self, name: str) -> float:
         """Return a parameter, a functional, or a state of an equilibrium, by name."""

@@ -10,7 +10,7 @@ from contin.detection.folds import FoldSearch
 from contin.detection.segment import Segment
 from contin.detection.test_functions import fold
 from contin.stepping.state import standing_at
-from contin.stepping.step import corrected, predict, sharpened
+from contin.stepping.step import corrected, predict
 from contin.stepping.trial import linearization
 
 
@@ -26,8 +26,8 @@ def search(square, start, step):
     x = np.array([start, start**3 / 3 - square * start])
     tangent = linearization(system, x, np.array([1.0, 0.0])).tangent
     state = standing_at(system, x, tangent, step)
-    before = sharpened(state, corrected(state, x, 0.0, Newton()))
-    trial = sharpened(state, corrected(state, predict(state, step), step, Newton()))
+    before = corrected(state, x, 0.0, Newton())
+    trial = corrected(state, predict(state, step), step, Newton())
     segment = Segment(state, (0.0, before), trial, step, Newton())
     return FoldSearch(segment, fold("mu"), lambda: None), (0.0, before), (step, trial)
 
@@ -63,7 +63,7 @@ def test_a_parameter_that_does_not_move_has_no_folds():
     problem = AlgebraicProblem(lambda u, p: (p.mu * (1 + u.x**2),), ["x"], {"mu": 0.0})
     system = Algebraic(problem, ["mu"])
     state = standing_at(system, np.zeros(2), np.array([1.0, 0.0]), 0.5)
-    before, trial = (sharpened(state, corrected(state, predict(state, s), s, Newton())) for s in (0.0, 0.5))
+    before, trial = (corrected(state, predict(state, s), s, Newton()) for s in (0.0, 0.5))
     search = FoldSearch(Segment(state, (0.0, before), trial, 0.5, Newton()), fold("mu"), lambda: None)
     assert search.between((0.0, before), (0.5, trial)) == []
 

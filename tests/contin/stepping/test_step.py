@@ -7,7 +7,7 @@ import pytest
 
 from contin import Algebraic, AlgebraicProblem, ConvergenceError, Newton
 from contin.stepping.state import State, standing_at
-from contin.stepping.step import corrected, judged, located, predict, sharpened, tangent_error
+from contin.stepping.step import corrected, judged, located, predict
 from contin.stepping.trial import Linearization, Trial
 
 
@@ -73,7 +73,7 @@ def test_the_corrected_point_lies_at_its_distance_along_the_tangent(find, step):
     assert trial.x == pytest.approx(x, abs=1e-11)
     assert state.tangent @ (trial.x - state.x) == pytest.approx(step, abs=1e-13)
     assert trial.is_linearized == (find is corrected)
-    assert sharpened(state, trial).tangent == pytest.approx(tangent, abs=1e-11)
+    assert trial.tangent == pytest.approx(tangent, abs=1e-11)
     assert trial.iterations > 1 and trial.newton_error < 1e-11
 
 
@@ -89,30 +89,7 @@ def test_a_point_that_is_located_takes_the_factors_at_hand():
     near = located(state, predict(state, 0.3), 0.3, Newton())
     trial = located(state, near.x, 0.3001, Newton(), near.factors)
     assert trial.x == pytest.approx(target(0.7, 0.3001)[0], abs=1e-12)
-    assert trial.linear.exact and trial.tangent == pytest.approx(target(0.7, 0.3001)[1], abs=1e-12)
-
-
-# --- how well the tangent is known ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("off", [1e-2, 1e-4])
-def test_the_error_of_a_tangent_is_estimated(off):
-    """A tangent of the point ``off`` further along, with that point's factors: the estimate is the difference of both."""
-    state = state_at(0.7)
-    x, exact = target(0.7, 0.3)
-    beside, wrong = target(0.7, 0.3 + off)
-    factors = state.system.linearize(beside, (state.row,))[1]
-    trial = Trial(state.system, x, Linearization(wrong, 1.0, factors))
-    error = tangent_error(trial, state.system.residual(x))
-    # the estimate is no unit vector: it keeps the length along the state's tangent, as the solution of the bordered matrix does
-    scaled = exact * (state.tangent @ wrong) / (state.tangent @ exact)
-    assert error == pytest.approx(wrong - scaled, rel=0.03, abs=1e-7)
-
-
-def test_an_exact_tangent_has_no_error():
-    state = state_at(0.7)
-    trial = sharpened(state, corrected(state, predict(state, 0.3), 0.3, Newton()))
-    assert np.abs(tangent_error(trial, state.system.residual(trial.x))).max() < 1e-5  # the difference has a length of 1e-6
+    assert trial.tangent == pytest.approx(target(0.7, 0.3001)[1], abs=1e-12)
 
 
 def judgement(state, trial):
@@ -169,20 +146,3 @@ def test_states_that_stand_still_have_no_direction():
 def test_a_tangent_that_is_not_a_number_has_no_turn():
     state = state_at(0.7)
     assert math.isnan(judgement(state, trial_at(state.system, at(0.8)[0], [math.nan, math.nan])).turn)
-
-
-@pytest.mark.parametrize("height", [1e-3, 0.02, 0.1])
-def test_a_hidden_turn_is_that_of_the_cubic_between_the_ends(height):
-    """Ends with the same tangent, the second one h aside at a distance of 1: y = h (3 s^2 - 2 s^3), whose slope is 1.5 h."""
-    system = circle()
-    state = standing_at(system, np.zeros(2), np.array([1.0, 0.0]), 1.0)
-    found = judgement(state, trial_at(system, [1.0, height], [1.0, 0.0])).hidden_turn
-    assert found == pytest.approx(1.5 * height, rel=height)
-    assert judgement(state, trial_at(system, [1.0, height], [1.0, 0.0])).turn == 0
-
-
-@pytest.mark.parametrize("arc", [0.1, 0.8])
-def test_an_even_turn_hides_nothing(arc):
-    """On the circle the chord lies half-way between both tangents."""
-    state = state_at(0.7)
-    assert judgement(state, trial_at(state.system, *at(0.7 + arc))).hidden_turn < 1e-12
