@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,13 +26,12 @@ from contin.continuation.corners import jump, unsettled, why_lost
 from contin.continuation.failure import no_convergence, shorter_steps
 from contin.continuation.scaling import outgrown, renewed, scaled
 from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
-from contin.detection.census import census_of, contradiction
 from contin.detection.extrema import extremum
 from contin.detection.hopf_end import collapsed
 from contin.detection.inspection import Inspection, Start
 from contin.detection.phase_loads import phase_loads
 from contin.detection.refinement import refined
-from contin.detection.second_variation import Stability, index_of, nullity_of, stability_of
+from contin.detection.second_variation import Stability, contradiction, index_of, nullity_of, stability_of
 from contin.detection.segment import Place, Segment, SpecialPoint, with_details
 from contin.detection.significance import STANDS, free_values, growing, sense
 from contin.detection.test_functions import (
@@ -48,6 +47,7 @@ from contin.detection.test_functions import (
     within_limits,
 )
 from contin.detection.trivial import crossed, jumped
+from contin.detection.watch import watch_list
 from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError, ProblemError
 from contin.names import exact_text, value_names
@@ -133,16 +133,20 @@ class Step(NamedTuple):
     Attributes
     ----------
     segment : Segment
-    inspection : Inspection
     judgement : Judgement
+    special : sequence of SpecialPoint
+        Inside it, in order.
+    turns : bool
+        The primary parameter turns inside it.
     doubt : str
         What is left of it where the step cannot be halved any more.
     """
 
     segment: Segment
-    inspection: Inspection
     judgement: Judgement
-    doubt: str
+    special: Sequence[SpecialPoint] = ()
+    turns: bool = False
+    doubt: str = ""
 
     @property
     def end(self) -> Trial:
@@ -210,7 +214,7 @@ class Continuation:
         self._ends = [test for test in self._tests if test.terminal and not test.limit]
         self._comparable = general  # have the same sign on every mesh
         self._index = index_of(self.state.system)
-        self._census = census_of(self.state.system) if settings.folds and settings.branch_points else None
+        self._watch = watch_list(self.state.system, settings, self._tests, self._fold, self._index)
         self.notes: list[str] = []
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
@@ -370,8 +374,7 @@ class Continuation:
             label, name = ("EP", self.stop.message.removeprefix("met ")) if met else ("MX", "no convergence")
             yield self._point(SpecialPoint(0.0, label, name, self._state_trial()), self.state, accuracy=self._accuracy)
             return
-        segment, inspection = step.segment, step.inspection
-        special = [own_end(segment.trial.system, point) for point in inspection.special_points(self._tests)]
+        segment, special = step.segment, [own_end(step.segment.trial.system, point) for point in step.special]
         special = within_limits(segment, special, self._limits)
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
         found = [self._located(point) for point in special[: end + 1]]
@@ -386,7 +389,7 @@ class Continuation:
             yield self._point(point, segment.state, change)
             if self.stop is not None:
                 return
-        self.state = self._accept(segment, step.judgement, inspection.turns)
+        self.state = self._accept(segment, step.judgement, step.turns)
         self._stand_at(step.end)
         self._note_corners(step.end)
         if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
@@ -510,11 +513,13 @@ class Continuation:
             try:
                 segment, judgement = self._attempt(state, step)
                 inspection = Inspection(segment, settings, self.start, self._fold)
+                if not (state.singular or segment.is_moved or any(asks(inspection) for asks in self._watch)):
+                    return Step(segment, judgement)
                 doubt = inspection.doubt() or self._contradiction(segment, inspection) or self._lost_end(segment, inspection)
                 doubt = doubt or self._moved_past(segment.trial) or inspection.strays(self._tests)
                 if step < 2 * finest or not doubt:
-                    inspection.special_points(self._tests)  # where points inside cannot be found the step is halved
-                    return Step(segment, inspection, judgement, doubt)
+                    special = inspection.special_points(self._tests)  # where these cannot be found the step is halved
+                    return Step(segment, judgement, special, inspection.turns, doubt)
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
@@ -631,15 +636,15 @@ class Continuation:
     # --- the index -----------------------------------------------------------------------------------------------
 
     def _contradiction(self, segment: Segment, inspection: Inspection) -> str:
-        """Return how the change of index or number of eigenvalues over a step contradicts its special points; "" if not."""
-        if not contradiction(self._census, segment, ()):
+        """Return how the change of index over a step contradicts its special points; "" if not."""
+        if not contradiction(self._index, segment, ()):
             return ""  # without special points, which take time
-        return contradiction(self._census, segment, inspection.special_points(self._tests))
+        return contradiction(self._index, segment, inspection.special_points(self._tests))
 
     def _note_doubts(self, segment: Segment, found: list[SpecialPoint], doubt: str) -> None:
-        """Note what the labelled points of a step do not explain: a change of the count or, without one, a doubt."""
-        contradicts = contradiction(self._census, segment, found)
-        if contradicts and (self._census is not self._index or not found):  # beside points, changes of the index are noted
+        """Note what the labelled points of a step do not explain: a change of the index or, without one, a doubt."""
+        contradicts = contradiction(self._index, segment, found)
+        if contradicts and not found:  # beside points, changes of the index are noted
             self._note(f"{contradicts}, and the labelled points do not explain it", segment)
         elif doubt and not contradicts:
             self._note(doubt, segment)

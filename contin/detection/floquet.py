@@ -201,7 +201,7 @@ def doubling(order: int = 1) -> TestFunction:
     (-1)^n = 1 there: cycles of the same period branch off that have lost the symmetry.
     """
     label, name = ("PD", "period doubling") if order % 2 else ("BP", "symmetry breaking")
-    return TestFunction(label, name, _antiperiodic, search=_doublings, describe=_of_doubling)
+    return TestFunction(label, name, _antiperiodic, search=_doublings, asks=_may_double, describe=_of_doubling)
 
 
 def _antiperiodic(trial: Trial) -> float:
@@ -215,6 +215,12 @@ def _antiperiodic(trial: Trial) -> float:
 
 def _of_doubling(trial: Trial) -> dict[str, float]:
     return {"frequency": math.pi, "pairs": 1}
+
+
+def _may_double(segment: Segment) -> bool:
+    """Return whether there may be period doublings inside a step."""
+    test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
+    return not segment.before.value(test) * segment.trial.value(test) > 0 or _comes_near(segment, _from_doubling)
 
 
 def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
@@ -357,12 +363,17 @@ def _followed(segment: Segment, at: float, square: float, test: TestFunction) ->
 
 def torus() -> TestFunction:
     """Return the test function of torus bifurcations: the largest real part of the logarithm of a complex multiplier."""
-    return TestFunction("TR", "torus", hopf().function, search=_tori)
+    return TestFunction("TR", "torus", hopf().function, search=_tori, asks=_may_twist)
+
+
+def _may_twist(segment: Segment) -> bool:
+    """Return whether there may be torus bifurcations inside a step."""
+    return _unstable(segment.before) != _unstable(segment.trial) or _comes_near(segment, _from_torus)
 
 
 def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
-    if _unstable(segment.before) == _unstable(segment.trial) and not _comes_near(segment, _from_torus):
+    if not _may_twist(segment):
         return []
     return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
 

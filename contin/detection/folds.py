@@ -48,9 +48,35 @@ class _Parabola(NamedTuple):
     linear: float
     square: float
 
+    @property
+    def dips(self) -> bool:
+        """It comes near zero between the places."""
+        first, last, linear, square = self
+        return 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * min(first, last)
+
+    @property
+    def ends_low(self) -> bool:
+        """It is near zero at one place already, and lower beside it."""
+        first, last, linear, square = self
+        inwards = linear if first < last else -linear - 2 * square
+        return min(first, last) < _BESIDE * square and inwards < _SHALLOW * square
+
     def times(self, sense: float) -> _Parabola:
         """Return the parabola multiplied by a sign."""
         return _Parabola(sense * self.first, sense * self.last, sense * self.linear, sense * self.square)
+
+
+def may_turn(segment: Segment, fold: TestFunction) -> bool:
+    """Return whether the primary parameter may turn inside a step, by its rates at both ends and their parabola.
+
+    It may, too, where its sense cannot be told at an end, or is not that in which it went before.
+    """
+    ends = senses(segment, fold)
+    if not ends[0] * ends[1] > 0 or segment.state.sense * ends[1] < 0:
+        return True
+    search = FoldSearch(segment, fold, lambda: None)
+    parabola = search._parabola((segment.low, segment.before), (segment.step, segment.trial)).times(ends[0])
+    return parabola.dips or parabola.ends_low
 
 
 class FoldSearch:
@@ -215,14 +241,11 @@ class FoldSearch:
         close to zero already: that end.
         """
         a, width = left[0], right[0] - left[0]
-        first, last, linear, square = parabola.first, parabola.last, parabola.linear, parabola.square
-        smaller = min(first, last)
-        if 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * smaller:
+        first, last, linear, square = parabola
+        if parabola.dips:
             s = a - width * linear / (2 * square)
             return (s, self.segment.at(s)), square / width**2
-        inwards = linear if first < last else -linear - 2 * square
-        beside = smaller < _BESIDE * square and inwards < _SHALLOW * square
-        return (left if first < last else right) if beside else None, square / width**2
+        return (left if first < last else right) if parabola.ends_low else None, square / width**2
 
     @staticmethod
     def _distance(place: Place, apart: float, left: Place, right: Place) -> float | None:

@@ -49,7 +49,12 @@ def hopf() -> TestFunction:
         parts = values[_is_complex(values)].real
         return float(parts.max()) if parts.size else float("nan")
 
-    return TestFunction("HB", "Hopf", function, search=hopf_points)
+    return TestFunction("HB", "Hopf", function, search=hopf_points, asks=may_pass)
+
+
+def may_pass(segment: Segment) -> bool:
+    """Return whether a pair may pass the axis inside a step, by how far eigenvalues move between its ends."""
+    return _moving([(segment.low, segment.before), (segment.step, segment.trial)])[0]
 
 
 def critical_real_part(frequency: float) -> Callable[[Trial], float]:
@@ -106,11 +111,11 @@ def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
 
 
 def _moving(places: list[Place]) -> list[bool]:
-    """Return between which of some places eigenvalues move further than they are from the imaginary axis.
+    """Return between which of some places a pair of eigenvalues may move to the imaginary axis, by how far all of them move.
 
-    Where all move less, each is nearer to one on its own side of the axis than to any on the other: none changes the side.
-    Those on the axis at both places do not count. They are taken to move as fast as beside the two places too: ones that go
-    to the axis and come back look as if they stood.
+    Where all move less than they are from it, each is nearer to one on its own side of the axis than to any on the other: none
+    changes the side. Those on the axis at both places do not count, nor does the one that is nearest to it: a pair is two. They
+    are taken to move as fast as beside the two places too: ones that go to the axis and come back look as if they stood.
     """
     system: Any = places[0][1].system
     values = system.eigenvalues_at([trial.x for _, trial in places])
@@ -118,7 +123,8 @@ def _moving(places: list[Place]) -> list[bool]:
         return [True] * (len(places) - 1)
     along = np.sort(np.array(values), axis=1)
     sizes = np.abs(along.real)
-    distances = np.where((sizes[1:] == 0) & (sizes[:-1] == 0), np.inf, np.minimum(sizes[1:], sizes[:-1])).min(axis=1)
+    distances = np.where((sizes[1:] == 0) & (sizes[:-1] == 0), np.inf, np.minimum(sizes[1:], sizes[:-1]))
+    distances = np.sort(distances, axis=1)[:, 1] if distances.shape[1] > 1 else np.full(len(distances), np.inf)
     lengths = np.diff([s for s, _ in places])
     speeds = np.pad(np.abs(along[1:] - along[:-1]).max(axis=1) / lengths, 1)
     fastest = np.maximum(np.maximum(speeds[:-2], speeds[2:]), speeds[1:-1])

@@ -26,7 +26,7 @@ from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.problems.cycle import PERIOD
 from contin.stepping.state import Stop
-from contin.stepping.trial import Trial
+from contin.stepping.trial import TestFunction, Trial
 
 #: The Hopf point lies no further off the cubic through both ends of the step than this part of the step; branch points neither.
 _OFF = 0.1
@@ -44,6 +44,15 @@ _FIRST = 1e-8
 _ON_AXIS = 1e-9
 
 
+#: The size of a cycle as a part of an earlier one of the run, with a sign.
+AMPLITUDE = TestFunction("HB", "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
+
+
+def shrinks(system: Discretization) -> bool:
+    """Return whether solutions of a kind of problem can shrink onto others: whether it has an amplitude."""
+    return isinstance(system, CycleCollocation)
+
+
 @functools.singledispatch
 def own_home(system: Discretization, segment: Segment) -> SpecialPoint | None:
     """Return the end of a branch inside a step that a kind of problem knows, or None. Each kind registers its own."""
@@ -53,7 +62,7 @@ def own_home(system: Discretization, segment: Segment) -> SpecialPoint | None:
 @own_home.register
 def _of_cycles(system: CycleCollocation, segment: Segment) -> SpecialPoint | None:
     """The Hopf point inside a step of a branch of cycles."""
-    before, trial = (system.amplitude(place.x) for place in (segment.before, segment.trial))
+    before, trial = segment.before.value(AMPLITUDE), segment.trial.value(AMPLITUDE)
     if not before > 0 > trial:
         return None
     try:

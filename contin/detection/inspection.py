@@ -92,7 +92,7 @@ class Inspection:
 
     def __init__(self, segment: Segment, settings: Settings, start: Start, fold: TestFunction | None) -> None:
         self.segment, self.settings, self.start, self.fold = segment, settings, start, fold
-        self._branch_points = BranchPointSearch(segment)
+        self.branch_points = BranchPointSearch(segment)
         self._found: list[SpecialPoint] | None = None
 
     # --- does the step stay on its branch? -----------------------------------------------------------------------
@@ -105,7 +105,7 @@ class Inspection:
         """
         if self._own_home is not None:
             return ""  # the equations are singular there, and what they say of other points is blurred
-        count, clear = self._branch_points.count if self.settings.branch_points else (0, True)
+        count, clear = self.branch_points.count if self.settings.branch_points else (0, True)
         if not clear:
             return "the linearized equations come close to singular: branch points may have been passed"
         if self._home is not None and not self._home.is_located:
@@ -113,9 +113,9 @@ class Inspection:
         if not self.settings.branch_points:
             return ""
         if count > 1:
-            located, what = self._branch_points.multiple.is_located, f"{count} branch points in one step were not told apart"
+            located, what = self.branch_points.multiple.is_located, f"{count} branch points in one step were not told apart"
         else:
-            located = not self._branch_points.sign_changes or self._branch_points.simple.is_located
+            located = not self.branch_points.sign_changes or self.branch_points.simple.is_located
             what = _STRAYS
         return "" if located else what
 
@@ -125,13 +125,13 @@ class Inspection:
         The determinant changes its sign where branches cross, labelled or not, and where a kind of problem knows its equations
         to be singular; otherwise Newton's method left the branch: another arm of it beside a fold is passed the other way.
         """
-        if self.settings.branch_points or self._own_home is not None or not self._branch_points.sign_changes:
+        if self.settings.branch_points or self._own_home is not None or not self.branch_points.sign_changes:
             return ""
         for point in self.special_points(tests):
             ends = point.stop is not None and not (point.test is not None and point.test.limit)
             if point.is_located and (point.label == "BP" or ends):
                 return ""
-        return "" if self._branch_points.simple.is_located else _STRAYS
+        return "" if self.branch_points.simple.is_located else _STRAYS
 
     # --- special points ------------------------------------------------------------------------------------------
 
@@ -152,10 +152,10 @@ class Inspection:
         home = self._home
         if home is not None:
             found.append(home)
-        elif self.settings.branch_points and self._branch_points.count[0] > 1:
-            found.append(self._branch_points.multiple)
-        elif self.settings.branch_points and self._branch_points.sign_changes:
-            found.append(self._branch_points.simple)
+        elif self.settings.branch_points and self.branch_points.count[0] > 1:
+            found.append(self.branch_points.multiple)
+        elif self.settings.branch_points and self.branch_points.sign_changes:
+            found.append(self.branch_points.simple)
         crossings = [point for point in found if point.is_located]
         for test in tests:
             found += self._zeros(test, crossings)
@@ -191,8 +191,8 @@ class Inspection:
         fold: Any = self.fold
         if self._home is not None:
             found = dataclasses.replace(self._home, stop=None)
-        elif self.settings.branch_points and self._branch_points.sign_changes:
-            found = self._branch_points.simple
+        elif self.settings.branch_points and self.branch_points.sign_changes:
+            found = self.branch_points.simple
         else:
             return None
         if not isinstance(found.details, BranchPoint) or not found.details.tangents:
@@ -303,8 +303,8 @@ class Inspection:
         if name is None or not crossed(before, trial, name, segment.newton):
             return None
         stop = Stop("trivial branch", f"returned to the trivial branch ({name} = 0)")
-        if not self.settings.branch_points or self._branch_points.sign_changes:
-            point = self._branch_points.simple
+        if not self.settings.branch_points or self.branch_points.sign_changes:
+            point = self.branch_points.simple
             if self._is_home(point):
                 return dataclasses.replace(point, label="EP", name="trivial branch", stop=stop)
         test = TestFunction("EP", "trivial branch", lambda there: there[name], terminal=True)
@@ -324,12 +324,17 @@ class Inspection:
             return False
         return segment.distance(point.trial.x, point.at) < _OFF * segment.step
 
+    def may_close(self) -> bool:
+        """Return whether the first point of the run may lie in this step."""
+        home, x, _ = self.start
+        return self.segment.state.accepted >= _FEWEST and not self._is_elsewhere(home, x)
+
     def _closed(self) -> SpecialPoint | None:
         """Return the end of a branch that comes back to its first point."""
         segment = self.segment
         state, trial, step = segment.state, segment.trial, segment.step
         home, x, tangent = self.start
-        if state.accepted < _FEWEST or self._is_elsewhere(home, x):
+        if not self.may_close():
             return None
         if home is not state.system:
             carry = home.carrier(state.system)

@@ -24,14 +24,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.detection.segment import SpecialPoint
+from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.basis import interpolation
 from contin.discretization.collocation import Collocation
 from contin.discretization.protocol import Discretization
@@ -118,6 +118,20 @@ def _index(trial: Trial) -> float:
 
 #: One object, so that a trial computes its index once.
 _INDEX = TestFunction("", "index", _index)
+
+
+def contradiction(index: TestFunction | None, segment: Segment, special: Iterable[SpecialPoint]) -> str:
+    """Return how the index over a step contradicts its special points, as a clause; "" where it does not.
+
+    It changes at special points only, by no more than the dimension of what vanishes there. A larger change means that
+    something was passed in silence. The index knows nothing of how special points are found.
+    """
+    if index is None:
+        return ""
+    before, after = segment.before.value(index), segment.trial.value(index)
+    if not abs(after - before) > sum(map(nullity_of, special)):
+        return ""
+    return f"the {index.name} goes from {before:g} to {after:g}"
 
 
 @dataclass(frozen=True)

@@ -106,6 +106,11 @@ class Segment:
         #: Newton's method, does so in other steps.
         self._factors = trial.factors if trial.is_linearized else None
 
+    @property
+    def is_moved(self) -> bool:
+        """The end is another point on a mesh with points where conditions switch."""
+        return self.trial.settled is not self.trial
+
     def at(self, distance: float) -> Trial:
         """Return the point of the curve at a distance along the state's tangent.
 

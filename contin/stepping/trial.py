@@ -181,6 +181,8 @@ class TestFunction:
     search : callable, optional
         ``search(segment, places)`` returns the special points between places of a step (`contin.detection.segment`), where a
         sign does not tell them all; None where it does.
+    asks : callable, optional
+        ``asks(segment) -> bool``: whether ``search`` may find something in a step; without it, it is called for every step.
     looks : int
         Number of places inside a step where the sign is looked at, too: two zeros in one step leave it as it was at the ends.
     unless : str
@@ -208,6 +210,7 @@ class TestFunction:
     describe: Callable[[Trial], object] | None = None
     limit: bool = False
     search: Callable[..., Any] | None = None
+    asks: Callable[..., bool] | None = None
     looks: int = 0
     unless: str = ""
     column: str = ""

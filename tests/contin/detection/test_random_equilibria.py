@@ -10,7 +10,6 @@ import pytest
 
 import contin
 from contin.detection.branch_point import locate_branch_point
-from contin.detection.branch_points import BranchPointSearch
 from contin.detection.crossings import crossings, quotients
 from contin.linalg.dense import DenseFactors
 from contin.linalg.rightmost import nearest
@@ -190,14 +189,3 @@ def test_a_count_that_is_clear_is_right(seed):
     count, clear = crossings(quotients(before, after, n + 1))
     if clear:
         assert count == np.count_nonzero((spectrum > low) & (spectrum < high))
-
-
-def test_what_the_labels_do_not_explain_is_noted(monkeypatch):
-    """Were the double point not seen in the matrices, the number of unstable eigenvalues, 2 more behind it, would tell."""
-    monkeypatch.setattr(BranchPointSearch, "count", (0, True))
-    branch = trivial_branch([12.0, 14.0, 14.0], 1, symmetric=True)
-    assert [round(point["lam"]) for point in branch.labelled("BP")] == [12]
-    (note,) = branch.notes
-    assert note.startswith("the number of unstable eigenvalues goes from 1 to 3, and the labelled points do not explain it")
-    low, high = map(float, note.rstrip(")").partition("lam = ")[2].split(" and "))
-    assert low < 14 < high
