@@ -389,6 +389,11 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         """Return the phase condition, shape (1,)."""
         return np.array([self._phase @ x - self._target])
 
+    @property
+    def linear_conditions(self) -> tuple[Array, Array]:
+        """The row of the phase condition, and its value."""
+        return self._phase[None], np.array([self._target])
+
     def conditions_with_rows(self, x: Array) -> tuple[Array, Array]:
         """Return the phase condition and its row."""
         return self.condition_values(x), self._phase[None]

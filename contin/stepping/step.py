@@ -20,7 +20,7 @@ from contin.functions.kernel_parts import ReadOnlyVector, Vector
 from contin.linalg.factors import Factors
 from contin.stepping.newton import Corrected, Newton, correct
 from contin.stepping.state import State
-from contin.stepping.trial import Trial, linearization, linearization_of
+from contin.stepping.trial import Linearization, Trial, linearization, linearization_of
 
 #: Share of the states in a unit tangent below which their direction is not compared: the states hardly take part in the step.
 _STILL = 0.01
@@ -66,7 +66,9 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
     ConvergenceError
         It is not found, or the equations are not finite there.
     """
-    return trial_of(state.system, _corrected(state, guess, step, newton), state.row)
+    row = state.row
+    done = correct(state.system, guess, row, row @ state.x + step, newton, linearize=True)
+    return trial_of(state.system, done, row)
 
 
 def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
@@ -77,6 +79,9 @@ def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
     ConvergenceError
         The equations are not finite there.
     """
+    if done.tangent is not None:
+        linear = Linearization(done.tangent, done.factors.sign, done.factors)
+        return Trial(system, done.x, linear, done.iterations, done.error)
     residual, factors = system.linearize(done.x, (row,))
     if not np.isfinite(residual).all():
         raise ConvergenceError("the equations are not finite at the corrected point")
@@ -92,13 +97,9 @@ def located(state: State, guess: Array, step: float, newton: Newton, factors: Fa
     ------
     ConvergenceError
     """
-    done, system, row = _corrected(state, guess, step, newton, factors), state.system, state.row
+    system, row = state.system, state.row
+    done = correct(system, guess, row, row @ state.x + step, newton, factors)
     return Trial(system, done.x, lambda: linearization(system, done.x, row), done.iterations, done.error)
-
-
-def _corrected(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Corrected:
-    row = state.row
-    return correct(state.system, guess, row, row @ state.x + step, newton, factors)
 
 
 class Judgement(NamedTuple):
