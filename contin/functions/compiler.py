@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import gc
+import inspect
 import itertools
 import types as python_types
 from collections.abc import Callable, Iterator
@@ -21,15 +22,18 @@ from numba.core import cgutils, compiler, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
+from numba.core.typeconv.castgraph import Conversion
 from numba.np.arrayobj import populate_array
 
-from contin.functions.kernel_parts import Helper, Instruction, names_in
-from contin.functions.machine_code import Code, machine
+from contin.functions.kernel_parts import Helper, Instruction, kernel_of, names_in
+from contin.functions.machine_code import INNER, Code, machine
 
 #: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
-#: Options of functions that only compiled code calls.
-_INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+#: Only compiled code calls what numba makes.
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"},
+    "no_cpython_wrapper": True, "no_cfunc_wrapper": True,
+}  # fmt: skip
 
 # LLVM's types.
 _BYTE, _INT, _WORD, _DOUBLE = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.DoubleType()
@@ -58,29 +62,39 @@ def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Cod
     numba.core.errors.NumbaError
         It cannot be compiled.
     """
-    hints = get_type_hints(function, include_extras=True)
-    result = _type(hints.pop("return"))
-    parameters = list(hints.values())
+    result, parameters = _signature(function)
+    hints = list(get_type_hints(function, include_extras=True).values())[:-1]
+    context = cpu_target.target_context
+    with global_compiler_lock:
+        _refresh()
+        with _own_options(context.codegen()):
+            done = _compiled(function, tuple(parameters), result, reorder)
+            return _Entry(context, done, hints, entry).code()
+
+
+def _compiled(function: Callable[..., Any], parameters: tuple[Any, ...], result: Any, reorder: bool) -> Any:
+    """Return what numba makes of a function for types of its parameters; it finds the type of the result where that is None."""
     options = _OPTIONS if reorder else {**_OPTIONS, "fastmath": False}
     flags: Any = compiler.Flags()
-    with global_compiler_lock:
-        cpu_target.options.parse_as_flags(flags, {**options, **_INSIDE, "nopython": True, "boundscheck": None})
-        flags.no_compile, flags.enable_pyobject = True, False  # what numba runs itself is not wanted
-        context = cpu_target.target_context
-        cpu_target.typing_context.refresh()
-        context.refresh()
-        with _own_options(context.codegen()):
-            done = compiler.compile_extra(
-                cpu_target.typing_context, context, _ready(function), tuple(map(_type, parameters)), result, flags, {}
-            )
-            return _Entry(context, done, parameters, entry).code()
+    cpu_target.options.parse_as_flags(flags, {**options, "nopython": True, "boundscheck": None})
+    flags.no_compile, flags.enable_pyobject = True, False  # what numba runs itself is not wanted
+    typing, context = cpu_target.typing_context, cpu_target.target_context
+    library = _Part(context.codegen(), function.__qualname__)
+    return compiler.compile_extra(typing, context, _ready(function), parameters, result, flags, {}, library)
+
+
+@functools.cache
+def _refresh() -> None:
+    """Let numba load what it knows, which it does not do on its own account before the first function."""
+    cpu_target.target_context.refresh()
 
 
 @contextlib.contextmanager
 def _own_options(codegen: Any) -> Iterator[None]:
     """Let what is compiled meanwhile be for `contin.functions.machine_code.machine`, in place of this processor.
 
-    It is optimized once, as a whole, and no garbage is collected: that saves a quarter of the time.
+    It is optimized once, as a whole, and no garbage is collected, neither meanwhile nor later: that saves a quarter of the time,
+    and takes up to 180 MB where one process makes all kernels.
     """
     collects, libraries, target = gc.isenabled(), codegen._library_class, codegen._tm
     codegen._library_class, codegen._tm = _Library, _target()
@@ -89,6 +103,7 @@ def _own_options(codegen: Any) -> Iterator[None]:
         yield
     finally:
         codegen._library_class, codegen._tm = libraries, target
+        gc.freeze()
         if collects:
             gc.enable()
 
@@ -104,10 +119,17 @@ def _target() -> Any:
 
 
 class _Library(JITCodeLibrary):
-    """What numba makes of a helper or a kernel. It is not optimized with all that it calls before that is part of a kernel."""
+    """A module that numba makes. It is not optimized with all that it calls before that is part of a kernel."""
 
     def _optimize_final_module(self) -> None:
         """Do nothing."""
+
+
+class _Part(_Library):
+    """What numba makes of a kernel or a helper: there is no machine code of it before it is part of a kernel."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
 
 
 def _type(hint: Any) -> Any:
@@ -132,45 +154,96 @@ def _fields(hint: Any) -> list[Any]:
 
 
 def _ready(function: Callable[..., Any]) -> Any:
-    """Return a function that calls what numba knows in place of helpers and instructions."""
-    names = names_in(function.__code__) & set(function.__globals__)
-    globals_ = function.__globals__ | {name: _known(function.__globals__[name]) for name in names}
+    """Return a function that calls what numba knows in place of kernels, helpers and instructions."""
+    scope, names = function.__globals__, names_in(function.__code__)
+    known = {name: _known(scope[name], names) for name in names & scope.keys()}
     copy = python_types.FunctionType(
-        function.__code__, globals_, function.__name__, function.__defaults__, function.__closure__
+        function.__code__, scope | known, function.__name__, function.__defaults__, function.__closure__
     )
     copy.__qualname__ = function.__qualname__
     return copy
 
 
-def _known(value: Any) -> Any:
-    """Return what numba knows a global value as; a value that stays is returned as it is."""
-    if isinstance(value, Helper | Instruction):
-        if value not in _KNOWN:
-            _KNOWN[value] = _dispatcher(value) if isinstance(value, Helper) else _intrinsic(value.write)
-        return _KNOWN[value]
-    if isinstance(value, python_types.ModuleType) and value.__name__.startswith(_PACKAGE):
+def _known(value: Any, names: frozenset[str]) -> Any:
+    """Return what numba knows a global value as, or for a module its members of these ``names``; others stay as they are."""
+    if isinstance(value, python_types.ModuleType):
+        members = {name: vars(value)[name] for name in names & vars(value).keys()}
+        known = {name: _known(member, frozenset()) for name, member in members.items()}
+        if all(known[name] is member for name, member in members.items()):
+            return value
         copy = python_types.ModuleType(value.__name__)
-        vars(copy).update(
-            {name: _known(member) for name, member in vars(value).items() if isinstance(member, Helper | Instruction)}
-        )
+        vars(copy).update(vars(value) | known)
         return copy
-    return value
+    part: Any = value if isinstance(value, Helper | Instruction) else kernel_of(value)
+    if part is None:
+        return value
+    if part not in _KNOWN:
+        make = _helper if isinstance(part, Helper) else _intrinsic if isinstance(part, Instruction) else _outer
+        _KNOWN[part] = make(part)
+    return _KNOWN[part]
 
 
-#: Helpers and instructions that numba knows.
-_KNOWN: dict[Helper | Instruction, Any] = {}
-#: Modules whose helpers may be called as ``module.helper``.
-_PACKAGE = __name__.partition(".")[0]
+#: Kernels, helpers and instructions that numba knows.
+_KNOWN: dict[Any, Any] = {}
 
 
-def _dispatcher(helper: Helper) -> Any:
-    inline = "always" if helper.inline else "never"
-    options: Any = {"inline": inline, **_INSIDE, **_OPTIONS}
-    return numba.njit(**options)(_ready(helper.function))
+def _helper(helper: Helper) -> Any:
+    """Return a helper as numba knows it: it is compiled once for each kind of arguments."""
+    if helper.inline:
+        return numba.njit(inline="always", **_OPTIONS)(_ready(helper.function))
+    made: dict[Any, Any] = {}
+
+    def typed(context: Any, *given: Any) -> Any:
+        if given not in made:
+            made[given] = _compiled(helper.function, given, None, reorder=True)
+        done = made[given]
+
+        def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            context.active_code_library.add_linking_library(done.library)
+            return context.call_internal_no_propagate(builder, done.fndesc, signature, arguments)[1]
+
+        return done.signature, call
+
+    return _function(helper.function, typed)
 
 
-def _intrinsic(write: Callable[..., Any]) -> Any:
+def _outer(kernel: Any) -> Any:
+    """Return a kernel as numba knows it where another one calls it: a function of this signature in other machine code."""
+    result, parameters = _signature(kernel.function)
+    signature = result(*parameters)
+
+    def typed(context: Any, *given: Any) -> Any:
+        fits = [context.can_convert(kind, wanted) for kind, wanted in zip(given, parameters)]
+        if len(given) != len(parameters) or any(fit is None or fit > Conversion.safe for fit in fits):
+            raise numba.errors.TypingError(f"{kernel.name} takes {signature.args}, not {given}")
+        return signature, call
+
+    def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = context.call_conv.get_function_type(result, signature.args)
+        function = cgutils.get_or_insert_function(builder.module, kind, kernel.entry + INNER)
+        _, value = context.call_conv.call_function(builder, function, result, signature.args, arguments)
+        return context.get_dummy_value() if result is types.void else value
+
+    return _function(kernel.function, typed)
+
+
+def _function(function: Callable[..., Any], typed: Any) -> Any:
+    """Return a function as numba knows it where ``typed`` gives its signature, and what writes a call of it."""
+    known: Any = functools.wraps(function)(typed)
+    first, own = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD), inspect.signature(function)
+    known.__signature__ = own.replace(parameters=[first, *own.parameters.values()])
+    return numba.extending.intrinsic(known)
+
+
+def _signature(function: Callable[..., Any]) -> tuple[Any, list[Any]]:
+    """Return numba's types of the result and the parameters of a kernel."""
+    hints = get_type_hints(function, include_extras=True)
+    return _type(hints.pop("return")), list(map(_type, hints.values()))
+
+
+def _intrinsic(instruction: Instruction) -> Any:
     """Return an instruction as numba knows it."""
+    write = instruction.function
     hints = get_type_hints(write)
     hints.pop("builder", None)
     result, parameters = _type(hints.pop("return")), list(hints.values())
@@ -235,9 +308,10 @@ class _Entry:
         entry = llvm.parse_assembly(cgutils.normalize_ir_text(str(self.module)))
         entry.verify()
         module.link_in(entry)
+        module.get_function(self.done.fndesc.llvm_func_name).name = self.name + INNER
         module.link_in(llvm.parse_assembly(_NOTHING_TO_RELEASE))
         for function in module.functions:
-            if not function.is_declaration and function.name != self.name:
+            if not function.is_declaration and function.name not in (self.name, self.name + INNER):
                 function.linkage = "internal"
         foreign = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
         foreign += [v.name for v in module.global_variables if v.is_declaration]
