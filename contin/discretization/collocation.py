@@ -281,11 +281,9 @@ class Collocation(System):
         own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
         if own is None or not recorded or not 0 <= self.size - self.equations <= 1:
             return None
-        rows, targets = np.zeros((len(own[0]) + self.size - self.equations, self.size)), np.zeros(self.size - self.equations)
-        rows[: len(own[0])] = own[0]
-        if share(self.intervals, self._empty_blocks(len(rows), 0).local.size).last > 1:
-            return None
-        return workspace(self, rows, np.concatenate([own[1], targets]))
+        rows = len(own[0]) + self.size - self.equations
+        numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
+        return workspace(self, rows) if share(self.intervals, numbers).last == 1 else None
 
     def unfilled_factors(self) -> Factorization:
         """Return factors of the matrix of `workspace`, to be filled by a kernel."""

@@ -108,8 +108,8 @@ class Workspace(NamedTuple):
     values: Values
 
 
-def workspace(system: Collocation, rows: np.ndarray, targets: np.ndarray) -> Workspace:
-    """Return the work space of a system with linear conditions ``rows`` (r, size) besides; each call fills the last one."""
+def workspace(system: Collocation, rows: int) -> Workspace:
+    """Return the work space of a system with so many linear conditions besides, which each call fills."""
     n, problem = system._n, system.problem
     field, ends = problem.batch("field"), problem.batch("boundary")
     of_field, of_ends = system._columns
@@ -132,7 +132,8 @@ def workspace(system: Collocation, rows: np.ndarray, targets: np.ndarray) -> Wor
     values = Values(
         system.parameters.copy(), empty((points, n)), empty((1, n)), empty((1, n)), empty((points, field.count)),
         np.zeros((points, field.count, of_field.width)), empty((1, ends.count)), np.zeros((1, ends.count, of_ends.width)),
-        rows, targets, empty((0, system._conditions + len(rows) - 1)), empty((1, system.size)), empty((1, system.size)),
+        empty((rows, system.size)), empty(rows), empty((0, system._conditions + rows - 1)), empty((1, system.size)),
+        empty((1, system.size)),
         empty((0, n)), empty((0, 0, 0)), np.zeros(1),
     )  # fmt: skip
     return Workspace(codes, mesh, values)

@@ -168,8 +168,11 @@ def _in_one_call(
     codes, mesh, values = system.workspace
     if (row is None) != (system.size == system.equations):
         return None
+    conditions, targets = system.linear_conditions
+    own = len(targets)
+    values.rows[:own], values.targets[:own] = conditions, targets
     if row is not None:
-        values.rows[-1], values.targets[-1] = row, target
+        values.rows[own], values.targets[own] = row, target
     x, report = np.array(guess, dtype=float), np.empty(UPDATES + max(newton.max_iterations, CHORDS))
     factors = system.unfilled_factors() if near is None else near
     tangent, control = np.empty(x.size), Control(newton.tolerance, newton.max_iterations, near is not None, linearize)
