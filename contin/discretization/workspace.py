@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector
 from contin.functions.program import Program
 from contin.linalg.layout import Layout
 from contin.linalg.segments import Share, share
-
-if TYPE_CHECKING:
-    from contin.discretization.collocation import Collocation
 
 
 class Code(NamedTuple):
@@ -108,8 +105,8 @@ class Workspace(NamedTuple):
     values: Values
 
 
-def workspace(system: Collocation, rows: int) -> Workspace:
-    """Return the work space of a system with so many linear conditions besides, which each call fills."""
+def workspace(system: Any, rows: int) -> Workspace:
+    """Return the work space of a system on a mesh with so many linear conditions besides, which each call fills."""
     n, problem = system._n, system.problem
     field, ends = problem.batch("field"), problem.batch("boundary")
     of_field, of_ends = system._columns

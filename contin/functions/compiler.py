@@ -93,8 +93,8 @@ def _refresh() -> None:
 def _own_options(codegen: Any) -> Iterator[None]:
     """Let what is compiled meanwhile be for `contin.functions.machine_code.machine`, in place of this processor.
 
-    It is optimized once, as a whole, and no garbage is collected, neither meanwhile nor later: that saves a quarter of the time,
-    and takes up to 180 MB where one process makes all kernels.
+    It is optimized once, as a whole, and no garbage is collected, neither meanwhile nor later: that saves a quarter of the
+    time, and takes up to 180 MB where one process makes all kernels.
     """
     collects, libraries, target = gc.isenabled(), codegen._library_class, codegen._tm
     codegen._library_class, codegen._tm = _Library, _target()
