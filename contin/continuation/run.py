@@ -59,6 +59,7 @@ from contin.stepping.settling import ROUNDS, settled
 from contin.stepping.state import State, Stop, standing_at
 from contin.stepping.step import (
     Judgement,
+    aims,
     corrected,
     judged,
     located,
@@ -540,7 +541,8 @@ class Continuation:
         if collapsed(state.system, state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         judgement = judged(state, guess, trial)
-        if not (judgement.turn <= settings.angle and judgement.missed <= _ASTRAY * settings.accuracy * step):
+        angle, accuracy = aims(settings, state.system)
+        if not (judgement.turn <= angle and judgement.missed <= _ASTRAY * accuracy * step):
             raise ConvergenceError(
                 f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
                 f"{judgement.missed / step:.2f} of it"
@@ -582,7 +584,7 @@ class Continuation:
             try:
                 guess = state.x + share * step * state.tangent
                 aside = located(state, guess, share * step, self.settings.newton)
-                if judged(state, guess, aside).turn <= self.settings.angle:
+                if judged(state, guess, aside).turn <= aims(self.settings, state.system)[0]:
                     return share * step, aside
             except ConvergenceError as error:
                 problem = error
@@ -617,9 +619,9 @@ class Continuation:
         """
         settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
         order = 2 if state.previous_tangent is None else 3
-        aim = settings.accuracy * step
-        factor = _LONGER if judgement.missed == 0 else (aim / judgement.missed) ** (1 / order)
-        factor = min(factor, _AIM * settings.angle / max(judgement.turn, _NO_ANGLE))
+        angle, accuracy = aims(settings, state.system)
+        factor = _LONGER if judgement.missed == 0 else (accuracy * step / judgement.missed) ** (1 / order)
+        factor = min(factor, _AIM * angle / max(judgement.turn, _NO_ANGLE))
         free = slice(state.system.state_size, None)
         rates = zip(trial.x[free].tolist(), trial.tangent[free].tolist())
         longest = min(settings.max_step, *[settings.change * (1 + abs(p)) / (abs(rate) + _NO_RATE) for p, rate in rates])

@@ -19,6 +19,7 @@ from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import ReadOnlyVector, Vector
 from contin.linalg.factors import Factors
 from contin.stepping.newton import Corrected, Newton, correct
+from contin.stepping.settings import Settings
 from contin.stepping.state import State
 from contin.stepping.trial import Linearization, Trial, linearization, linearization_of
 
@@ -27,6 +28,12 @@ _STILL = 0.01
 #: A step ends at this many times the distance to a limit, along the tangent, at most: beyond it, and not much. Ten times
 #: larger, a parameter that the equations divide by went through zero, and three branch points before it were lost.
 _BEYOND = 1.25
+
+
+def aims(settings: Settings, system: Discretization) -> tuple[float, float]:
+    """Return the largest angle between tangents, and the part of a step by which it aims to miss its prediction."""
+    angle, accuracy = system.aims
+    return settings.angle or angle, settings.accuracy or accuracy
 
 
 def predict(state: State, step: float) -> Array:
