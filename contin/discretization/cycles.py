@@ -63,8 +63,8 @@ class PeriodicCollocation(Collocation):
 
     problem: CycleProblem
     autonomous = True
-    #: Twice those of other problems: with these, branches of Lorenz's cycles and of AUTO's pp2 take 15 orbits for 19, and 10 for
-    #: 15, and all special points of the tests' cycles are found.
+    #: Twice those of other problems: with these, branches of Lorenz's cycles and of AUTO's pp2 take 15 orbits for 19, and 10
+    #: for 15, and all special points of the tests' cycles are found.
     aims = 0.7, 0.05
 
     def __init__(
