@@ -58,10 +58,14 @@ from contin.stepping.settings import Settings
 from contin.stepping.settling import ROUNDS, settled
 from contin.stepping.state import State, Stop, standing_at
 from contin.stepping.step import (
+    ASTRAY,
     Judgement,
     corrected,
+    following_step,
+    is_astray,
     judged,
     located,
+    longest_step,
     predict,
     trial_of,
     up_to_limits,
@@ -70,8 +74,6 @@ from contin.stepping.trial import Linearization, TestFunction, Trial, linearizat
 
 #: A step is cut down to this fraction of itself to take several branch points one by one.
 _FINEST = 1e-3
-#: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
-_ASTRAY = 2.5
 #: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
 #: The next one is taken where the equations are still too nearly singular for Newton's method.
 _ASIDE = (0.01, 0.1, 0.5)
@@ -80,14 +82,6 @@ _SLACK = 1e-9
 #: A curve that begins where a test function that ends runs is zero has it positive this far along its tangent: what is known to
 #: 1e-10 is then told from round-off, and no regular start lies so near to an end.
 _ENTERS = 1e-6
-#: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
-_SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
-#: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
-#: the curvature, it is one half.
-_MISSED = 0.75
-#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. Twice the error that
-#: Newton's method left comes on top: where cycles shrink onto a Hopf point it is 1e-10, and steps of 1e-6 were refused.
-_NOISE = 1e-12
 #: Round-off above the tolerance is noted from this error on: ten times smaller, runs in small units that soon change would be.
 _NOISY = 1e-9
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
@@ -115,9 +109,6 @@ _HELPS = 0.5
 _CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
 #: Labels of points that no derivative by the solution tells.
 _BY_VALUES = ("EP", "UZ", "MX")
-#: Smallest angle and rate, in place of zero where they are divided by.
-_NO_ANGLE, _NO_RATE = 1e-12, 1e-300
-
 
 #: The index on both sides of a special point; None where it is not defined.
 IndexChange = tuple[int | None, int | None]
@@ -540,7 +531,7 @@ class Continuation:
         if collapsed(state.system, state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         judgement = judged(state, guess, trial)
-        if not (judgement.turn <= settings.angle and judgement.missed <= _ASTRAY * settings.accuracy * step):
+        if not (judgement.turn <= settings.angle and judgement.missed <= ASTRAY * settings.accuracy * step):
             raise ConvergenceError(
                 f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
                 f"{judgement.missed / step:.2f} of it"
@@ -597,9 +588,7 @@ class Continuation:
         missed = abs(guess[at] - trial.x[at])
         tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
         change = step * max(abs(tangent[at]) for tangent in tangents)
-        noise = _NOISE + 2 * trial.newton_error
-        jumped = missed > _MISSED * change and missed > noise * (1 + abs(trial.x[at]))
-        return bool(jumped and self._sense(trial))
+        return bool(is_astray(missed, change, trial.newton_error, trial.x[at]) and self._sense(trial))
 
     def _has_moved(self, start: Array, trial: Trial) -> bool:
         """Return whether a step has moved the primary parameter by more than round-off: tangents are blurred at Hopf points."""
@@ -616,15 +605,16 @@ class Continuation:
         ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
         """
         settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
-        order = 2 if state.previous_tangent is None else 3
-        aim = settings.accuracy * step
-        factor = _LONGER if judgement.missed == 0 else (aim / judgement.missed) ** (1 / order)
-        factor = min(factor, _AIM * settings.angle / max(judgement.turn, _NO_ANGLE))
-        free = slice(state.system.state_size, None)
-        rates = zip(trial.x[free].tolist(), trial.tangent[free].tolist())
-        longest = min(settings.max_step, *[settings.change * (1 + abs(p)) / (abs(rate) + _NO_RATE) for p, rate in rates])
-        longer = step * min(max(factor, _SHORTER), _LONGER)
-        following = min(max(longer, settings.min_step), max(longest, settings.min_step))
+        order, longest, free = (
+            2 if state.previous_tangent is None else 3,
+            settings.max_step,
+            slice(state.system.state_size, None),
+        )
+        for value, rate in zip(trial.x[free].tolist(), trial.tangent[free].tolist()):
+            longest = longest_step(longest, settings.change, value, rate)
+        following = following_step(
+            step, judgement.missed, judgement.turn, order, settings.accuracy, settings.angle, settings.min_step, longest
+        )
         way = self._sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
         way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
         return State(

@@ -21,7 +21,7 @@ from contin.problems.map import MapProblem
 #: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
 _SHRUNK = 1e-7
 #: The logarithm of a multiplier is no smaller than that of this number: a superstable cycle has the multiplier zero.
-_NO_MULTIPLIER = 1e-300
+NO_MULTIPLIER = 1e-300
 #: Smallest number of unknown states for which the matrix is kept sparse: it has n + 1 entries a row. Dense factors of 200
 #: unknowns take as long as sparse ones.
 _MANY = 200
@@ -284,7 +284,7 @@ class MapSystem(Algebraic):
     def _logarithms(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers as they are computed."""
         values = log_eigenvalues(self.transitions(x))
-        values.real = np.maximum(values.real, np.log(_NO_MULTIPLIER))
+        values.real = np.maximum(values.real, np.log(NO_MULTIPLIER))
         return values
 
     def is_symmetric(self, x: Array) -> bool:

@@ -23,7 +23,6 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 from numba.np.arrayobj import populate_array
 
-from contin.functions.kernel import SOURCES
 from contin.functions.kernel_parts import Helper, Instruction, names_in
 from contin.functions.machine_code import Code, machine
 
@@ -149,12 +148,6 @@ def _known(value: Any) -> Any:
         if value not in _KNOWN:
             _KNOWN[value] = _dispatcher(value) if isinstance(value, Helper) else _intrinsic(value.write)
         return _KNOWN[value]
-    source = SOURCES.get(value) if callable(value) and value.__hash__ else None
-    if source is not None:
-        if source not in _KNOWN:
-            options = {"inline": "never", **_INSIDE, **_OPTIONS, **({} if source.reorder else {"fastmath": False})}
-            _KNOWN[source] = numba.njit(**options)(_ready(source.function))
-        return _KNOWN[source]
     if isinstance(value, python_types.ModuleType) and value.__name__.startswith(_PACKAGE):
         copy = python_types.ModuleType(value.__name__)
         vars(copy).update(

@@ -122,12 +122,7 @@ def kernel(function: Any = None, *, reorder: bool = True, last: bool = False) ->
     found = made.stored()
     if found is None:
         _PENDING.append(made)
-    SOURCES[found or made] = made
     return found or made
-
-
-#: The Python function of each kernel: kernels call kernels.
-SOURCES: dict[Any, Any] = {}
 
 
 #: Kernels whose machine code was not in the cache when they were defined.

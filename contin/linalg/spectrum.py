@@ -75,10 +75,11 @@ def _isolate(a):
 @helper
 def _alone(a, i, first, end, row):
     """Return whether a row, or a column, of a part of a matrix has zeros only beside the diagonal."""
+    total = 0.0
     for j in range(first, end):
-        if j != i and (a[i, j] if row else a[j, i]) != 0.0:
-            return False
-    return True
+        if j != i:
+            total += abs(a[i, j] if row else a[j, i])
+    return total == 0.0
 
 
 @helper

@@ -19,7 +19,7 @@ from contin.arrays import Array
 from contin.discretization.protocol import Equations
 from contin.errors import ConvergenceError
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Vector
+from contin.functions.kernel_parts import Vector, helper
 from contin.linalg.factors import Factors
 
 #: After a larger update the Jacobian is taken anew, and a first update is trusted no further than this: from there chord steps
@@ -42,7 +42,7 @@ _DRAWS = 3
 #: A larger update is not taken for round-off in any case. Ten times larger, a matrix that is singular could pass.
 _COARSE = 1e-3
 #: Nor is one larger than this on the way: stiff meshes of strips leave 1e-8. Ten times larger, a step could end elsewhere.
-_STAGNANT = 1e-6
+STAGNANT = 1e-6
 #: An update of a few units in the last place: with it x solves the equations as well as any number can.
 _EXACT = 1e-15
 
@@ -160,7 +160,7 @@ def _newton(
                 break
             if progress.wants_jacobian:
                 factors = None
-        coarse = _COARSE if sizes is not None else _STAGNANT
+        coarse = _COARSE if sizes is not None else STAGNANT
         if size <= coarse and _is_noise(system, x, update, rows, coarse):
             return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), max(progress.sizes[-2:]))
     raise _failure(progress.sizes)
@@ -286,15 +286,8 @@ class _Progress:
         """Note an update, made with a ``fresh`` Jacobian or with an old one."""
         self.sizes.append(size)
         self._moved = size if fresh else self._moved + size
-        self.rate = self._estimated_rate(fresh)
-
-    def _estimated_rate(self, fresh: bool) -> float:
-        if len(self.sizes) < 2:  # nothing is known of how nonlinear the equations are
-            return min(self._moved, _FAR) if fresh else 1.0
-        ratio = self.sizes[-1] / self.sizes[-2]
-        if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
-            return min(1.0, max(self.sizes[-1], ratio * min(1.0, ratio)))
-        return max(min(self._moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
+        before = self.sizes[-2] if len(self.sizes) > 1 else math.inf
+        self.rate = estimated_rate(size, before, self._moved, fresh)
 
     @property
     def error(self) -> float:
@@ -304,25 +297,62 @@ class _Progress:
     @property
     def converged(self) -> bool:
         """The error is below the tolerance."""
-        confirmed = len(self.sizes) > 1 or self.sizes[-1] <= self.tolerance
-        return confirmed and self.error <= self.tolerance
+        return has_converged(self.sizes[-1], self.rate, len(self.sizes), self.tolerance)
 
     @property
     def stagnates(self) -> bool:
         """Small updates no longer shrink: they are round-off, or there is no solution and unknowns are smaller still."""
-        return self.sizes[-1] < _ROUND_OFF and len(self.sizes) > 1 and self.rate >= 0.5
+        return stagnates(self.sizes[-1], self.rate, len(self.sizes))
 
     @property
     def diverges(self) -> bool:
         """The last update is more than twice the one before."""
-        return len(self.sizes) > 2 and self.sizes[-1] > 2 * self.sizes[-2] > _ROUND_OFF
+        return len(self.sizes) > 2 and diverges(self.sizes[-1], self.sizes[-2])
 
     @property
     def wants_jacobian(self) -> bool:
         """The next update is better made with a new Jacobian: chord steps would take longer."""
-        size = self.sizes[-1]
-        far = size > _FAR or not self.rate < 0.5
-        return far or (self.rate > 0 and math.log(self.tolerance / size) < _CHORDS * math.log(self.rate))
+        return wants_jacobian(self.sizes[-1], self.rate, self.tolerance)
+
+
+@helper
+def estimated_rate(size: float, before: float, moved: float, fresh: bool) -> float:
+    """Return the estimated ratio of the error after an update to its size.
+
+    ``before`` is the size of the update before, infinite without one; ``moved`` the distance from where the Jacobian was taken,
+    which is ``fresh`` where it is the one of this update.
+    """
+    if before == math.inf:  # nothing is known of how nonlinear the equations are
+        return min(moved, _FAR) if fresh else 1.0
+    ratio = size / before
+    if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
+        return min(1.0, max(size, ratio * min(1.0, ratio)))
+    return max(min(moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
+
+
+@helper
+def has_converged(size: float, rate: float, updates: int, tolerance: float) -> bool:
+    """Return whether the error after so many updates is below the tolerance, and another update has confirmed that."""
+    return (updates > 1 or size <= tolerance) and size * rate <= tolerance
+
+
+@helper
+def stagnates(size: float, rate: float, updates: int) -> bool:
+    """Return whether small updates no longer shrink."""
+    return size < _ROUND_OFF and updates > 1 and rate >= 0.5
+
+
+@helper
+def diverges(size: float, before: float) -> bool:
+    """Return whether an update is more than twice the one before."""
+    return size > 2 * before > _ROUND_OFF
+
+
+@helper
+def wants_jacobian(size: float, rate: float, tolerance: float) -> bool:
+    """Return whether the next update is better made with a new Jacobian."""
+    far = size > _FAR or not rate < 0.5
+    return far or (rate > 0 and math.log(tolerance / size) < _CHORDS * math.log(rate))
 
 
 def _chords(
