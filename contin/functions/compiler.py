@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import gc
+import inspect
 import itertools
 import types as python_types
 from collections.abc import Callable, Iterator
@@ -21,10 +22,11 @@ from numba.core import cgutils, compiler, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
+from numba.core.typeconv.castgraph import Conversion
 from numba.np.arrayobj import populate_array
 
-from contin.functions.kernel_parts import Helper, Instruction, names_in
-from contin.functions.machine_code import Code, machine
+from contin.functions.kernel_parts import Helper, Instruction, kernel_of, names_in
+from contin.functions.machine_code import INNER, Code, machine
 
 #: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
@@ -132,35 +134,66 @@ def _fields(hint: Any) -> list[Any]:
 
 
 def _ready(function: Callable[..., Any]) -> Any:
-    """Return a function that calls what numba knows in place of helpers and instructions."""
-    names = names_in(function.__code__) & set(function.__globals__)
-    globals_ = function.__globals__ | {name: _known(function.__globals__[name]) for name in names}
+    """Return a function that calls what numba knows in place of kernels, helpers and instructions."""
+    scope, names = function.__globals__, names_in(function.__code__)
+    known = {name: _known(scope[name], names) for name in names & scope.keys()}
     copy = python_types.FunctionType(
-        function.__code__, globals_, function.__name__, function.__defaults__, function.__closure__
+        function.__code__, scope | known, function.__name__, function.__defaults__, function.__closure__
     )
     copy.__qualname__ = function.__qualname__
     return copy
 
 
-def _known(value: Any) -> Any:
-    """Return what numba knows a global value as; a value that stays is returned as it is."""
-    if isinstance(value, Helper | Instruction):
-        if value not in _KNOWN:
-            _KNOWN[value] = _dispatcher(value) if isinstance(value, Helper) else _intrinsic(value.write)
-        return _KNOWN[value]
-    if isinstance(value, python_types.ModuleType) and value.__name__.startswith(_PACKAGE):
+def _known(value: Any, names: frozenset[str]) -> Any:
+    """Return what numba knows a global value as, or for a module its members of these ``names``; others stay as they are."""
+    if isinstance(value, python_types.ModuleType):
+        members = {name: vars(value)[name] for name in names & vars(value).keys()}
+        known = {name: _known(member, frozenset()) for name, member in members.items()}
+        if all(known[name] is member for name, member in members.items()):
+            return value
         copy = python_types.ModuleType(value.__name__)
-        vars(copy).update(
-            {name: _known(member) for name, member in vars(value).items() if isinstance(member, Helper | Instruction)}
-        )
+        vars(copy).update(vars(value) | known)
         return copy
-    return value
+    part: Any = value if isinstance(value, Helper | Instruction) else kernel_of(value)
+    if part is None:
+        return value
+    if part not in _KNOWN:
+        make = _dispatcher if isinstance(part, Helper) else _intrinsic if isinstance(part, Instruction) else _outer
+        _KNOWN[part] = make(part)
+    return _KNOWN[part]
 
 
-#: Helpers and instructions that numba knows.
-_KNOWN: dict[Helper | Instruction, Any] = {}
-#: Modules whose helpers may be called as ``module.helper``.
-_PACKAGE = __name__.partition(".")[0]
+#: Kernels, helpers and instructions that numba knows.
+_KNOWN: dict[Any, Any] = {}
+
+
+def _outer(kernel: Any) -> Any:
+    """Return a kernel as numba knows it where another one calls it: a function of this signature in other machine code."""
+    result, parameters = _signature(kernel.function)
+    signature = result(*parameters)
+
+    def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = context.call_conv.get_function_type(result, signature.args)
+        function = cgutils.get_or_insert_function(builder.module, kind, kernel.entry + INNER)
+        _, value = context.call_conv.call_function(builder, function, result, signature.args, arguments)
+        return context.get_dummy_value() if result is types.void else value
+
+    def typed(context: Any, *given: Any) -> Any:
+        fits = [context.can_convert(kind, wanted) for kind, wanted in zip(given, signature.args)]
+        if len(given) != len(signature.args) or any(fit is None or fit > Conversion.safe for fit in fits):
+            raise numba.errors.TypingError(f"{kernel.name} takes {signature.args}, not {given}")
+        return signature, call
+
+    known: Any = functools.wraps(kernel.function)(typed)
+    first, own = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD), inspect.signature(kernel.function)
+    known.__signature__ = own.replace(parameters=[first, *own.parameters.values()])
+    return numba.extending.intrinsic(known)
+
+
+def _signature(function: Callable[..., Any]) -> tuple[Any, list[Any]]:
+    """Return numba's types of the result and the parameters of a kernel."""
+    hints = get_type_hints(function, include_extras=True)
+    return _type(hints.pop("return")), list(map(_type, hints.values()))
 
 
 def _dispatcher(helper: Helper) -> Any:
@@ -169,8 +202,9 @@ def _dispatcher(helper: Helper) -> Any:
     return numba.njit(**options)(_ready(helper.function))
 
 
-def _intrinsic(write: Callable[..., Any]) -> Any:
+def _intrinsic(instruction: Instruction) -> Any:
     """Return an instruction as numba knows it."""
+    write = instruction.function
     hints = get_type_hints(write)
     hints.pop("builder", None)
     result, parameters = _type(hints.pop("return")), list(hints.values())
@@ -235,9 +269,10 @@ class _Entry:
         entry = llvm.parse_assembly(cgutils.normalize_ir_text(str(self.module)))
         entry.verify()
         module.link_in(entry)
+        module.get_function(self.done.fndesc.llvm_func_name).name = self.name + INNER
         module.link_in(llvm.parse_assembly(_NOTHING_TO_RELEASE))
         for function in module.functions:
-            if not function.is_declaration and function.name != self.name:
+            if not function.is_declaration and function.name not in (self.name, self.name + INNER):
                 function.linkage = "internal"
         foreign = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
         foreign += [v.name for v in module.global_variables if v.is_declaration]

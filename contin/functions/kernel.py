@@ -29,9 +29,10 @@ from typing import Any, TypeVar, overload
 import llvmlite
 import numpy as np
 
+from contin.errors import ContinError
 from contin.functions import machine_code
 from contin.functions.cache import cache_directory
-from contin.functions.kernel_parts import length
+from contin.functions.kernel_parts import KERNELS, length, parts
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -53,26 +54,58 @@ class Kernel:
         self.name = f"{function.__module__}.{function.__qualname__}"
 
     @functools.cached_property
+    def parts(self) -> list[Any]:
+        """What it is made of, as far as that is defined where it stands."""
+        return parts(self.function)
+
+    @functools.cached_property
+    def files(self) -> frozenset[Path]:
+        """Files that its machine code is made of: those in which it, its helpers and the kernels that it calls stand."""
+        return self._files(self.parts)
+
+    def _files(self, used: list[Any]) -> frozenset[Path]:
+        modules = {self.function.__module__, *(part.__module__ for part in used if not isinstance(part, int | float))}
+        files = {Path(str(sys.modules[module].__file__)) for module in modules}
+        return frozenset(files.union(*(part.files for part in used if isinstance(part, Kernel))))
+
+    @functools.cached_property
     def key(self) -> str:
         """The name of its machine code in the cache: a fingerprint of all that the code depends on."""
-        own = contents(Path(self.function.__code__.co_filename))
-        return hashlib.sha256(repr((self.name, self.reorder, own, *_surroundings())).encode()).hexdigest()[:32]
+        numbers = [part for part in self.parts if isinstance(part, int | float)]
+        held = sorted(map(contents, self.files))
+        return hashlib.sha256(repr((self.name, self.reorder, numbers, held, *_surroundings())).encode()).hexdigest()[:32]
+
+    @property
+    def entry(self) -> str:
+        """The name of the function that its machine code holds for Python."""
+        return machine_code.ENTRY + self.key
 
     def stored(self) -> Callable[..., Any] | None:
         """Return the function that runs the machine code in the cache; None where there is none that can be used."""
-        return machine_code.stored(self.key, self.name, self.function.__doc__)
+        code = machine_code.stored(self.key)
+        with contextlib.suppress(ContinError):  # a kernel that it calls may not be in the cache
+            return machine_code.loaded(code, self.name, self.function.__doc__) if code else None
+        return None
 
     @functools.cached_property
     def compiled(self) -> Callable[..., Any]:
-        """The function that runs the machine code; it is made where the cache has none."""
-        found = self.stored()
+        """The function that runs the machine code; that of the kernels that it calls is loaded before."""
+        code = self.code
+        for part in parts(self.function):
+            if isinstance(part, Kernel) and part is not self:
+                _ = part.compiled
+        return machine_code.loaded(code, self.name, self.function.__doc__)
+
+    @functools.cached_property
+    def code(self) -> machine_code.Code:
+        """The machine code; it is made where the cache has none."""
+        found = machine_code.stored(self.key)
         if found is not None:
             return found
         _share_work()
-        others = _by_length(other for other in _PENDING if other is not self and "compiled" not in vars(other))
+        others = _by_length(other for other in _PENDING if other is not self and "code" not in vars(other))
         while True:
-            with machine_code.claim(self.key) as mine:
-                found = self._made() if mine else None
+            found = self._made()
             if found is not None:
                 return found
             if others:  # another process makes this one
@@ -82,19 +115,25 @@ class Kernel:
 
     def prepare(self) -> None:
         """Make the machine code, unless the cache has it, or another process is making it."""
-        with machine_code.claim(self.key) as mine:
-            if mine:
-                vars(self).setdefault("compiled", self._made())
-
-    def _made(self) -> Callable[..., Any]:
-        found = self.stored()
+        found = self._made()
         if found is not None:
-            return found
-        from contin.functions import compiler  # numba takes .3 s, and is needed the first time only
+            vars(self).setdefault("code", found)
 
-        code = compiler.machine_code(self.function, self.reorder, machine_code.ENTRY + self.key)
-        machine_code.keep(self.key, code)
-        return machine_code.loaded(code, self.name, self.function.__doc__)
+    def _made(self) -> machine_code.Code | None:
+        """Return the machine code from the cache, or make it; None where another process is making it."""
+        with machine_code.claim(self.key) as mine:
+            if not mine:
+                return None
+            found = machine_code.stored(self.key)
+            if found is None:
+                late = self._files(parts(self.function)) - self.files
+                if late:  # the key would not change with them
+                    raise TypeError(f"{self.name}: what it uses of {sorted(late)[0]} must be imported above it")
+                from contin.functions import compiler  # numba takes .3 s, and is needed the first time only
+
+                found = compiler.machine_code(self.function, self.reorder, self.entry)
+                machine_code.keep(self.key, found)
+            return found
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the machine code."""
@@ -115,6 +154,8 @@ def kernel(function: Any = None, *, reorder: bool = True, last: bool = False) ->
     These are ``int``, ``float``, ``None``, the arrays above, and named tuples of them. Division by zero gives inf. Sums are
     evaluated in any order, so that loops become vector instructions; without ``reorder`` sums and products are evaluated one by
     one as they stand. One that only some kinds of problem need is made ``last`` where all are made.
+
+    Kernels call kernels, by a global name or as ``module.name``. What they call is not compiled again, and keeps its options.
     """
     if function is None:
         return functools.partial(kernel, reorder=reorder, last=last)
@@ -122,6 +163,7 @@ def kernel(function: Any = None, *, reorder: bool = True, last: bool = False) ->
     found = made.stored()
     if found is None:
         _PENDING.append(made)
+    KERNELS[found or made] = made
     return found or made
 
 
@@ -182,8 +224,7 @@ def contents(*files: Path) -> str:
     return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
 
 
-#: Files that decide what machine code is made of, besides the one in which a kernel stands and those of its helpers in
-#: `linalg`.
+#: Files that decide what machine code is made of, besides the `Kernel.files`.
 _MADE_BY = ("compiler", "kernel", "kernel_parts", "machine_code", "primitives", "program")
 
 
@@ -191,7 +232,7 @@ _MADE_BY = ("compiler", "kernel", "kernel_parts", "machine_code", "primitives", 
 def _surroundings() -> tuple[str, ...]:
     """Return what all machine code depends on: the engine's files that kernels and compiler consist of, and the machine."""
     here = Path(__file__).parent
-    files = [here / f"{name}.py" for name in _MADE_BY] + sorted((here.parent / "linalg").glob("*.py"))
+    files = [here / f"{name}.py" for name in _MADE_BY]
     numba = importlib.util.find_spec("numba")  # its version stands in a file; to ask for it would take 20 ms
     release = contents(Path(str(numba.origin)).with_name("_version.py")) if numba is not None else ""
     return contents(*files), sys.version, release, llvmlite.__version__, np.__version__, *machine_code.machine()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from types import CodeType
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from types import CodeType, ModuleType
 from typing import Annotated, Any, Concatenate, NamedTuple, ParamSpec, TypeVar, overload
 
 from contin.arrays import Array, Indices
@@ -41,39 +42,79 @@ class Helper:
         return self.function(*arguments)
 
 
-def names_in(code: CodeType) -> set[str]:
-    """Return the global names that a code object, and those inside it, may use."""
+@functools.cache
+def names_in(code: CodeType) -> frozenset[str]:
+    """Return the names that a code object, and those inside it, may use: global ones and attributes."""
     inner = (constant for constant in code.co_consts if isinstance(constant, CodeType))
-    return set(code.co_names).union(*map(names_in, inner))
+    return frozenset(code.co_names).union(*map(names_in, inner))
+
+
+def parts(function: Callable[..., Any]) -> list[Any]:
+    """Return what a kernel is made of besides its own code, as far as it is defined now.
+
+    These are helpers, instructions, named tuples, enumerations and numbers, and those that they use; and kernels, without what
+    they use.
+    """
+    found: dict[tuple[int, str], Any] = {}
+
+    def add(scope: Mapping[str, Any], names: Iterable[str]) -> None:
+        for name in sorted(scope.keys() & set(names)):
+            value = scope[name]
+            if (id(scope), name) in found or value is function:
+                continue
+            if isinstance(value, ModuleType):
+                found[id(scope), name] = None
+                add(vars(value), names)
+            elif isinstance(value, int | float):
+                found[id(scope), name] = value
+            elif isinstance(value, Helper | Instruction):
+                found[id(scope), name] = value
+                add(value.function.__globals__, _names(value.function))
+            elif isinstance(value, type) and (hasattr(value, "_fields") or hasattr(value, "__members__")):
+                found[id(scope), name] = value
+                add(vars(sys.modules[value.__module__]), _hints(value))
+            elif kernel_of(value) is not None:
+                found[id(scope), name] = kernel_of(value)
+
+    add(function.__globals__, _names(function))
+    return [value for value in found.values() if value is not None]
+
+
+def _names(function: Any) -> set[str]:
+    """Return the names in a function and in its annotations."""
+    return {*names_in(function.__code__), *_hints(function)}
+
+
+def _hints(item: Any) -> list[str]:
+    """Return the annotations of a function or a named tuple, as they are written."""
+    return [str(getattr(hint, "__forward_arg__", hint)) for hint in getattr(item, "__annotations__", {}).values()]
 
 
 def length(function: Callable[..., Any]) -> int:
-    """Return the bytes of a function's code and of the helpers that it calls, each counted once."""
-    found: dict[Any, int] = {}
+    """Return the bytes of a function's code and of the helpers that it calls; kernels that it calls are compiled apart."""
+    helpers = dict.fromkeys(part for part in parts(function) if isinstance(part, Helper))
+    return sum(len(each.__code__.co_code) for each in (function, *(helper.function for helper in helpers)))
 
-    def add(function: Any) -> None:
-        if function in found:
-            return
-        found[function] = len(function.__code__.co_code)
-        for name in names_in(function.__code__):
-            value = function.__globals__.get(name)
-            if isinstance(value, Helper):
-                add(value.function)
 
-    add(function)
-    return sum(found.values())
+#: Kernels by what stands under their names: themselves, or functions that run their machine code.
+KERNELS: dict[Any, Any] = {}
+
+
+def kernel_of(value: Any) -> Any:
+    """Return the `contin.functions.kernel.Kernel` that a global value stands for; None where it is none."""
+    return KERNELS.get(value) if callable(value) and value.__hash__ else None
 
 
 class Instruction:
-    """A function that kernels call, whose body `write` appends; see `instruction`."""
+    """A function that kernels call, whose body ``function`` appends; see `instruction`."""
 
     def __init__(self, write: Callable[..., Any]) -> None:
         functools.update_wrapper(self, write)
-        self.write = write
+        self.function = write
 
     def __call__(self, *arguments: Any) -> Any:
         """Raise TypeError: there is no Python function."""
-        raise TypeError(f"{self.write.__name__} is an instruction, only kernels can call it")
+        raise TypeError(f"{self.function.__name__} is an instruction, only kernels can call it")
 
 
 @overload

@@ -27,6 +27,8 @@ from contin.functions.cache import cache_directory
 
 #: The name of the function in an object file that Python calls, followed by the key of the code.
 ENTRY = "contin_"
+#: Behind the name of that function, the name of the one that other kernels call.
+INNER = "_inner"
 #: Python calls it with an array of arguments (METH_FASTCALL).
 _CALLED_WITH_ARRAY = 0x0080
 
@@ -74,19 +76,21 @@ _VERSION_3 = (
 )
 
 
-def stored(key: str, name: str, doc: str | None) -> Callable[..., Any] | None:
-    """Return the function of this key in the cache; None where there is none that can be used."""
+def stored(key: str) -> Code | None:
+    """Return the code of this key in the cache; None where there is none that can be used."""
     try:
-        data = (cache_directory() / f"k{key}.bin").read_bytes()
-        head, code = _unpacked(data)
+        head, code = _unpacked((cache_directory() / f"k{key}.bin").read_bytes())
     except (OSError, ContinError, ValueError):
         return None
-    if head["key"] != key:
-        return None
-    try:
-        return loaded(Code(head["entry"], tuple(head["foreign"]), code), name, doc)
-    except ContinError:
-        return None
+    found = Code(head["entry"], tuple(head["foreign"]), code)
+    return found if head["key"] == key and not _missing(found, kernels=False) else None
+
+
+def _missing(code: Code, kernels: bool) -> list[str]:
+    """Return functions that a code calls and that this process does not have; other ``kernels`` may be loaded later."""
+    _engine()  # loads the functions of this process
+    names = [name for name in code.foreign if kernels or not name.startswith(ENTRY)]
+    return [name for name in names if llvm.address_of_symbol(name) is None]
 
 
 def keep(key: str, code: Code) -> None:
@@ -154,11 +158,12 @@ def loaded(code: Code, name: str, doc: str | None) -> Callable[..., Any]:
         It calls a function that this process does not have.
     """
     engine = _engine()
-    missing = [symbol for symbol in code.foreign if llvm.address_of_symbol(symbol) is None]
+    missing = _missing(code, kernels=True)
     if missing:
         raise ContinError(f"{name}: the function {missing[0]}, which its machine code calls, is not there")
     engine.add_object_file(llvm.object_file.ObjectFileRef.from_data(code.object))
     engine.finalize_object()
+    llvm.add_symbol(code.entry + INNER, engine.get_function_address(code.entry + INNER))
     module, _, own = name.rpartition(".")
     method = _Method(own.encode(), engine.get_function_address(code.entry), _CALLED_WITH_ARRAY, (doc or "").encode())
     _KEPT.append(method)
