@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +24,8 @@ from contin import checks, threads
 from contin.arrays import Array
 from contin.continuation.corners import jump, unsettled, why_lost
 from contin.continuation.failure import no_convergence, shorter_steps
+from contin.continuation.lane import FEWEST, MOST, Lane, lane_of
+from contin.continuation.plain import NOISY
 from contin.continuation.scaling import outgrown, renewed, scaled
 from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.detection.extrema import extremum
@@ -82,8 +84,6 @@ _SLACK = 1e-9
 #: A curve that begins where a test function that ends runs is zero has it positive this far along its tangent: what is known to
 #: 1e-10 is then told from round-off, and no regular start lies so near to an end.
 _ENTERS = 1e-6
-#: Round-off above the tolerance is noted from this error on: ten times smaller, runs in small units that soon change would be.
-_NOISY = 1e-9
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
 _ROUNDS = 3
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
@@ -196,7 +196,7 @@ class Continuation:
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         self._check(system)
         self.primary = settings.primary or system.free[0]
-        self.state = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
+        self._state: State | Callable[[], State] = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
         self._fold = fold(self.primary) if settings.folds else None
         self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
@@ -210,6 +210,20 @@ class Continuation:
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
+        self._lane_for: object = None
+        self._known_lane: Lane | None = None
+
+    @property
+    def state(self) -> State:
+        """The state behind the last point."""
+        known = self._state
+        if not isinstance(known, State):
+            self._state = known = known()
+        return known
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self._state = state
 
     def __repr__(self) -> str:
         return f"Continuation({self.state!r}; {self.stop or 'not ended'})"
@@ -321,7 +335,30 @@ class Continuation:
                 self.stop = stop
                 return
         while self.stop is None:
+            yield from self._plain()
             yield from self._advance()
+
+    def _plain(self) -> Iterator[Point]:
+        """Make plain steps, many at a time, up to the first that wants a closer look; yield their points."""
+        most = FEWEST
+        while (lane := self._lane) is not None and not self.state.singular:
+            most = min(most, self.settings.max_points - 1 - self.state.accepted)  # the last one has a label
+            block = lane.steps(self.state, max(most, 0))
+            for self._state, point in block.points():
+                self._end, self._accuracy = None, Accuracy(0.0)
+                yield point
+            if block.made < most or most <= 0:
+                return
+            most = min(2 * most, MOST)
+
+    @property
+    def _lane(self) -> Lane | None:
+        """The lane of plain steps, made anew where what it depends on has changed; None where there is none."""
+        system, settings, noisy = depends = self.state.system, self.settings, self._is_noisy
+        if self._lane_for != depends:
+            self._lane_for = depends
+            self._known_lane = lane_of(system, settings, self.start, self._tests, self._own, noisy)
+        return self._known_lane
 
     def predicted(self, step: float) -> Array:
         """Return the guess (shape (size,), of ``state.system``) from which the corrector starts at a distance ``step``."""
@@ -383,7 +420,7 @@ class Continuation:
         self.state = self._accept(segment, step.judgement, step.turns)
         self._stand_at(step.end)
         self._note_corners(step.end)
-        if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
+        if segment.trial.newton_error > max(self.settings.newton.tolerance, NOISY) and not self._is_noisy:
             self._is_noisy = True
             self._note(
                 "from here on the updates of Newton's method are round-off above its tolerance: see newton_error", segment

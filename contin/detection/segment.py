@@ -27,7 +27,7 @@ _ROUGH = 1e-3
 #: What that finds lies no further off the cubic than this part of the step, as branch points do.
 _OFF = 0.1
 #: Least cosine between the tangents at both ends that the cubic is made with: accepted steps turn by less.
-_LEAST_COSINE = 0.1
+LEAST_COSINE = 0.1
 
 #: Where on a step: the distance along the state's tangent, and the point.
 Place = tuple[float, Trial]
@@ -148,7 +148,7 @@ class Segment:
         """The coefficients of the cubic by powers of the part of the step, shape (4, size)."""
         state, trial, step = self.state, self.trial, self.step
         ahead = trial.x - state.x
-        rate = step / max(inner(state.system, state.tangent, trial.tangent), _LEAST_COSINE)
+        rate = step / max(inner(state.system, state.tangent, trial.tangent), LEAST_COSINE)
         a, b = state.tangent * step, trial.tangent * rate
         return np.array([state.x, a, 3 * ahead - 2 * a - b, a + b - 2 * ahead])
 

@@ -19,10 +19,9 @@ from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.linalg.orientation import oriented
 from contin.stepping.newton import UNITS, Newton, correct
+from contin.stepping.step import CLEAR
 from contin.stepping.trial import TestFunction, Trial, linearization
 
-#: Rates above this are significant without a look at a finer mesh. Ten times larger, more steps take twice as long.
-CLEAR = 1e-6
 #: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
 STANDS = 1e-13
 #: Rates below this are round-off of tangents; it is 1e-16 to 1e-15 in the canard explosions of the tests.

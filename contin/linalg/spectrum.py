@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from contin.arrays import Array
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, helper
 
@@ -34,7 +35,7 @@ def fill_eigenvalues(matrices: Stack, real: Matrix, imaginary: Matrix) -> None:
 
 
 @helper
-def eigenvalues_in_place(a, real, imaginary):
+def eigenvalues_in_place(a: Array, real: Array, imaginary: Array) -> None:
     """Fill in the eigenvalues of a matrix, which is overwritten; see `fill_eigenvalues`."""
     n, total = a.shape[0], 0.0
     for i in range(n):

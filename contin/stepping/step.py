@@ -29,6 +29,9 @@ _STILL = 0.01
 _BEYOND = 1.25
 #: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
 ASTRAY = 2.5
+#: Rates of the primary parameter above this are significant without a closer look (`contin.detection.significance`). Ten times
+#: larger, more steps on a mesh take twice as long.
+CLEAR = 1e-6
 #: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
 _SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
 #: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
