@@ -179,12 +179,10 @@ def _eigenvalues_ask(equations: Equations, linear: Linear, spectra: Spectra, pat
     """Return whether eigenvalues, or multipliers of a map, ask for a closer look."""
     if fill_spectrum(equations, spectra, LAST):
         return True
-    if not equations.is_map:
-        return may_pass_axis(spectra)
     rate = step / max(linear.sums[1], LEAST_COSINE)
     x, tangent, new, new_tangent = path.x[number - 1], path.tangents[number - 1], path.x[number], path.tangents[number]
     fill_cubic(spectra, x, tangent, new, new_tangent, step, rate)
-    return may_double_or_twist(equations, spectra)
+    return may_double_or_twist(equations, spectra) if equations.is_map else may_pass_axis(equations, spectra)
 
 
 @helper
@@ -214,13 +212,17 @@ def plain_steps(
     ``accepted`` is the number of regular points up to row 1, ``bent`` 1 where row 0 has a tangent.
     """
     evaluate_slopes(equations, path.x[1])
+    fill_matrix(equations, path.tangents[1], linear.matrix)
     if watch.eigenvalues and fill_spectrum(equations, spectra, LAST):
         return 0
     for number in range(2, path.x.shape[0]):
         x, tangent, had, now = path.x[number - 1], path.tangents[number - 1], path.numbers[number - 1], path.numbers[number]
-        for i in range(x.size):
+        size = x.size
+        for i in range(size):
             linear.row[i] = equations.weights[i] * tangent[i]
-        fill_matrix(equations, linear.row, quotient.before)
+        for i in range(size):
+            for j in range(size):
+                quotient.before[i, j] = linear.matrix[i, j] if i < size - 1 else linear.row[j]
         for i in range(spectra.one.size):
             spectra.real[FIRST, i], spectra.imaginary[FIRST, i] = spectra.real[LAST, i], spectra.imaginary[LAST, i]
         bend = 0.5 / had[STEP] if number > 2 or bent else 0.0
@@ -229,8 +231,6 @@ def plain_steps(
             return number - 2
         if watch.eigenvalues and _eigenvalues_ask(equations, linear, spectra, path, number, step):
             return number - 2
-        if equations.is_map:  # places inside the step may have been evaluated
-            evaluate_slopes(equations, path.x[number])
         _accept(equations, linear, control, path, number, step, bend)
         if control.primary >= 0 and now[SENSE] == 0.0:
             return number - 2

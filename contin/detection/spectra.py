@@ -111,9 +111,14 @@ def room(spectra: Spectra, one: int, other: int) -> float:
 
 
 @helper
-def may_pass_axis(spectra: Spectra) -> bool:
-    """Return whether a pair may pass the axis between both ends, as `contin.detection.hopf.may_pass`."""
-    return not moved(spectra, FIRST, LAST) < room(spectra, FIRST, LAST)
+def may_pass_axis(equations: Equations, spectra: Spectra) -> bool:
+    """Return whether a pair may pass the axis, by how far eigenvalues move between both ends and, then, places inside."""
+    if moved(spectra, FIRST, LAST) < room(spectra, FIRST, LAST):
+        return False
+    for k in range(1, len(_QUARTERS) - 1):
+        if _look(equations, spectra, _QUARTERS[k]):
+            return True
+    return _moves_far(spectra)
 
 
 @helper
@@ -127,15 +132,21 @@ def may_double_or_twist(equations: Equations, spectra: Spectra) -> bool:
     if not (doubles or twists):
         return False
     for number in range(1, LAST):
-        s = spectra.parts[number]
-        for i in range(spectra.place.size):
-            one, two, three, four = spectra.cubic[0, i], spectra.cubic[1, i], spectra.cubic[2, i], spectra.cubic[3, i]
-            spectra.place[i] = one + s * (two + s * (three + s * four))
-        evaluate_slopes(equations, spectra.place)
-        if fill_spectrum(equations, spectra, number):
+        if _look(equations, spectra, number):
             return True
         _fill_values(spectra, number)
     return (doubles and _dips(spectra)) or (twists and _moves_far(spectra))
+
+
+@helper
+def _look(equations: Equations, spectra: Spectra, number: int) -> bool:
+    """Fill in the eigenvalues at a place of the cubic; return whether round-off decides on the side of one of them."""
+    s = spectra.parts[number]
+    for i in range(spectra.place.size):
+        one, two, three, four = spectra.cubic[0, i], spectra.cubic[1, i], spectra.cubic[2, i], spectra.cubic[3, i]
+        spectra.place[i] = one + s * (two + s * (three + s * four))
+    evaluate_slopes(equations, spectra.place)
+    return fill_spectrum(equations, spectra, number)
 
 
 @helper
