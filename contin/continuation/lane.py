@@ -100,7 +100,7 @@ class Lane:
         home, x, _ = start
         closing = np.where(np.append(system.circles, np.zeros(size - n)) > 0, 0.0, system.weights)
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
-        before, quotient, work = np.empty((3, size, size))
+        (before, quotient, work), (real, imaginary) = np.empty((3, size, size)), np.empty((2, 1, size))
         self._rooms = (
             equations_of(system), linear_of(size), control_of(settings, primary),
             Watch(
@@ -109,7 +109,7 @@ class Lane:
                 np.array([test.value for test in held], dtype=float), np.array(sides), ends[:, 0].copy(), ends[:, 1].copy(),
                 home.carrier(system)(x), closing,
             ),
-            Quotient(before, quotient, work, np.empty(size), np.empty(size)), spectra_of(n, size),
+            Quotient(before, quotient, work, np.empty((1, size, size)), real, imaginary), spectra_of(n, size),
         )  # fmt: skip
 
     def steps(self, state: State, most: int) -> Block:

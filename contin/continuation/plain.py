@@ -17,10 +17,10 @@ from contin.detection.significance import STANDS
 from contin.detection.spectra import FIRST, LAST, Spectra, fill_cubic, fill_spectrum, may_double_or_twist, may_pass_axis
 from contin.discretization.scales import USUAL
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import IndexVector, Matrix, Vector, helper
+from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg.ends import is_near_one
 from contin.linalg.small import solve_small
-from contin.linalg.spectrum import eigenvalues_in_place
+from contin.linalg.spectrum import fill_eigenvalues
 from contin.stepping.small import (
     BELIEVED,
     ERROR,
@@ -74,8 +74,9 @@ class Quotient(NamedTuple):
     before: Matrix
     quotient: Matrix
     work: Matrix
-    real: Vector
-    imaginary: Vector
+    copy: Stack
+    real: Matrix
+    imaginary: Matrix
 
 
 class Path(NamedTuple):
@@ -166,10 +167,13 @@ def _calm(linear: Linear, quotient: Quotient) -> bool:
         solve_small(linear.lu, linear.exchanges, column)
     if is_near_one(quotient.quotient, NEAR_ONE, CALM, quotient.work):
         return True
-    eigenvalues_in_place(quotient.quotient, quotient.real, quotient.imaginary)
     for i in range(size):
-        distance = math.hypot(quotient.real[i], quotient.imaginary[i])
-        if not (quotient.real[i] > 0 and 1 / CALM < distance < CALM):
+        for j in range(size):
+            quotient.copy[0, i, j] = quotient.quotient[i, j]
+    fill_eigenvalues(quotient.copy, quotient.real, quotient.imaginary)
+    for i in range(size):
+        distance = math.hypot(quotient.real[0, i], quotient.imaginary[0, i])
+        if not (quotient.real[0, i] > 0 and 1 / CALM < distance < CALM):
             return False
     return True
 
@@ -223,7 +227,7 @@ def plain_steps(
         for i in range(size):
             for j in range(size):
                 quotient.before[i, j] = linear.matrix[i, j] if i < size - 1 else linear.row[j]
-        for i in range(spectra.one.size):
+        for i in range(spectra.real.shape[1]):
             spectra.real[FIRST, i], spectra.imaginary[FIRST, i] = spectra.real[LAST, i], spectra.imaginary[LAST, i]
         bend = 0.5 / had[STEP] if number > 2 or bent else 0.0
         step = _made(equations, linear, control, watch, path, number, bend)

@@ -15,8 +15,8 @@ from contin.arrays import Array
 from contin.detection.floquet import CHANGES, DEEPER, LOOKS, NEAR
 from contin.discretization.maps import NO_MULTIPLIER
 from contin.discretization.rounding import NEAR_AXIS, NEAR_CIRCLE
-from contin.functions.kernel_parts import Matrix, Vector, helper
-from contin.linalg.spectrum import eigenvalues_in_place
+from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
+from contin.linalg.spectrum import fill_eigenvalues
 from contin.stepping.small import Equations, evaluate_slopes
 
 #: Parts of a step at which multipliers are known: both ends, and `LOOKS` between them.
@@ -34,11 +34,11 @@ class Spectra(NamedTuple):
     both ends, ``place`` a point of it, ``parts`` the places as parts of the step.
     """
 
-    square: Matrix
+    square: Stack
+    ones: Matrix
+    others: Matrix
     real: Matrix
     imaginary: Matrix
-    one: Vector
-    other: Vector
     values: Vector
     cubic: Matrix
     place: Vector
@@ -48,31 +48,32 @@ class Spectra(NamedTuple):
 def spectra_of(n: int, size: int) -> Spectra:
     """Return the room for n eigenvalues of a problem with so many unknowns."""
     return Spectra(
-        np.empty((n, n)), np.empty((_COUNT, n)), np.empty((_COUNT, n)), np.empty(n), np.empty(n), np.empty(_COUNT),
-        np.empty((4, size)), np.empty(size), _PLACES,
+        np.empty((1, n, n)), np.empty((1, n)), np.empty((1, n)), np.empty((_COUNT, n)), np.empty((_COUNT, n)),
+        np.empty(_COUNT), np.empty((4, size)), np.empty(size), _PLACES,
     )  # fmt: skip
 
 
 @helper
 def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
     """Fill in a row from the derivatives that were evaluated; return whether round-off decides on the side of one of them."""
-    n, doubt = spectra.one.size, False
+    n, doubt = spectra.real.shape[1], False
     for i in range(n):
         for j in range(n):
-            spectra.square[i, j] = equations.slopes_found[0, i, j]
-    eigenvalues_in_place(spectra.square, spectra.one, spectra.other)
+            spectra.square[0, i, j] = equations.slopes_found[0, i, j]
+    fill_eigenvalues(spectra.square, spectra.ones, spectra.others)
+    one, other = spectra.ones[0], spectra.others[0]
     largest = 0.0
     for i in range(n):
-        x, y = spectra.one[i], spectra.other[i]
+        x, y = one[i], other[i]
         size = math.hypot(x, y)
         if equations.is_map:
-            spectra.one[i], spectra.other[i] = math.log(max(size, NO_MULTIPLIER)), math.atan2(y, x)
-            doubt = doubt or not abs(spectra.one[i]) >= NEAR_CIRCLE
+            one[i], other[i] = math.log(max(size, NO_MULTIPLIER)), math.atan2(y, x)
+            doubt = doubt or not abs(one[i]) >= NEAR_CIRCLE
         else:
             largest = max(largest, size)
     real, imaginary = spectra.real[number], spectra.imaginary[number]
     for i in range(n):
-        x, y = spectra.one[i], spectra.other[i]
+        x, y = one[i], other[i]
         if not equations.is_map:
             doubt = doubt or not (abs(x) >= NEAR_AXIS * largest or y == 0.0 or x == 0.0)
         at = i
@@ -87,7 +88,7 @@ def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
 def moved(spectra: Spectra, one: int, other: int) -> float:
     """Return the largest distance by which an eigenvalue moves between two places; NaN where one is not known."""
     largest = 0.0
-    for i in range(spectra.one.size):
+    for i in range(spectra.real.shape[1]):
         apart = math.hypot(
             spectra.real[other, i] - spectra.real[one, i], spectra.imaginary[other, i] - spectra.imaginary[one, i]
         )
@@ -100,7 +101,7 @@ def moved(spectra: Spectra, one: int, other: int) -> float:
 def room(spectra: Spectra, one: int, other: int) -> float:
     """Return the second smallest distance of an eigenvalue to the axis at two places, without those on it at both."""
     least, second = math.inf, math.inf
-    for i in range(spectra.one.size):
+    for i in range(spectra.real.shape[1]):
         first, last = abs(spectra.real[one, i]), abs(spectra.real[other, i])
         distance = math.inf if first == 0.0 and last == 0.0 else min(first, last)
         if distance < least:
@@ -162,7 +163,7 @@ def fill_cubic(spectra: Spectra, x: Array, tangent: Array, new: Array, new_tange
 def _fill_values(spectra: Spectra, number: int) -> None:
     """Fill in det(M + I), each factor divided by 1 + |multiplier|."""
     real, imaginary = 1.0, 0.0
-    for i in range(spectra.one.size):
+    for i in range(spectra.real.shape[1]):
         x, y = spectra.real[number, i], spectra.imaginary[number, i]
         size = math.exp(-abs(x))
         one, other = (size, 1.0) if x > 0 else (1.0, size)
@@ -175,7 +176,7 @@ def _fill_values(spectra: Spectra, number: int) -> None:
 def _outside(spectra: Spectra, number: int) -> int:
     """Return the number of multipliers outside the circle."""
     count = 0
-    for i in range(spectra.one.size):
+    for i in range(spectra.real.shape[1]):
         if spectra.real[number, i] > 0:
             count += 1
     return count
@@ -184,7 +185,7 @@ def _outside(spectra: Spectra, number: int) -> int:
 @helper
 def _comes_near(spectra: Spectra, twists: bool) -> bool:
     """Return whether a multiplier may have passed -1, or as one of a pair the circle, and back."""
-    n = spectra.one.size
+    n = spectra.real.shape[1]
     for side in range(2):
         here, there = (FIRST, LAST) if side == 0 else (LAST, FIRST)
         for i in range(n):

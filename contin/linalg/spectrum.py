@@ -10,7 +10,6 @@ import math
 
 import numpy as np
 
-from contin.arrays import Array
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, helper
 
@@ -31,12 +30,12 @@ def fill_eigenvalues(matrices: Stack, real: Matrix, imaginary: Matrix) -> None:
     The two of a complex pair stand side by side, the one above the real axis first.
     """
     for number in range(matrices.shape[0]):
-        eigenvalues_in_place(matrices[number], real[number], imaginary[number])
+        _fill(matrices[number], real[number], imaginary[number])
 
 
 @helper
-def eigenvalues_in_place(a: Array, real: Array, imaginary: Array) -> None:
-    """Fill in the eigenvalues of a matrix, which is overwritten; see `fill_eigenvalues`."""
+def _fill(a, real, imaginary):
+    """Fill in the eigenvalues of a matrix."""
     n, total = a.shape[0], 0.0
     for i in range(n):
         for j in range(n):
