@@ -29,9 +29,11 @@ from contin.functions.kernel_parts import Helper, Instruction, kernel_of, names_
 from contin.functions.machine_code import INNER, Code, machine
 
 #: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"}}
-#: Options of functions that only compiled code calls.
-_INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+#: Only compiled code calls what numba makes.
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"},
+    "no_cpython_wrapper": True, "no_cfunc_wrapper": True,
+}  # fmt: skip
 
 # LLVM's types.
 _BYTE, _INT, _WORD, _DOUBLE = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.DoubleType()
@@ -60,29 +62,39 @@ def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Cod
     numba.core.errors.NumbaError
         It cannot be compiled.
     """
-    hints = get_type_hints(function, include_extras=True)
-    result = _type(hints.pop("return"))
-    parameters = list(hints.values())
+    result, parameters = _signature(function)
+    hints = list(get_type_hints(function, include_extras=True).values())[:-1]
+    context = cpu_target.target_context
+    with global_compiler_lock:
+        _refresh()
+        with _own_options(context.codegen()):
+            done = _compiled(function, tuple(parameters), result, reorder)
+            return _Entry(context, done, hints, entry).code()
+
+
+def _compiled(function: Callable[..., Any], parameters: tuple[Any, ...], result: Any, reorder: bool) -> Any:
+    """Return what numba makes of a function for types of its parameters; it finds the type of the result where that is None."""
     options = _OPTIONS if reorder else {**_OPTIONS, "fastmath": False}
     flags: Any = compiler.Flags()
-    with global_compiler_lock:
-        cpu_target.options.parse_as_flags(flags, {**options, **_INSIDE, "nopython": True, "boundscheck": None})
-        flags.no_compile, flags.enable_pyobject = True, False  # what numba runs itself is not wanted
-        context = cpu_target.target_context
-        cpu_target.typing_context.refresh()
-        context.refresh()
-        with _own_options(context.codegen()):
-            done = compiler.compile_extra(
-                cpu_target.typing_context, context, _ready(function), tuple(map(_type, parameters)), result, flags, {}
-            )
-            return _Entry(context, done, parameters, entry).code()
+    cpu_target.options.parse_as_flags(flags, {**options, "nopython": True, "boundscheck": None})
+    flags.no_compile, flags.enable_pyobject = True, False  # what numba runs itself is not wanted
+    typing, context = cpu_target.typing_context, cpu_target.target_context
+    library = _Part(context.codegen(), function.__qualname__)
+    return compiler.compile_extra(typing, context, _ready(function), parameters, result, flags, {}, library)
+
+
+@functools.cache
+def _refresh() -> None:
+    """Let numba load what it knows, which it does not do on its own account before the first function."""
+    cpu_target.target_context.refresh()
 
 
 @contextlib.contextmanager
 def _own_options(codegen: Any) -> Iterator[None]:
     """Let what is compiled meanwhile be for `contin.functions.machine_code.machine`, in place of this processor.
 
-    It is optimized once, as a whole, and no garbage is collected: that saves a quarter of the time.
+    It is optimized once, as a whole, and no garbage is collected, neither meanwhile nor later: that saves a quarter of the time,
+    and takes up to 180 MB where one process makes all kernels.
     """
     collects, libraries, target = gc.isenabled(), codegen._library_class, codegen._tm
     codegen._library_class, codegen._tm = _Library, _target()
@@ -91,6 +103,7 @@ def _own_options(codegen: Any) -> Iterator[None]:
         yield
     finally:
         codegen._library_class, codegen._tm = libraries, target
+        gc.freeze()
         if collects:
             gc.enable()
 
@@ -106,10 +119,17 @@ def _target() -> Any:
 
 
 class _Library(JITCodeLibrary):
-    """What numba makes of a helper or a kernel. It is not optimized with all that it calls before that is part of a kernel."""
+    """A module that numba makes. It is not optimized with all that it calls before that is part of a kernel."""
 
     def _optimize_final_module(self) -> None:
         """Do nothing."""
+
+
+class _Part(_Library):
+    """What numba makes of a kernel or a helper: there is no machine code of it before it is part of a kernel."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
 
 
 def _type(hint: Any) -> Any:
@@ -158,7 +178,7 @@ def _known(value: Any, names: frozenset[str]) -> Any:
     if part is None:
         return value
     if part not in _KNOWN:
-        make = _dispatcher if isinstance(part, Helper) else _intrinsic if isinstance(part, Instruction) else _outer
+        make = _helper if isinstance(part, Helper) else _intrinsic if isinstance(part, Instruction) else _outer
         _KNOWN[part] = make(part)
     return _KNOWN[part]
 
@@ -167,10 +187,36 @@ def _known(value: Any, names: frozenset[str]) -> Any:
 _KNOWN: dict[Any, Any] = {}
 
 
+def _helper(helper: Helper) -> Any:
+    """Return a helper as numba knows it: it is compiled once for each kind of arguments."""
+    if helper.inline:
+        return numba.njit(inline="always", **_OPTIONS)(_ready(helper.function))
+    made: dict[Any, Any] = {}
+
+    def typed(context: Any, *given: Any) -> Any:
+        if given not in made:
+            made[given] = _compiled(helper.function, given, None, reorder=True)
+        done = made[given]
+
+        def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            context.active_code_library.add_linking_library(done.library)
+            return context.call_internal_no_propagate(builder, done.fndesc, signature, arguments)[1]
+
+        return done.signature, call
+
+    return _function(helper.function, typed)
+
+
 def _outer(kernel: Any) -> Any:
     """Return a kernel as numba knows it where another one calls it: a function of this signature in other machine code."""
     result, parameters = _signature(kernel.function)
     signature = result(*parameters)
+
+    def typed(context: Any, *given: Any) -> Any:
+        fits = [context.can_convert(kind, wanted) for kind, wanted in zip(given, parameters)]
+        if len(given) != len(parameters) or any(fit is None or fit > Conversion.safe for fit in fits):
+            raise numba.errors.TypingError(f"{kernel.name} takes {signature.args}, not {given}")
+        return signature, call
 
     def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = context.call_conv.get_function_type(result, signature.args)
@@ -178,14 +224,13 @@ def _outer(kernel: Any) -> Any:
         _, value = context.call_conv.call_function(builder, function, result, signature.args, arguments)
         return context.get_dummy_value() if result is types.void else value
 
-    def typed(context: Any, *given: Any) -> Any:
-        fits = [context.can_convert(kind, wanted) for kind, wanted in zip(given, signature.args)]
-        if len(given) != len(signature.args) or any(fit is None or fit > Conversion.safe for fit in fits):
-            raise numba.errors.TypingError(f"{kernel.name} takes {signature.args}, not {given}")
-        return signature, call
+    return _function(kernel.function, typed)
 
-    known: Any = functools.wraps(kernel.function)(typed)
-    first, own = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD), inspect.signature(kernel.function)
+
+def _function(function: Callable[..., Any], typed: Any) -> Any:
+    """Return a function as numba knows it where ``typed`` gives its signature, and what writes a call of it."""
+    known: Any = functools.wraps(function)(typed)
+    first, own = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD), inspect.signature(function)
     known.__signature__ = own.replace(parameters=[first, *own.parameters.values()])
     return numba.extending.intrinsic(known)
 
@@ -194,12 +239,6 @@ def _signature(function: Callable[..., Any]) -> tuple[Any, list[Any]]:
     """Return numba's types of the result and the parameters of a kernel."""
     hints = get_type_hints(function, include_extras=True)
     return _type(hints.pop("return")), list(map(_type, hints.values()))
-
-
-def _dispatcher(helper: Helper) -> Any:
-    inline = "always" if helper.inline else "never"
-    options: Any = {"inline": inline, **_INSIDE, **_OPTIONS}
-    return numba.njit(**options)(_ready(helper.function))
 
 
 def _intrinsic(instruction: Instruction) -> Any:
