@@ -175,11 +175,11 @@ class Block:
         """Yield what returns the state behind each step, and the point there."""
         system, (x, tangents, numbers) = self._system, self._path
         names, rows = tuple(system.problem.parameters), range(2, self.made + 2)
-        values = np.tile(system.parameters, (self.made + 2, 1))
-        values[:, system._free] = self._free(x[: self.made + 2])
+        values = np.tile(system.parameters, (self.made, 1))
+        values[:, system._free] = self._free(x[2 : self.made + 2])
         arclengths = (numbers[1 : self.made + 1, ARCLENGTH] + numbers[2 : self.made + 2, STEP]).tolist()
         told = numbers[2 : self.made + 2, (ITERATIONS, ERROR_LEFT)].tolist()
-        for row, given, arclength, (iterations, error) in zip(rows, values[2:].tolist(), arclengths, told):
+        for row, given, arclength, (iterations, error) in zip(rows, values.tolist(), arclengths, told):
             point = object.__new__(Point)  # its own __init__ would take half of the time of a step
             vars(point).update(_REGULAR, parameters=dict(zip(names, given)), functionals=self._functionals(row))
             vars(point).update(x=x[row], tangent=tangents[row], system=system, arclength=arclength, errors={})

@@ -206,7 +206,7 @@ def _accept(equations: Equations, linear: Linear, control: Control, path: Path, 
         now[SENSE], now[SENSED] = math.copysign(1.0, tangent[at]), number
 
 
-@kernel(reorder=False)
+@kernel(reorder=False, last=True)
 def plain_steps(
     equations: Equations, linear: Linear, control: Control, watch: Watch, quotient: Quotient, spectra: Spectra, path: Path,
     accepted: int, bent: int,
