@@ -9,7 +9,7 @@ from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Stack, Vector,
 from contin.linalg.elimination import Range
 from contin.linalg.layout import Blocks, Layout
 from contin.linalg.segments import Share
-from contin.linalg.vector import scale_into
+from contin.linalg.vector import address, scale_into
 
 
 @kernel
@@ -99,7 +99,7 @@ def _fill_collocation(
                 row, equation = local[j, place], layout.rows[place]
                 i, a = equation // n, equation % n
                 point = jacobian[j * d + i, a]
-                target, source = row.ctypes.data, point.ctypes.data
+                target, source = address(row, 0), address(point, 0)
                 if i == d - 1:  # the row remains, and all of its ends are read
                     for b in range(inner, rest):
                         row[b] = 0.0

@@ -25,7 +25,7 @@ from numba.core.registry import cpu_target
 from numba.core.typeconv.castgraph import Conversion
 from numba.np.arrayobj import populate_array
 
-from contin.functions.kernel_parts import Helper, Instruction, kernel_of, names_in
+from contin.functions.kernel_parts import Helper, Instruction, Place, kernel_of, names_in
 from contin.functions.machine_code import INNER, Code, machine
 
 #: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
@@ -93,8 +93,8 @@ def _refresh() -> None:
 def _own_options(codegen: Any) -> Iterator[None]:
     """Let what is compiled meanwhile be for `contin.functions.machine_code.machine`, in place of this processor.
 
-    It is optimized once, as a whole, and no garbage is collected, neither meanwhile nor later: that saves a quarter of the time,
-    and takes up to 180 MB where one process makes all kernels.
+    It is optimized once, as a whole, and no garbage is collected, neither meanwhile nor later. That saves a quarter of the
+    time; where one process makes all kernels, it takes 180 MB.
     """
     collects, libraries, target = gc.isenabled(), codegen._library_class, codegen._tm
     codegen._library_class, codegen._tm = _Library, _target()
@@ -204,7 +204,7 @@ def _helper(helper: Helper) -> Any:
 
         return done.signature, call
 
-    return _function(helper.function, typed)
+    return _callable(helper.function, typed)
 
 
 def _outer(kernel: Any) -> Any:
@@ -224,10 +224,10 @@ def _outer(kernel: Any) -> Any:
         _, value = context.call_conv.call_function(builder, function, result, signature.args, arguments)
         return context.get_dummy_value() if result is types.void else value
 
-    return _function(kernel.function, typed)
+    return _callable(kernel.function, typed)
 
 
-def _function(function: Callable[..., Any], typed: Any) -> Any:
+def _callable(function: Callable[..., Any], typed: Any) -> Any:
     """Return a function as numba knows it where ``typed`` gives its signature, and what writes a call of it."""
     known: Any = functools.wraps(function)(typed)
     first, own = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD), inspect.signature(function)
@@ -247,38 +247,48 @@ def _intrinsic(instruction: Instruction) -> Any:
     hints = get_type_hints(write)
     hints.pop("builder", None)
     result, parameters = _type(hints.pop("return")), list(hints.values())
-    signature, nothing = result(*map(_type, parameters)), result is types.void
+    nothing = result is types.void
 
     def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        values: list[Any] = []
-        for argument, parameter in zip(arguments, parameters):
-            values += cgutils.unpack_tuple(builder, argument) if hasattr(parameter, "_fields") else [argument]
-        value = builder.call(_function(context, builder.module, values), values)
+        parts = [_taken_apart(context, builder, *each) for each in zip(signature.args, arguments)]
+        function = _function(context, builder.module, parts)
+        value = builder.call(function, list(itertools.chain.from_iterable(parts)))
         return context.get_dummy_value() if nothing else value
 
-    def _function(context: Any, module: Any, values: list[Any]) -> Any:
+    def _function(context: Any, module: Any, parts: list[list[Any]]) -> Any:
         options = sorted(getattr(context.fastmath, "flags", ()))  # numba gives them to all sums and products of the module
-        name = ".".join([write.__module__, write.__qualname__, *options])
+        name = ".".join([write.__module__, write.__qualname__, *options, *(str(len(part)) for part in parts)])
         if name in module.globals:
             return module.globals[name]
         returned = ir.VoidType() if nothing else context.get_value_type(result)
-        function = ir.Function(module, ir.FunctionType(returned, [value.type for value in values]), name)
+        function = ir.Function(module, ir.FunctionType(returned, [value.type for part in parts for value in part]), name)
         function.linkage = "linkonce_odr"  # one copy where modules are linked
         if write.__name__ in _SMALL:
             function.attributes.add("optsize")
         builder, given = ir.IRBuilder(function.append_basic_block()), iter(function.args)
         arguments = [
-            kind(*itertools.islice(given, len(kind._fields))) if hasattr(kind, "_fields") else next(given)
-            for kind in parameters
+            (Place if kind is Any else kind)(*taken) if kind is Any or hasattr(kind, "_fields") else taken[0]
+            for kind, part in zip(parameters, parts)
+            for taken in [list(itertools.islice(given, len(part)))]
         ]
         value = write(builder, *arguments)
+        if isinstance(value, tuple):
+            value = context.make_tuple(builder, result, value)
         builder.ret_void() if nothing else builder.ret(value)
         return function
 
-    def typed(context: Any, *types: Any) -> Any:
-        return signature, call
+    def typed(context: Any, *given: Any) -> Any:
+        return result(*(kind if hint is Any else _type(hint) for hint, kind in zip(parameters, given))), call
 
     return numba.extending.intrinsic(functools.wraps(write)(typed))
+
+
+def _taken_apart(context: Any, builder: Any, kind: Any, argument: Any) -> list[Any]:
+    """Return what an instruction takes for an argument: the values of a named tuple, the address and strides of an array."""
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, argument)
+        return [builder.ptrtoint(array.data, _WORD), *cgutils.unpack_tuple(builder, array.strides)]
+    return list(cgutils.unpack_tuple(builder, argument)) if isinstance(kind, types.BaseTuple) else [argument]
 
 
 # --- the function that Python calls ----------------------------------------------------------------------------------

@@ -500,10 +500,11 @@ def _give_up(work, lists, row, lanes):
                 work[(at + i) * LANES + lane] = math.nan
 
 
-@helper(inline=True)
-def _address(array, offset):
+@instruction
+def _address(builder: Any, array: Any, offset: int) -> int:
     """Return an address in an array, which must be a parameter of the kernel."""
-    return array.ctypes.data + offset
+    there: int = builder.add(array.address, offset)
+    return there
 
 
 class Instructions(NamedTuple):

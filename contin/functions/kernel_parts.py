@@ -141,7 +141,8 @@ def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Call
 
     ``write(builder, *arguments)`` appends the body of the function with an ``llvmlite.ir.IRBuilder`` and returns its value. Its
     annotations (``int``, ``float``, named tuples of them, ``None``) are the types that kernels see; the ``arguments`` are LLVM
-    values, and named tuples of LLVM values. For example, a rounded sum of two numbers::
+    values, and named tuples of LLVM values. An array of any kind, annotated as ``Any``, is
+    a `Place`. For example, a rounded sum of two numbers::
 
         @instruction
         def sum(builder: Any, x: float, y: float) -> float:
@@ -151,6 +152,13 @@ def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Call
     """
     written: Any = Instruction(write)
     return written  # type: ignore[no-any-return]
+
+
+class Place:
+    """An array of any kind, as an instruction sees it: the address of its first entry, and the bytes from one to the next."""
+
+    def __init__(self, address: Any, *strides: Any) -> None:
+        self.address, self.strides = address, strides
 
 
 def for_range(builder: Any, count: Any) -> Any:

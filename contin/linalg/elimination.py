@@ -17,6 +17,7 @@ from contin.linalg.segments import Share
 from contin.linalg.vector import (
     PANEL,
     Rows,
+    at,
     copy_rows,
     exchange,
     invert_triangles,
@@ -96,16 +97,6 @@ def whole_step(size):
 
 
 # --- elimination of columns from rows --------------------------------------------------------------------------------
-
-
-@helper(inline=True)
-def at(matrix, i, j):
-    """Return the rows of a matrix from entry (i, j) on, for vector instructions.
-
-    numba frees an array after its last use, and does not see that an address is one: ``matrix`` must be a parameter of the
-    kernel or of a helper that is not inlined, a part of one, or used again later.
-    """
-    return Rows(matrix.ctypes.data + i * matrix.strides[0] + 8 * j, matrix.strides[0])
 
 
 @helper

@@ -10,46 +10,30 @@ from typing import NamedTuple
 
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyMatrix, helper
-from contin.linalg.elimination import Eliminated, Range, at, group_step, point_step, whole_step
+from contin.linalg.elimination import Eliminated, Range, group_step, point_step, whole_step
 from contin.linalg.layout import Layout
 from contin.linalg.segments import ALL, Share
 from contin.linalg.vector import (
     LANES,
     PANEL,
-    Rows,
     add,
+    address,
     apart,
     apply_lower,
     apply_lower_transposed,
     apply_upper,
     apply_upper_transposed,
+    at,
     clear,
+    entry,
     exchange,
     move,
+    page,
     side_by_side,
     subtract_columns,
     subtract_rows,
+    within,
 )
-
-# --- addresses -------------------------------------------------------------------------------------------------------
-
-
-@helper(inline=True)
-def _entry(vector, i):
-    """Return the address of an entry of a vector."""
-    return vector + 8 * LANES * i
-
-
-@helper(inline=True)
-def _part(block, i, j):
-    """Return the rows of a block from entry (i, j) on."""
-    return Rows(block.address + i * block.stride + 8 * j, block.stride)
-
-
-@helper(inline=True)
-def _page(stack, j):
-    """Return the rows of a stack's matrix j."""
-    return Rows(stack.ctypes.data + j * stack.strides[0], stack.strides[1])
 
 
 class Vectors(NamedTuple):
@@ -109,10 +93,10 @@ def _sizes(factors, n, starts):
 def _joint(work, sizes):
     """Return places of the joint vectors in work space at an address."""
     segments, rows, n, r, size = sizes
-    dense = _entry(work, size - n)
-    known = _entry(dense, size)
-    border = _entry(known, size)
-    return Joint(work, dense, known, border, _entry(border, r))
+    dense = entry(work, size - n)
+    known = entry(dense, size)
+    border = entry(known, size)
+    return Joint(work, dense, known, border, entry(border, r))
 
 
 @helper
@@ -121,47 +105,47 @@ def _vectors(work, sizes, part, s):
     segments, rows, n, r, size = sizes
     count = part.last - part.first
     before = 3 * size - n + r + (segments + 1) * 2 * n + part.first * (3 * rows + 2 * n) + s * (2 * n + r + size)
-    given = _entry(work, before)
-    found = _entry(given, count * rows + n)
-    inner = _entry(found, count * rows + n)
-    pair = _entry(inner, count * rows)
-    border = _entry(pair, count * 2 * n)
-    return Vectors(given, found, inner, pair, border, _entry(border, r))
+    given = entry(work, before)
+    found = entry(given, count * rows + n)
+    inner = entry(found, count * rows + n)
+    pair = entry(inner, count * rows)
+    border = entry(pair, count * 2 * n)
+    return Vectors(given, found, inner, pair, border, entry(border, r))
 
 
 @helper
 def _move(target, source, count):
     """Copy ``count`` entries."""
     for k in range(count):
-        move(_entry(target, k), _entry(source, k))
+        move(entry(target, k), entry(source, k))
 
 
 @helper
 def _clear(target, count):
     """Fill ``count`` entries with zeros."""
     for k in range(count):
-        clear(_entry(target, k))
+        clear(entry(target, k))
 
 
 @helper
 def _add(target, source, count):
     """Add ``count`` entries."""
     for k in range(count):
-        add(_entry(target, k), _entry(source, k))
+        add(entry(target, k), entry(source, k))
 
 
 @helper
 def _take(target, source, places, part):
     """Fill entries of ``target`` with source[places[part]]."""
     for k in range(part.first, part.last):
-        move(_entry(target, k - part.first), _entry(source, places[k]))
+        move(entry(target, k - part.first), entry(source, places[k]))
 
 
 @helper
 def _put(target, places, part, source):
     """Put entries of ``source`` at target[places[part]]."""
     for k in range(part.first, part.last):
-        move(_entry(target, places[k]), _entry(source, k - part.first))
+        move(entry(target, places[k]), entry(source, k - part.first))
 
 
 # --- substitution with the rows and columns of one elimination -------------------------------------------------------
@@ -173,20 +157,20 @@ def _forward(block, step, pivots, x):
     top, bottom, left, right, _, _ = step
     for c in range(left, right):
         if pivots[c] != top + c - left:
-            exchange(_entry(x, top + c - left), _entry(x, pivots[c]), LANES)
+            exchange(entry(x, top + c - left), entry(x, pivots[c]), LANES)
     for start in range(left, right, PANEL):
         size, row = min(PANEL, right - start), top + start - left
-        subtract_rows(_entry(x, row), _part(block, row, left), _entry(x, top), start - left, size)
-        apply_lower(_entry(x, row), _part(block, row, start), size)
+        subtract_rows(entry(x, row), within(block, row, left), entry(x, top), start - left, size)
+        apply_lower(entry(x, row), within(block, row, start), size)
     row = top + right - left
-    subtract_rows(_entry(x, row), _part(block, row, left), _entry(x, top), right - left, bottom - row)
+    subtract_rows(entry(x, row), within(block, row, left), entry(x, top), right - left, bottom - row)
 
 
 @helper(inline=True)
 def _subtract(matrix, rows, step, x, y):
     """Apply an elimination to the right-hand sides y of reduced ``rows`` of a matrix; x are those of the block."""
-    reduced, pivots = _part(matrix, rows.first, step.left), _entry(x, step.top)
-    subtract_rows(_entry(y, rows.first), reduced, pivots, step.right - step.left, rows.last - rows.first)
+    reduced, pivots = within(matrix, rows.first, step.left), entry(x, step.top)
+    subtract_rows(entry(y, rows.first), reduced, pivots, step.right - step.left, rows.last - rows.first)
 
 
 @helper
@@ -194,13 +178,13 @@ def _backward(block, step, x, known):
     """Solve the upper triangle of an elimination for x; ``known`` are the unknowns of the columns from the tail on."""
     top, _, left, right, tail, width = step
     if width > tail:
-        subtract_rows(_entry(x, top), _part(block, top, tail), known, width - tail, right - left)
+        subtract_rows(entry(x, top), within(block, top, tail), known, width - tail, right - left)
     end = right
     while end > left:
         start = left + (end - left - 1) // PANEL * PANEL
         row, after = top + start - left, top + end - left
-        subtract_rows(_entry(x, row), _part(block, row, end), _entry(x, after), right - end, end - start)
-        apply_upper(_entry(x, row), _part(block, row, start), end - start)
+        subtract_rows(entry(x, row), within(block, row, end), entry(x, after), right - end, end - start)
+        apply_upper(entry(x, row), within(block, row, start), end - start)
         end = start
 
 
@@ -211,17 +195,17 @@ def _forward_transposed(block, step, x, rest):
     for start in range(left, right, PANEL):
         end, row = min(start + PANEL, right), top + start - left
         size, after = end - start, top + end - left
-        apply_upper_transposed(_entry(x, row), _part(block, row, start), size)
-        subtract_columns(_entry(x, after), _part(block, row, end), _entry(x, row), right - end, size)
+        apply_upper_transposed(entry(x, row), within(block, row, start), size)
+        subtract_columns(entry(x, after), within(block, row, end), entry(x, row), right - end, size)
         if width > tail:
-            subtract_columns(rest, _part(block, row, tail), _entry(x, row), width - tail, size)
+            subtract_columns(rest, within(block, row, tail), entry(x, row), width - tail, size)
 
 
 @helper(inline=True)
 def _subtract_transposed(matrix, rows, step, y, x):
     """Subtract from x what the multipliers y of reduced ``rows`` of a matrix contribute to those of the block."""
-    reduced, pivots = _part(matrix, rows.first, step.left), _entry(x, step.top)
-    subtract_columns(pivots, reduced, _entry(y, rows.first), step.right - step.left, rows.last - rows.first)
+    reduced, pivots = within(matrix, rows.first, step.left), entry(x, step.top)
+    subtract_columns(pivots, reduced, entry(y, rows.first), step.right - step.left, rows.last - rows.first)
 
 
 @helper
@@ -229,17 +213,17 @@ def _backward_transposed(block, step, pivots, x):
     """Apply the transpose of an elimination to the multipliers x of the rows of a block."""
     top, bottom, left, right, _, _ = step
     row = top + right - left
-    subtract_columns(_entry(x, top), _part(block, row, left), _entry(x, row), right - left, bottom - row)
+    subtract_columns(entry(x, top), within(block, row, left), entry(x, row), right - left, bottom - row)
     end = right
     while end > left:
         start = left + (end - left - 1) // PANEL * PANEL
         row = top + start - left
-        apply_lower_transposed(_entry(x, row), _part(block, row, start), end - start)
-        subtract_columns(_entry(x, top), _part(block, row, left), _entry(x, row), start - left, end - start)
+        apply_lower_transposed(entry(x, row), within(block, row, start), end - start)
+        subtract_columns(entry(x, top), within(block, row, left), entry(x, row), start - left, end - start)
         end = start
     for c in range(right - 1, left - 1, -1):
         if pivots[c] != top + c - left:
-            exchange(_entry(x, top + c - left), _entry(x, pivots[c]), LANES)
+            exchange(entry(x, top + c - left), entry(x, pivots[c]), LANES)
 
 
 # --- solve: the stages, one after the other, and unknowns in the reverse order ---------------------------------------
@@ -252,9 +236,9 @@ def _forward_interiors(layout, factors, part, vectors):
     n, groups, (_, rows, width) = layout.order.size, layout.offsets.size - 1, factors.local.shape
     r, degree = factors.border.shape[1], rows // n
     for j in range(part.first, part.last):
-        block, edge, pivots, i = _page(factors.local, j), _page(factors.border, j), factors.pivots[j], j - part.first
-        inner, remaining = _entry(vectors.inner, i * rows), _entry(vectors.pair, (2 * i + 1) * n)
-        _take(inner, _entry(vectors.given, i * rows), layout.rows, Range(0, rows))
+        block, edge, pivots, i = page(factors.local, j), page(factors.border, j), factors.pivots[j], j - part.first
+        inner, remaining = entry(vectors.inner, i * rows), entry(vectors.pair, (2 * i + 1) * n)
+        _take(inner, entry(vectors.given, i * rows), layout.rows, Range(0, rows))
         for g in range(groups):
             step = group_step(offsets, g, degree, width)
             _forward(block, step, pivots, inner)
@@ -263,14 +247,14 @@ def _forward_interiors(layout, factors, part, vectors):
                     _subtract(block, Range(degree * offsets[h], degree * offsets[h + 1]), step, inner, inner)
             _subtract(edge, Range(0, r), step, inner, vectors.border)
             size = offsets[g + 1] - offsets[g]
-            _move(_entry(remaining, offsets[g]), _entry(inner, step.bottom - size), size)
+            _move(entry(remaining, offsets[g]), entry(inner, step.bottom - size), size)
 
 
 @helper
 def _forward_point(block, step, r, pivots, pair, border):
     """Apply the elimination of a mesh point to the ``pair`` of its rows, and reduce the ``border``."""
     _forward(block, step, pivots, pair)
-    _subtract(_part(block, step.bottom, 0), Range(0, r), step, pair, border)
+    _subtract(within(block, step.bottom, 0), Range(0, r), step, pair, border)
 
 
 @helper(inline=True)
@@ -278,10 +262,10 @@ def _forward_points(factors, n, part, vectors):
     """Apply stage 2: fill the first half of each ``pair``, and reduce the ``border``."""
     step = point_step(n, factors.chain.shape[2])
     for j in range(part.first + 1, part.last):
-        pair = _entry(vectors.pair, 2 * n * (j - part.first))
-        _move(pair, _entry(pair, -n), n)
+        pair = entry(vectors.pair, 2 * n * (j - part.first))
+        _move(pair, entry(pair, -n), n)
         pivots = factors.pivots[j, factors.local.shape[1] - n :]
-        _forward_point(_page(factors.chain, j - 1), step, factors.border.shape[1], pivots, pair, vectors.border)
+        _forward_point(page(factors.chain, j - 1), step, factors.border.shape[1], pivots, pair, vectors.border)
 
 
 @helper(inline=True)
@@ -297,9 +281,9 @@ def _backward_points(factors, n, part, vectors):
     """Solve for the mesh points inside a segment, the last first, with [first point | next point | parameters] ``known``."""
     rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
     for j in range(part.last - 1, part.first, -1):
-        pair, point = _entry(vectors.pair, 2 * n * (j - part.first)), _entry(vectors.found, (j - part.first) * rows)
-        _move(_entry(vectors.known, n), _entry(point, rows), n)
-        _backward(_page(factors.chain, j - 1), step, pair, vectors.known)
+        pair, point = entry(vectors.pair, 2 * n * (j - part.first)), entry(vectors.found, (j - part.first) * rows)
+        _move(entry(vectors.known, n), entry(point, rows), n)
+        _backward(page(factors.chain, j - 1), step, pair, vectors.known)
         _move(point, pair, n)
 
 
@@ -308,13 +292,13 @@ def _backward_interiors(layout, factors, part, vectors):
     """Solve for the interior unknowns of each interval, with [both ends | parameters] ``known``."""
     offsets, n, (_, rows, width) = layout.offsets, layout.order.size, factors.local.shape
     for j in range(part.first, part.last):
-        block, i = _page(factors.local, j), j - part.first
-        inner, found = _entry(vectors.inner, i * rows), _entry(vectors.found, i * rows)
+        block, i = page(factors.local, j), j - part.first
+        inner, found = entry(vectors.inner, i * rows), entry(vectors.found, i * rows)
         _take(vectors.known, found, layout.ends, Range(0, 2 * n))
         for g in range(offsets.size - 1):
             step = group_step(offsets, g, rows // n, width)
-            _backward(block, step, inner, _entry(vectors.known, 2 * (n - offsets[g + 1])))
-            _put(found, layout.inside, Range(step.left, step.right), _entry(inner, step.top))
+            _backward(block, step, inner, entry(vectors.known, 2 * (n - offsets[g + 1])))
+            _put(found, layout.inside, Range(step.left, step.right), entry(inner, step.top))
 
 
 @helper(inline=True)
@@ -327,34 +311,34 @@ def _solve_joint(factors, sizes, starts, place):
     segments, rows, n, r, size = sizes
     joint, step = _joint(place, sizes), point_step(n, factors.chain.shape[2])
     for s in range(segments):
-        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), _entry(joint.pair, 2 * n * s)
-        _move(_entry(pair, n), _entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), n)
+        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.pair, 2 * n * s)
+        _move(entry(pair, n), entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), n)
         if s == 0:
             _move(joint.border, vectors.border, r)
         else:
             _add(joint.border, vectors.border, r)
     for s in range(1, segments):
-        pair = _entry(joint.pair, 2 * n * s)
-        _move(pair, _entry(pair, -n), n)
+        pair = entry(joint.pair, 2 * n * s)
+        _move(pair, entry(pair, -n), n)
         pivots = factors.pivots[starts[s], rows - n :]
-        _forward_point(_page(factors.chain, starts[s] - 1), step, r, pivots, pair, joint.border)
-    _move(joint.dense, _entry(joint.pair, (2 * segments - 1) * n), n)
-    _move(_entry(joint.dense, n), joint.rest, size - n - r)
-    _move(_entry(joint.dense, size - r), joint.border, r)
+        _forward_point(page(factors.chain, starts[s] - 1), step, r, pivots, pair, joint.border)
+    _move(joint.dense, entry(joint.pair, (2 * segments - 1) * n), n)
+    _move(entry(joint.dense, n), joint.rest, size - n - r)
+    _move(entry(joint.dense, size - r), joint.border, r)
     _solve_dense(factors, joint.dense)
-    _move(joint.rest, _entry(joint.dense, n), size - n)
+    _move(joint.rest, entry(joint.dense, n), size - n)
     _move(joint.known, joint.dense, size)
     for s in range(segments - 1, -1, -1):
-        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), _entry(joint.pair, 2 * n * s)
-        _move(_entry(vectors.found, (starts[s + 1] - starts[s]) * rows), _entry(joint.known, n), n)
+        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.pair, 2 * n * s)
+        _move(entry(vectors.found, (starts[s + 1] - starts[s]) * rows), entry(joint.known, n), n)
         if s > 0:
-            _backward(_page(factors.chain, starts[s] - 1), step, pair, joint.known)
-            _move(_entry(joint.known, n), pair, n)
+            _backward(page(factors.chain, starts[s] - 1), step, pair, joint.known)
+            _move(entry(joint.known, n), pair, n)
         else:
-            _move(_entry(joint.known, n), joint.known, n)
-        _move(vectors.found, _entry(joint.known, n), n)
+            _move(entry(joint.known, n), joint.known, n)
+        _move(vectors.found, entry(joint.known, n), n)
         _move(vectors.known, vectors.found, n)
-        _move(_entry(vectors.known, 2 * n), _entry(joint.known, 2 * n), size - 2 * n)
+        _move(entry(vectors.known, 2 * n), entry(joint.known, 2 * n), size - 2 * n)
 
 
 @kernel
@@ -364,7 +348,7 @@ def solve(layout: Layout, factors: Eliminated, b: ReadOnlyMatrix, x: Matrix, wor
     The stages of a `Share` are: elimination in segments, what joins them, substitution in segments. A share that is not the
     whole takes at most `LANES` rows.
     """
-    starts, place = share.starts, work.ctypes.data
+    starts, place = share.starts, address(work, 0)
     sizes = _sizes(factors, layout.order.size, starts)
     _, rows, n, r, size = sizes
     collocation, tail = factors.local.shape[0] * rows, size - n
@@ -375,24 +359,24 @@ def solve(layout: Layout, factors: Eliminated, b: ReadOnlyMatrix, x: Matrix, wor
             for s in range(share.first, share.last):
                 part = Range(starts[s], starts[s + 1])
                 vectors = _vectors(place, sizes, part, s)
-                side_by_side(vectors.given, _part(given, 0, part.first * rows), (part.last - part.first) * rows, count)
+                side_by_side(vectors.given, within(given, 0, part.first * rows), (part.last - part.first) * rows, count)
                 if s == 0:
-                    side_by_side(joint.rest, _part(given, 0, collocation), tail, count)
-                    _move(vectors.border, _entry(joint.rest, tail - r), r)
+                    side_by_side(joint.rest, within(given, 0, collocation), tail, count)
+                    _move(vectors.border, entry(joint.rest, tail - r), r)
                 else:
                     _clear(vectors.border, r)
                 _forward_interiors(layout, factors, part, vectors)
                 _forward_points(factors, n, part, vectors)
         if share.stage == 1 or share.stage == ALL:
             _solve_joint(factors, sizes, starts, place)
-            apart(_part(found, 0, collocation), joint.rest, tail, count)
+            apart(within(found, 0, collocation), joint.rest, tail, count)
         if share.stage == 2 or share.stage == ALL:
             for s in range(share.first, share.last):
                 part = Range(starts[s], starts[s + 1])
                 vectors = _vectors(place, sizes, part, s)
                 _backward_points(factors, n, part, vectors)
                 _backward_interiors(layout, factors, part, vectors)
-                apart(_part(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
+                apart(within(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
 
 
 # --- transposed solve: triangles in the order of the stages, and multipliers in the reverse order --------------------
@@ -403,13 +387,13 @@ def _interiors_transposed(layout, factors, part, vectors):
     """Solve the triangles of stage 1: fill ``inner``; subtract what it contributes to both ends and to the parameters."""
     offsets, n, (_, rows, width) = layout.offsets, layout.order.size, factors.local.shape
     for j in range(part.first, part.last):
-        block, i = _page(factors.local, j), j - part.first
-        inner, given = _entry(vectors.inner, i * rows), _entry(vectors.given, i * rows)
+        block, i = page(factors.local, j), j - part.first
+        inner, given = entry(vectors.inner, i * rows), entry(vectors.given, i * rows)
         _take(vectors.known, given, layout.ends, Range(0, 2 * n))
         for g in range(offsets.size - 1):
             step = group_step(offsets, g, rows // n, width)
-            _take(_entry(inner, step.top), given, layout.inside, Range(step.left, step.right))
-            _forward_transposed(block, step, inner, _entry(vectors.known, 2 * (n - offsets[g + 1])))
+            _take(entry(inner, step.top), given, layout.inside, Range(step.left, step.right))
+            _forward_transposed(block, step, inner, entry(vectors.known, 2 * (n - offsets[g + 1])))
         _put(given, layout.ends, Range(0, 2 * n), vectors.known)
 
 
@@ -417,9 +401,9 @@ def _interiors_transposed(layout, factors, part, vectors):
 def _point_transposed(block, step, point, after, known):
     """Solve the triangle of a mesh point; subtract what it contributes to the first one, the one ``after``, and parameters."""
     n = step.right
-    _move(_entry(known, n), after, n)
+    _move(entry(known, n), after, n)
     _forward_transposed(block, step, point, known)
-    _move(after, _entry(known, n), n)
+    _move(after, entry(known, n), n)
 
 
 @helper(inline=True)
@@ -428,8 +412,8 @@ def _points_transposed(factors, n, part, vectors):
     rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
     _move(vectors.known, vectors.given, n)
     for j in range(part.first + 1, part.last):
-        point = _entry(vectors.given, (j - part.first) * rows)
-        _point_transposed(_page(factors.chain, j - 1), step, point, _entry(point, rows), vectors.known)
+        point = entry(vectors.given, (j - part.first) * rows)
+        _point_transposed(page(factors.chain, j - 1), step, point, entry(point, rows), vectors.known)
     _move(vectors.given, vectors.known, n)
 
 
@@ -444,7 +428,7 @@ def _solve_dense_transposed(factors, x):
 @helper
 def _multipliers_of_point(block, step, r, pivots, pair, border):
     """Apply the transpose of the elimination of a mesh point: turn its ``pair`` into the multipliers of its rows."""
-    _subtract_transposed(_part(block, step.bottom, 0), Range(0, r), step, border, pair)
+    _subtract_transposed(within(block, step.bottom, 0), Range(0, r), step, border, pair)
     _backward_transposed(block, step, pivots, pair)
 
 
@@ -453,11 +437,11 @@ def _multipliers_of_points(factors, n, part, vectors):
     """Apply the transpose of stage 2: fill each ``pair`` with the multipliers of its rows."""
     rows, step = factors.local.shape[1], point_step(n, factors.chain.shape[2])
     for j in range(part.last - 1, part.first, -1):
-        pair = _entry(vectors.pair, 2 * n * (j - part.first))
-        _move(pair, _entry(vectors.given, (j - part.first) * rows), n)
+        pair = entry(vectors.pair, 2 * n * (j - part.first))
+        _move(pair, entry(vectors.given, (j - part.first) * rows), n)
         pivots = factors.pivots[j, rows - n :]
-        _multipliers_of_point(_page(factors.chain, j - 1), step, factors.border.shape[1], pivots, pair, vectors.border)
-        _move(_entry(pair, -n), pair, n)
+        _multipliers_of_point(page(factors.chain, j - 1), step, factors.border.shape[1], pivots, pair, vectors.border)
+        _move(entry(pair, -n), pair, n)
 
 
 @helper(inline=True)
@@ -467,17 +451,17 @@ def _multipliers_of_interiors(layout, factors, part, vectors):
     n, groups, (_, rows, width) = layout.order.size, layout.offsets.size - 1, factors.local.shape
     r, degree = factors.border.shape[1], rows // n
     for j in range(part.first, part.last):
-        block, edge, pivots, i = _page(factors.local, j), _page(factors.border, j), factors.pivots[j], j - part.first
-        inner, remaining = _entry(vectors.inner, i * rows), _entry(vectors.pair, (2 * i + 1) * n)
+        block, edge, pivots, i = page(factors.local, j), page(factors.border, j), factors.pivots[j], j - part.first
+        inner, remaining = entry(vectors.inner, i * rows), entry(vectors.pair, (2 * i + 1) * n)
         for g in range(groups - 1, -1, -1):
             step, size = group_step(offsets, g, degree, width), offsets[g + 1] - offsets[g]
-            _move(_entry(inner, step.bottom - size), _entry(remaining, offsets[g]), size)
+            _move(entry(inner, step.bottom - size), entry(remaining, offsets[g]), size)
             _subtract_transposed(edge, Range(0, r), step, vectors.border, inner)
             for h in range(g + 1, groups):
                 if follows[g * groups + h]:
                     _subtract_transposed(block, Range(degree * offsets[h], degree * offsets[h + 1]), step, inner, inner)
             _backward_transposed(block, step, pivots, inner)
-        _put(_entry(vectors.found, i * rows), layout.rows, Range(0, rows), inner)
+        _put(entry(vectors.found, i * rows), layout.rows, Range(0, rows), inner)
 
 
 @helper(inline=True)
@@ -490,38 +474,38 @@ def _solve_joint_transposed(factors, sizes, starts, place):
     segments, rows, n, r, size = sizes
     joint, step = _joint(place, sizes), point_step(n, factors.chain.shape[2])
     for s in range(segments):
-        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), _entry(joint.pair, 2 * n * s)
+        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.pair, 2 * n * s)
         if s == 0:
-            _move(_entry(joint.known, 2 * n), _entry(vectors.known, 2 * n), size - 2 * n)
+            _move(entry(joint.known, 2 * n), entry(vectors.known, 2 * n), size - 2 * n)
             _move(joint.known, vectors.given, n)
         else:
-            _add(_entry(joint.known, 2 * n), _entry(vectors.known, 2 * n), size - 2 * n)
+            _add(entry(joint.known, 2 * n), entry(vectors.known, 2 * n), size - 2 * n)
             _add(pair, vectors.given, n)
-        _move(_entry(pair, 2 * n), _entry(vectors.given, (starts[s + 1] - starts[s]) * rows), n)
+        _move(entry(pair, 2 * n), entry(vectors.given, (starts[s + 1] - starts[s]) * rows), n)
     for s in range(1, segments):
-        pair = _entry(joint.pair, 2 * n * s)
-        _point_transposed(_page(factors.chain, starts[s] - 1), step, pair, _entry(pair, 2 * n), joint.known)
+        pair = entry(joint.pair, 2 * n * s)
+        _point_transposed(page(factors.chain, starts[s] - 1), step, pair, entry(pair, 2 * n), joint.known)
     _move(joint.dense, joint.known, n)
-    _move(_entry(joint.dense, n), _entry(joint.pair, 2 * n * segments), n)
-    _move(_entry(joint.dense, 2 * n), _entry(joint.known, 2 * n), size - 2 * n)
+    _move(entry(joint.dense, n), entry(joint.pair, 2 * n * segments), n)
+    _move(entry(joint.dense, 2 * n), entry(joint.known, 2 * n), size - 2 * n)
     _solve_dense_transposed(factors, joint.dense)
-    _move(joint.rest, _entry(joint.dense, n), size - n)
-    _move(joint.border, _entry(joint.dense, size - r), r)
-    _move(_entry(joint.pair, (2 * segments - 1) * n), joint.dense, n)
+    _move(joint.rest, entry(joint.dense, n), size - n)
+    _move(joint.border, entry(joint.dense, size - r), r)
+    _move(entry(joint.pair, (2 * segments - 1) * n), joint.dense, n)
     for s in range(segments - 1, -1, -1):
-        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), _entry(joint.pair, 2 * n * s)
+        vectors, pair = _vectors(place, sizes, Range(starts[s], starts[s + 1]), s), entry(joint.pair, 2 * n * s)
         if s > 0:
             pivots = factors.pivots[starts[s], rows - n :]
-            _multipliers_of_point(_page(factors.chain, starts[s] - 1), step, r, pivots, pair, joint.border)
-            _move(_entry(pair, -n), pair, n)
-        _move(_entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), _entry(pair, n), n)
+            _multipliers_of_point(page(factors.chain, starts[s] - 1), step, r, pivots, pair, joint.border)
+            _move(entry(pair, -n), pair, n)
+        _move(entry(vectors.pair, (2 * (starts[s + 1] - starts[s]) - 1) * n), entry(pair, n), n)
         _move(vectors.border, joint.border, r)
 
 
 @kernel
 def solve_transposed(layout: Layout, factors: Eliminated, c: ReadOnlyMatrix, y: Matrix, work: Matrix, share: Share) -> None:
     """Solve J^T y = c for rows of c (m, unknowns) and of y (m, equations), with ``work`` and ``share`` as for `solve`."""
-    starts, place = share.starts, work.ctypes.data
+    starts, place = share.starts, address(work, 0)
     sizes = _sizes(factors, layout.order.size, starts)
     segments, rows, n, _, size = sizes
     collocation, tail = factors.local.shape[0] * rows, size - n
@@ -533,25 +517,25 @@ def solve_transposed(layout: Layout, factors: Eliminated, c: ReadOnlyMatrix, y: 
                 part = Range(starts[s], starts[s + 1])
                 vectors = _vectors(place, sizes, part, s)
                 own = (part.last - part.first) * rows
-                side_by_side(vectors.given, _part(given, 0, part.first * rows), own, count)
-                right, parameters = _entry(vectors.given, own), _entry(vectors.known, 2 * n)
+                side_by_side(vectors.given, within(given, 0, part.first * rows), own, count)
+                right, parameters = entry(vectors.given, own), entry(vectors.known, 2 * n)
                 if s == segments - 1:
-                    side_by_side(right, _part(given, 0, collocation), n, count)
+                    side_by_side(right, within(given, 0, collocation), n, count)
                 else:
                     _clear(right, n)
                 if s == 0:
-                    side_by_side(parameters, _part(given, 0, collocation + n), size - 2 * n, count)
+                    side_by_side(parameters, within(given, 0, collocation + n), size - 2 * n, count)
                 else:
                     _clear(parameters, size - 2 * n)
                 _interiors_transposed(layout, factors, part, vectors)
                 _points_transposed(factors, n, part, vectors)
         if share.stage == 1 or share.stage == ALL:
             _solve_joint_transposed(factors, sizes, starts, place)
-            apart(_part(found, 0, collocation), joint.rest, tail, count)
+            apart(within(found, 0, collocation), joint.rest, tail, count)
         if share.stage == 2 or share.stage == ALL:
             for s in range(share.first, share.last):
                 part = Range(starts[s], starts[s + 1])
                 vectors = _vectors(place, sizes, part, s)
                 _multipliers_of_points(factors, n, part, vectors)
                 _multipliers_of_interiors(layout, factors, part, vectors)
-                apart(_part(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)
+                apart(within(found, 0, part.first * rows), vectors.found, (part.last - part.first) * rows, count)

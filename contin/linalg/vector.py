@@ -37,6 +37,44 @@ class Rows(NamedTuple):
     stride: int
 
 
+# --- addresses -------------------------------------------------------------------------------------------------------
+#
+# numba frees an array after its last use, and does not see that an address is one: an array must be a parameter of the kernel
+# or of a helper that is not inlined, a part of one, or used again later.
+
+
+@instruction
+def address(builder: Any, array: Any, offset: int) -> int:
+    """Return an address in an array."""
+    there: int = builder.add(array.address, offset)
+    return there
+
+
+@instruction
+def at(builder: Any, matrix: Any, i: int, j: int) -> Rows:
+    """Return the rows of a matrix from entry (i, j) on."""
+    return _within(builder, Rows(matrix.address, matrix.strides[0]), i, j)
+
+
+@instruction
+def page(builder: Any, stack: Any, j: int) -> Rows:
+    """Return the rows of a stack's matrix j."""
+    return Rows(builder.add(stack.address, builder.mul(j, stack.strides[0])), stack.strides[1])
+
+
+@instruction
+def within(builder: Any, rows: Rows, i: int, j: int) -> Rows:
+    """Return the rows of a block from entry (i, j) on."""
+    return _within(builder, rows, i, j)
+
+
+@instruction
+def entry(builder: Any, vector: int, i: int) -> int:
+    """Return the address of an entry of a vector whose entries are `LANES` numbers."""
+    there: int = _entry(builder, vector, i)
+    return there
+
+
 # --- elimination -----------------------------------------------------------------------------------------------------
 
 
@@ -385,6 +423,12 @@ def _number(value: int) -> Any:
 def _below(builder: Any, rows: Rows, first: Any) -> Rows:
     """Return the rows from the ``first`` on."""
     return Rows(builder.add(rows.address, builder.mul(rows.stride, first)), rows.stride)
+
+
+def _within(builder: Any, rows: Rows, i: Any, j: Any) -> Rows:
+    """Return the rows from entry (i, j) on."""
+    below = _below(builder, rows, i)
+    return Rows(builder.add(below.address, builder.mul(j, _number(8))), below.stride)
 
 
 def _rows(builder: Any, rows: Rows, count: int) -> list[Any]:

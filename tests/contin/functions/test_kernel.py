@@ -13,7 +13,6 @@ from contin.functions import kernel_parts
 from contin.functions.kernel import Kernel, kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
 from contin.linalg import vector
-from contin.linalg.elimination import at
 
 
 class Pair(NamedTuple):
@@ -70,7 +69,7 @@ def in_order(x: Vector) -> float:
 @kernel
 def exchange(a: Matrix) -> None:
     """Exchange two rows; the name is that of what is called."""
-    vector.exchange(at(a, 0, 0).address, at(a, 1, 0).address, a.shape[1])
+    vector.exchange(vector.at(a, 0, 0).address, vector.at(a, 1, 0).address, a.shape[1])
 
 
 @kernel

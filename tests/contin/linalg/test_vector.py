@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, Vector
+from contin.functions.kernel_parts import Matrix, Stack, Vector
 from contin.linalg import vector
-from contin.linalg.elimination import at
-from contin.linalg.vector import LANES, PANEL
+from contin.linalg.vector import LANES, PANEL, at
 
 LENGTHS = range(41)
 SIZES = range(1, PANEL + 1)
@@ -276,9 +275,41 @@ def test_side_by_side_and_apart(width, rows):
         assert np.array_equal(found, known)
 
 
+# --- addresses --------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def address(array: Stack, offset: int) -> int:
+    return vector.address(array, offset)
+
+
+@kernel
+def page(stack: Stack, j: int) -> int:
+    return vector.page(stack, j).address + 1000 * vector.page(stack, j).stride
+
+
+@kernel
+def within(matrix: Matrix, i: int, j: int) -> int:
+    return vector.within(at(matrix, i, j), 2, 3).address
+
+
+@kernel
+def entry(array: Matrix, i: int) -> int:
+    return vector.entry(vector.address(array, 0), i)
+
+
+def test_addresses():
+    stack = np.zeros((3, 4, 5))
+    matrix, first = stack[1], stack.ctypes.data
+    assert address(stack, 24) == first + 24
+    assert page(stack, 2) == stack[2].ctypes.data + 1000 * 40
+    assert within(matrix, 1, 1) == matrix[3, 4:].ctypes.data
+    assert entry(matrix, 3) == matrix.ctypes.data + 3 * LANES * 8
+
+
 def test_every_instruction_has_a_kernel_here():
     """Of the same name; one kernel applies all four triangles."""
     decorated = {name for name, value in vars(vector).items() if hasattr(value, "__wrapped__")}
     instructions = {name for name in decorated if getattr(vector, name).__module__ == vector.__name__}
-    assert len(instructions) == 19
+    assert len(instructions) == 24
     assert {re.sub("apply_.*", "apply_triangle", name) for name in instructions} <= globals().keys()
