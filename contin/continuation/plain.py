@@ -96,7 +96,7 @@ def _made(equations: Equations, linear: Linear, control: Control, watch: Watch, 
         largest = max(largest, abs(x[i]))
     if not largest <= USUAL[1] and not equations.is_map:
         return 0.0  # sizes may grow
-    step = path.numbers[number - 1, NEXT]
+    step: float = path.numbers[number - 1, NEXT]
     for k in range(watch.low.size):
         size = equations.sizes[n + k]
         rate, value = tangent[n + k] * size, x[n + k] * size
@@ -219,7 +219,8 @@ def plain_steps(
     fill_matrix(equations, path.tangents[1], linear.matrix)
     if watch.eigenvalues and fill_spectrum(equations, spectra, LAST):
         return 0
-    for number in range(2, path.x.shape[0]):
+    rows: int = path.x.shape[0]
+    for number in range(2, rows):
         x, tangent, had, now = path.x[number - 1], path.tangents[number - 1], path.numbers[number - 1], path.numbers[number]
         size = x.size
         for i in range(size):
@@ -238,4 +239,4 @@ def plain_steps(
         _accept(equations, linear, control, path, number, step, bend)
         if control.primary >= 0 and now[SENSE] == 0.0:
             return number - 2
-    return path.x.shape[0] - 2
+    return rows - 2
