@@ -14,9 +14,12 @@ from contin.continuation.plain import (
     ARCLENGTH,
     ERROR_LEFT,
     ITERATIONS,
+    LENGTH,
     NUMBERS,
     SIGN_OF,
     STEP,
+    Attempt,
+    Control,
     Path,
     Quotient,
     Watch,
@@ -25,18 +28,14 @@ from contin.continuation.plain import (
 from contin.detection.inspection import Start
 from contin.detection.spectra import spectra_of
 from contin.discretization.algebraic import Algebraic
-from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
-from contin.functions import round_off
 from contin.results.point import Point
 from contin.stepping.settings import Settings
-from contin.stepping.small import control_of, equations_of, linear_of
+from contin.stepping.small import Equations, equations_of, linear_of
 from contin.stepping.state import State
 from contin.stepping.trial import Linearization, TestFunction, Trial
 
-#: Largest number of unknowns: from some fifty on, LAPACK's factors are faster than those of a kernel.
-_SMALL = 32
 #: Steps of the first call after a step that was looked at, and at most: each call makes twice as many as the one before.
 FEWEST, MOST = 8, 128
 
@@ -54,22 +53,28 @@ def lane_of(
     noisy : bool
         Round-off of Newton's method was noted.
     """
-    if type(system) not in (Algebraic, MapSystem) or round_off.SEED:
+    equations = equations_of(system)
+    if equations is None or settings.trivial is not None:
         return None
     known: Any = system
-    problem, is_map = known.problem, isinstance(known, MapSystem)
-    plain = not known.is_sparse and known.size <= _SMALL and (not is_map or known.rounds == 1)
-    plain = plain and problem.jacobian is None and problem.pattern is None and settings.trivial is None
-    plain = plain and problem.batch("map" if is_map else "residual").interpreted is None
     others = [test for test in tests if test not in own and not _is_held(test, known)]
-    if not plain or any(test.search or test.asks or test.looks for test in others):
+    if any(test.search or test.asks or test.looks for test in others):
         return None
-    return Lane(known, settings, start, tests, others, bool(own), noisy)
+    return Lane(known, equations, settings, start, tests, others, bool(own), noisy)
 
 
 def _is_held(test: TestFunction, system: Discretization) -> bool:
     """Return whether a test function is that of a value of a free parameter."""
     return test.value is not None and test.column in system.free
+
+
+def _control(settings: Settings, primary: int) -> Control:
+    """Return the settings as the kernel takes them."""
+    newton = settings.newton
+    return Control(
+        newton.tolerance, newton.max_iterations, settings.accuracy, settings.angle, settings.change, settings.min_step,
+        settings.max_step, primary,
+    )  # fmt: skip
 
 
 class Lane:
@@ -78,6 +83,8 @@ class Lane:
     Parameters
     ----------
     system : Algebraic
+    equations : Equations
+        Those of the system.
     settings : Settings
     start : tuple (system, x, tangent)
         The first point of the run.
@@ -89,7 +96,7 @@ class Lane:
     """
 
     def __init__(
-        self, system: Algebraic, settings: Settings, start: Start, tests: Sequence[TestFunction],
+        self, system: Algebraic, equations: Equations, settings: Settings, start: Start, tests: Sequence[TestFunction],
         others: Sequence[TestFunction], eigenvalues: bool, noisy: bool,
     ) -> None:  # fmt: skip
         self.system, self.settings, self.noisy, self._others = system, settings, noisy, others
@@ -102,7 +109,7 @@ class Lane:
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         (before, quotient, work), (real, imaginary) = np.empty((3, size, size)), np.empty((2, 1, size))
         self._rooms = (
-            equations_of(system), linear_of(size), control_of(settings, primary),
+            equations, linear_of(size), Attempt(np.empty(size), np.empty(6), np.empty(LENGTH + 1)), _control(settings, primary),
             Watch(
                 int(settings.branch_points), int(eigenvalues), int(noisy),
                 np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),

@@ -1,12 +1,13 @@
-"""Newton's method and the tangent inside kernels, for small problems without a mesh whose functions are recorded.
+"""Newton's method and the tangent in a kernel, for small problems without a mesh whose functions are recorded.
 
-The rules are those of `contin.stepping.newton` and `contin.stepping.step`. What would have to be told from round-off is left
-to them: `attempt` returns `ASKS` then.
+The rules are those of `contin.stepping.newton`. Where round-off would have to tell whether it has converged, that is asked.
 """
 
 from __future__ import annotations
 
+import functools
 import math
+import threading
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,16 +15,18 @@ import numpy as np
 from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.maps import MapSystem
+from contin.functions import round_off
 from contin.functions.interpreter import LANES, Instructions, Points, Room, evaluate
+from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.functions.program import Program
 from contin.linalg.small import factor_small, solve_small
-from contin.stepping.newton import STAGNANT, diverges, estimated_rate, has_converged, stagnates, wants_jacobian
-from contin.stepping.settings import Settings
-from contin.stepping.step import ASTRAY, CLEAR, fill_sums_of, is_astray, turned
+from contin.stepping.newton import STAGNANT, Newton, diverges, estimated_rate, has_converged, stagnates, wants_jacobian
 
-#: What came of an attempt: a step to be believed; one to be halved; one that is not decided here.
-BELIEVED, HALVED, ASKS = range(3)
+#: What came of it: a point or step to be believed; none; one that is not decided here.
+BELIEVED, FAILED, ASKS = range(3)
+#: Largest number of unknowns: from some fifty on, LAPACK's factors are faster than those of a kernel.
+_SMALL = 32
 
 
 class Recorded(NamedTuple):
@@ -61,36 +64,18 @@ class Equations(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """The matrix [F_x; row], its factors, and vectors: an update, and the guess from which Newton's method began.
-
-    ``sums`` is filled by `contin.stepping.step.fill_sums`, ``judged`` by `attempt`.
-    """
+    """The matrix [F_x; row], its factors, an update, and ``found``: sign of the determinant, updates, error that is left."""
 
     matrix: Matrix
     lu: Matrix
     exchanges: IndexVector
     row: Vector
     update: Vector
-    guess: Vector
-    sums: Vector
-    judged: Vector
+    found: Vector
 
 
-class Control(NamedTuple):
-    """Settings; ``primary`` is the place of the primary parameter, or -1 where folds are not looked for."""
-
-    tolerance: float
-    most: int
-    accuracy: float
-    angle: float
-    change: float
-    shortest: float
-    longest: float
-    primary: int
-
-
-#: Places in ``Linear.judged``: sign of the determinant, updates, the error that they left, and what `Judgement` holds.
-SIGN, UPDATES, ERROR, MISSED, TURN, LENGTH = range(6)
+#: Places in ``Linear.found``.
+SIGN, UPDATES, ERROR = range(3)
 
 
 def recorded(program: Program) -> Recorded:
@@ -100,35 +85,62 @@ def recorded(program: Program) -> Recorded:
     return Recorded(instructions, program.first, program.last, room, program.parameters)
 
 
-def equations_of(system: Algebraic) -> Equations:
-    """Return the equations of a problem whose functions are recorded, of a map with one round."""
-    is_map, n, size = isinstance(system, MapSystem), system.state_size, system.size
-    batch: Any = system.problem.batch("map" if is_map else "residual")
-    columns = batch.columns(system._free)
+def equations_of(system: Any) -> Equations | None:
+    """Return the equations of a small problem whose functions are recorded, of a map with one round; None of others."""
+    if type(system) not in (Algebraic, MapSystem) or system.size > _SMALL or round_off.SEED:
+        return None
+    problem, is_map = system.problem, isinstance(system, MapSystem)
+    batch = problem.batch("map" if is_map else "residual")
+    given = problem.jacobian is not None or problem.pattern is not None
+    if given or batch.interpreted is not None or getattr(system, "rounds", 1) != 1 or system.size != system.equations + 1:
+        return None
+    n, count, size = system.state_size, system.equations, system.size
     return Equations(
-        recorded(batch._values_program()), recorded(batch._slopes(columns.key)[0]),
-        system.unscaled_factors, np.ones(system.equations) if system.scales is None else system.scales.rows["residual"],
-        system.weights,
-        system.gain if isinstance(system, MapSystem) else np.zeros(system.equations), int(is_map),
-        system.parameters.copy(), system._free, np.zeros(1), np.empty((1, n)), np.empty((0, n)),
-        np.empty((1, system.equations)), np.zeros((1, system.equations, size)), np.empty((0, 0, 0)),
+        recorded(batch._values_program()), recorded(batch._slopes(batch.columns(system._free).key)[0]),
+        system.unscaled_factors, np.ones(count) if system.scales is None else system.scales.rows["residual"], system.weights,
+        system.gain if is_map else np.zeros(count), int(is_map), system.parameters.copy(), system._free, np.zeros(1),
+        np.empty((1, n)), np.empty((0, n)), np.empty((1, count)), np.zeros((1, count, size)), np.empty((0, 0, 0)),
     )  # fmt: skip
 
 
 def linear_of(size: int) -> Linear:
     """Return the room for a matrix of this size."""
-    row, update, guess = np.empty((3, size))
-    lu, exchanges = np.empty((size, size)), np.empty(size, dtype=np.int64)
-    return Linear(np.empty((size, size)), lu, exchanges, row, update, guess, np.empty(6), np.empty(LENGTH + 1))
+    (matrix, lu), (row, update) = np.empty((2, size, size)), np.empty((2, size))
+    return Linear(matrix, lu, np.empty(size, dtype=np.int64), row, update, np.empty(ERROR + 1))
 
 
-def control_of(settings: Settings, primary: int) -> Control:
-    """Return the settings as kernels take them."""
-    newton = settings.newton
-    return Control(
-        newton.tolerance, newton.max_iterations, settings.accuracy, settings.angle, settings.change, settings.min_step,
-        settings.max_step, primary,
-    )  # fmt: skip
+@functools.lru_cache(maxsize=16)
+def _rooms(system: Any, thread: int) -> tuple[Equations, Linear] | None:
+    """Return where a thread corrects points of a system; None where kernels do not."""
+    equations = equations_of(system)
+    return None if equations is None else (equations, linear_of(system.size))
+
+
+class Found(NamedTuple):
+    """A corrected point: x, unit tangent, the matrix [F_x; row] right there and the sign of its determinant.
+
+    With the iterations of Newton's method, and the error that they left.
+    """
+
+    x: Array
+    tangent: Array
+    matrix: Array
+    sign: float
+    iterations: int
+    error: float
+
+
+def corrected_small(system: Any, guess: Array, row: Array, target: Any, newton: Newton) -> Found | None:
+    """Solve F(x) = 0 and row.x = target; None where the kernel does not, or does not decide whether it has."""
+    rooms = _rooms(system, threading.get_ident())
+    if rooms is None:
+        return None
+    x, tangent, linear = np.array(guess, dtype=float), np.empty(guess.size), rooms[1]
+    linear.row[:] = row
+    if correct_point(*rooms, newton.tolerance, newton.max_iterations, x, float(target), tangent) != BELIEVED:
+        return None
+    sign, iterations, error = linear.found.tolist()
+    return Found(x, tangent, linear.matrix.copy(), sign, int(iterations), error)
 
 
 @helper
@@ -193,16 +205,15 @@ def linearize(equations: Equations, linear: Linear, x: Array) -> float:
 
 
 @helper
-def correct_small(equations: Equations, linear: Linear, control: Control, x: Array, target: float) -> int:
+def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, x: Array, target: float) -> int:
     """Solve F(x) = 0 and row.x = target by Newton's method and chord steps, in place."""
     size, fresh, moved, before, now = x.size, True, 1.0, math.inf, math.inf
-    for number in range(1, control.most + 1):
-        if fresh:
-            if linearize(equations, linear, x) == 0.0:
-                now = math.inf
-                break
-        else:
+    for number in range(1, most + 1):
+        now = math.inf
+        if not fresh:
             evaluate_values(equations, x)
+        elif linearize(equations, linear, x) == 0.0:
+            break
         fill_residual(equations, linear.update)
         missing = -target
         for i in range(size):
@@ -216,73 +227,26 @@ def correct_small(equations: Equations, linear: Linear, control: Control, x: Arr
                 now = part
             x[i] -= linear.update[i]
             if not now < math.inf:
-                break
-        if not now < math.inf:
-            break
+                return FAILED
         moved = now if fresh else moved + now
         rate = estimated_rate(now, before, moved, fresh)
-        if has_converged(now, rate, number, control.tolerance):
-            linear.judged[UPDATES], linear.judged[ERROR] = number, now * rate
+        if has_converged(now, rate, number, tolerance):
+            linear.found[UPDATES], linear.found[ERROR] = number, now * rate
             return BELIEVED
         if stagnates(now, rate, number):
             return ASKS
         if number > 2 and diverges(now, before):
             break
-        fresh, before = wants_jacobian(now, rate, control.tolerance), now
-    return ASKS if now <= STAGNANT else HALVED
+        fresh, before = wants_jacobian(now, rate, tolerance), now
+    return ASKS if now <= STAGNANT else FAILED
 
 
 @helper
-def attempt(
-    equations: Equations, linear: Linear, control: Control, x: Array, tangent: Array, earlier: Array, bend: float, step: float,
-    new: Array, new_tangent: Array,
-) -> int:  # fmt: skip
-    """Make one step from x, as far as it can be believed by itself; fill in its end, with the tangent right there.
-
-    ``bend`` is 1 / (2 times the step before), or 0 without one; ``earlier`` the tangent before that. ``linear.row`` belongs to
-    the tangent.
-    """
-    size, target = x.size, step
-    for i in range(size):
-        linear.guess[i] = x[i] + step * tangent[i]
-        if bend > 0:
-            linear.guess[i] += step * step * bend * (tangent[i] - earlier[i])
-        target += linear.row[i] * x[i]
-        new[i] = linear.guess[i]
-    outcome = correct_small(equations, linear, control, new, target)
-    if outcome != BELIEVED:
-        return outcome
-    sign = linearize(equations, linear, new)
-    fill_residual(equations, linear.update)
-    total = 0.0
-    for i in range(size - 1):
-        total += abs(linear.update[i])
-    if sign == 0.0 or not total < math.inf:
-        return HALVED
-    along(equations, linear, new_tangent)
-    fill_sums_of(x, tangent, new, new_tangent, linear.guess, equations.weights, equations.states.shape[1], linear.sums)
-    missed, turn = math.sqrt(linear.sums[0]), turned(linear.sums[1], linear.sums[2], linear.sums[3], linear.sums[4])
-    if not (turn <= control.angle and missed <= ASTRAY * control.accuracy * step):
-        return HALVED
-    linear.judged[SIGN], linear.judged[MISSED], linear.judged[TURN] = sign, missed, turn
-    linear.judged[LENGTH] = math.sqrt(linear.sums[5])
-    at = control.primary
-    if at >= 0:
-        change = max(abs(tangent[at]), abs(new_tangent[at]))
-        if bend > 0:
-            change = max(change, abs(earlier[at]))
-        if is_astray(abs(linear.guess[at] - new[at]), step * change, linear.judged[ERROR], new[at]):
-            return HALVED if abs(new_tangent[at]) >= CLEAR else ASKS
-    return BELIEVED
-
-
-@helper
-def along(equations: Equations, linear: Linear, tangent: Array) -> None:
+def _fill_tangent(equations: Equations, linear: Linear, tangent: Array) -> None:
     """Fill in the unit tangent from the factors."""
     size = tangent.size
-    for i in range(size - 1):
-        tangent[i] = 0.0
-    tangent[size - 1] = 1.0
+    for i in range(size):
+        tangent[i] = 1.0 if i == size - 1 else 0.0
     solve_small(linear.lu, linear.exchanges, tangent)
     square = 0.0
     for i in range(size):
@@ -290,3 +254,23 @@ def along(equations: Equations, linear: Linear, tangent: Array) -> None:
     length = math.sqrt(square)
     for i in range(size):
         tangent[i] /= length
+
+
+@kernel(reorder=False, last=True)
+def correct_point(
+    equations: Equations, linear: Linear, tolerance: float, most: int, x: Vector, target: float, tangent: Vector
+) -> int:
+    """Correct x, in place, so that F(x) = 0 and row.x = target; fill in the tangent right there. ``linear.row`` is given."""
+    outcome = _correct(equations, linear, tolerance, most, x, target)
+    if outcome != BELIEVED:
+        return outcome
+    sign = linearize(equations, linear, x)
+    fill_residual(equations, linear.update)
+    total = 0.0
+    for i in range(x.size - 1):
+        total += abs(linear.update[i])
+    if sign == 0.0 or not total < math.inf:
+        return FAILED
+    linear.found[SIGN] = sign
+    _fill_tangent(equations, linear, tangent)
+    return BELIEVED

@@ -17,10 +17,12 @@ from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import ReadOnlyVector, Vector, helper
+from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
 from contin.stepping.newton import Corrected, Newton, correct
+from contin.stepping.small import corrected_small
 from contin.stepping.state import State
-from contin.stepping.trial import Trial, linearization, linearization_of
+from contin.stepping.trial import Linearization, Trial, linearization, linearization_of
 
 #: Share of the states in a unit tangent below which their direction is not compared: the states hardly take part in the step.
 _STILL = 0.01
@@ -87,7 +89,12 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
     ConvergenceError
         It is not found, or the equations are not finite there.
     """
-    return trial_of(state.system, _corrected(state, guess, step, newton), state.row)
+    row = state.row
+    small = corrected_small(state.system, guess, row, row @ state.x + step, newton)
+    if small is not None:
+        linear = Linearization(small.tangent, small.sign, DenseFactors(small.matrix))
+        return Trial(state.system, small.x, linear, small.iterations, small.error)
+    return trial_of(state.system, _corrected(state, guess, step, newton), row)
 
 
 def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
@@ -113,7 +120,11 @@ def located(state: State, guess: Array, step: float, newton: Newton, factors: Fa
     ------
     ConvergenceError
     """
-    done, system, row = _corrected(state, guess, step, newton, factors), state.system, state.row
+    row = state.row
+    small = corrected_small(state.system, guess, row, row @ state.x + step, newton)
+    if small is not None:
+        return Trial(state.system, small.x, Linearization(small.tangent, small.sign), small.iterations, small.error)
+    done, system = _corrected(state, guess, step, newton, factors), state.system
     return Trial(system, done.x, lambda: linearization(system, done.x, row), done.iterations, done.error)
 
 
