@@ -216,12 +216,18 @@ class MapSystem(Algebraic):
         columns: Array = self._derivatives(x, names)[1][:, :, self._n :].reshape(self.state_size, len(names))
         return columns
 
-    def along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of F along several directions, shape (equations,): f at every point; the rest is linear."""
-        wide = [self._wide(v, self.states(v)) for v in directions]
-        found: Array = self.problem.batch("map").along(*self._arguments(x, self.states(x)), wide).ravel()
+    def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several stacks of directions: f at every point; the rest is linear."""
+        n, count = self._n, len(directions[0])
+        wide = [np.zeros((count, self.rounds, n + len(self.parameters))) for _ in directions]
+        for inputs, stack in zip(wide, directions):
+            inputs[:, :, :n] = stack[:, : self.state_size].reshape(count, self.rounds, n)
+            inputs[:, :, n + self._free] = stack[:, None, self.state_size :] if stack.shape[1] > self.state_size else 0.0
+        given = self._arguments(x, np.tile(self.states(x), (count, 1)))
+        flat = [inputs.reshape(count * self.rounds, -1) for inputs in wide]
+        found: Array = self.problem.batch("map").along(*given, flat).reshape(count, -1)
         if len(directions) == 1:
-            found = found - np.roll(self.states(directions[0]), -1, axis=0).ravel()
+            found = found - np.roll(directions[0][:, : self.state_size], -n, axis=1)
         return found
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
