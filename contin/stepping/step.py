@@ -112,7 +112,7 @@ def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
 
 
 def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Trial:
-    """Return the point of the curve at ``step``, linearized right there when its tangent is first asked for.
+    """Return the point of the curve at ``step``, linearized right there: when that is first asked for, if it takes long.
 
     ``factors`` from near by save Newton's method its own.
 
