@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +24,8 @@ from contin import checks, threads
 from contin.arrays import Array
 from contin.continuation.corners import jump, unsettled, why_lost
 from contin.continuation.failure import no_convergence, shorter_steps
+from contin.continuation.lane import FEWEST, MOST, Lane, lane_of
+from contin.continuation.plain import NOISY
 from contin.continuation.scaling import outgrown, renewed, scaled
 from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.detection.extrema import extremum
@@ -58,11 +60,15 @@ from contin.stepping.settings import Settings
 from contin.stepping.settling import ROUNDS, settled
 from contin.stepping.state import State, Stop, standing_at
 from contin.stepping.step import (
+    ASTRAY,
     Judgement,
     aims,
     corrected,
+    following_step,
+    is_astray,
     judged,
     located,
+    longest_step,
     predict,
     trial_of,
     up_to_limits,
@@ -71,8 +77,6 @@ from contin.stepping.trial import Linearization, TestFunction, Trial, linearizat
 
 #: A step is cut down to this fraction of itself to take several branch points one by one.
 _FINEST = 1e-3
-#: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
-_ASTRAY = 2.5
 #: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
 #: The next one is taken where the equations are still too nearly singular for Newton's method.
 _ASIDE = (0.01, 0.1, 0.5)
@@ -81,16 +85,6 @@ _SLACK = 1e-9
 #: A curve that begins where a test function that ends runs is zero has it positive this far along its tangent: what is known to
 #: 1e-10 is then told from round-off, and no regular start lies so near to an end.
 _ENTERS = 1e-6
-#: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
-_SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
-#: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
-#: the curvature, it is one half.
-_MISSED = 0.75
-#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. Twice the error that
-#: Newton's method left comes on top: where cycles shrink onto a Hopf point it is 1e-10, and steps of 1e-6 were refused.
-_NOISE = 1e-12
-#: Round-off above the tolerance is noted from this error on: ten times smaller, runs in small units that soon change would be.
-_NOISY = 1e-9
 #: Rounds of correcting and adapting the mesh at the first point; each settles most of what is left.
 _ROUNDS = 3
 #: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
@@ -116,9 +110,6 @@ _HELPS = 0.5
 _CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
 #: Labels of points that no derivative by the solution tells.
 _BY_VALUES = ("EP", "UZ", "MX")
-#: Smallest angle and rate, in place of zero where they are divided by.
-_NO_ANGLE, _NO_RATE = 1e-12, 1e-300
-
 
 #: The index on both sides of a special point; None where it is not defined.
 IndexChange = tuple[int | None, int | None]
@@ -206,7 +197,7 @@ class Continuation:
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         self._check(system)
         self.primary = settings.primary or system.free[0]
-        self.state = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
+        self._state: State | Callable[[], State] = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
         self._fold = fold(self.primary) if settings.folds else None
         self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
@@ -220,6 +211,20 @@ class Continuation:
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
+        self._lane_for: object = None
+        self._known_lane: Lane | None = None
+
+    @property
+    def state(self) -> State:
+        """The state behind the last point."""
+        known = self._state
+        if not isinstance(known, State):
+            self._state = known = known()
+        return known
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self._state = state
 
     def __repr__(self) -> str:
         return f"Continuation({self.state!r}; {self.stop or 'not ended'})"
@@ -331,7 +336,30 @@ class Continuation:
                 self.stop = stop
                 return
         while self.stop is None:
+            yield from self._plain()
             yield from self._advance()
+
+    def _plain(self) -> Iterator[Point]:
+        """Make plain steps, many at a time, up to the first that wants a closer look; yield their points."""
+        most = FEWEST
+        while (lane := self._lane) is not None and not self.state.singular:
+            most = min(most, self.settings.max_points - 1 - self.state.accepted)  # the last one has a label
+            block = lane.steps(self.state, max(most, 0))
+            for self._state, point in block.points():
+                self._end, self._accuracy = None, Accuracy(0.0)
+                yield point
+            if block.made < most or most <= 0:
+                return
+            most = min(2 * most, MOST)
+
+    @property
+    def _lane(self) -> Lane | None:
+        """The lane of plain steps, made anew where what it depends on has changed; None where there is none."""
+        system, settings, noisy = depends = self.state.system, self.settings, self._is_noisy
+        if self._lane_for != depends:
+            self._lane_for = depends
+            self._known_lane = lane_of(system, settings, self.start, self._tests, self._own, noisy)
+        return self._known_lane
 
     def predicted(self, step: float) -> Array:
         """Return the guess (shape (size,), of ``state.system``) from which the corrector starts at a distance ``step``."""
@@ -393,7 +421,7 @@ class Continuation:
         self.state = self._accept(segment, step.judgement, step.turns)
         self._stand_at(step.end)
         self._note_corners(step.end)
-        if segment.trial.newton_error > max(self.settings.newton.tolerance, _NOISY) and not self._is_noisy:
+        if segment.trial.newton_error > max(self.settings.newton.tolerance, NOISY) and not self._is_noisy:
             self._is_noisy = True
             self._note(
                 "from here on the updates of Newton's method are round-off above its tolerance: see newton_error", segment
@@ -542,7 +570,7 @@ class Continuation:
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         judgement = judged(state, guess, trial)
         angle, accuracy = aims(settings, state.system)
-        if not (judgement.turn <= angle and judgement.missed <= _ASTRAY * accuracy * step):
+        if not (judgement.turn <= angle and judgement.missed <= ASTRAY * accuracy * step):
             raise ConvergenceError(
                 f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
                 f"{judgement.missed / step:.2f} of it"
@@ -599,9 +627,7 @@ class Continuation:
         missed = abs(guess[at] - trial.x[at])
         tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
         change = step * max(abs(tangent[at]) for tangent in tangents)
-        noise = _NOISE + 2 * trial.newton_error
-        jumped = missed > _MISSED * change and missed > noise * (1 + abs(trial.x[at]))
-        return bool(jumped and self._sense(trial))
+        return bool(is_astray(missed, change, trial.newton_error, trial.x[at]) and self._sense(trial))
 
     def _has_moved(self, start: Array, trial: Trial) -> bool:
         """Return whether a step has moved the primary parameter by more than round-off: tangents are blurred at Hopf points."""
@@ -618,15 +644,12 @@ class Continuation:
         ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
         """
         settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
-        order = 2 if state.previous_tangent is None else 3
         angle, accuracy = aims(settings, state.system)
-        factor = _LONGER if judgement.missed == 0 else (accuracy * step / judgement.missed) ** (1 / order)
-        factor = min(factor, _AIM * angle / max(judgement.turn, _NO_ANGLE))
-        free = slice(state.system.state_size, None)
-        rates = zip(trial.x[free].tolist(), trial.tangent[free].tolist())
-        longest = min(settings.max_step, *[settings.change * (1 + abs(p)) / (abs(rate) + _NO_RATE) for p, rate in rates])
-        longer = step * min(max(factor, _SHORTER), _LONGER)
-        following = min(max(longer, settings.min_step), max(longest, settings.min_step))
+        order = 2 if state.previous_tangent is None else 3
+        longest, free = settings.max_step, slice(state.system.state_size, None)
+        for value, rate in zip(trial.x[free].tolist(), trial.tangent[free].tolist()):
+            longest = longest_step(longest, settings.change, value, rate)
+        following = following_step(step, judgement.missed, judgement.turn, order, accuracy, angle, settings.min_step, longest)
         way = self._sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
         way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
         return State(

@@ -37,7 +37,7 @@ _MEDIUM = 128
 #: in some), except beside a layer, where it is right.
 _TURN, _PIVOT = 0.5, 0.2
 #: A condensed matrix that differs from the identity by less has no eigenvalue near zero.
-_NEAR_ONE = 0.9
+NEAR_ONE = 0.9
 #: Directions added in a round, and the largest number of them: where more change, the step is divided, which takes as long as
 #: 16 directions do. With 64 the half loop of the benchmarks took 1.7 times as long, with 24 a fifth more.
 _ADDED, _MOST = 4, 16
@@ -56,7 +56,7 @@ _SHRINKS = 20.0
 _VANISHES = 1e4
 #: Up to this change no singular value comes near zero, and factors of an iterate close by do as well. A fifth of it costs 10 %
 #: more factorizations on the test bank, twice as much saves 0.5 %.
-_CALM = 10.0
+CALM = 10.0
 #: Rounds with such factors. With one, twice as many steps take factors at both ends.
 _GLANCES = 2
 
@@ -232,14 +232,14 @@ def calm(before: Factors, after: Factors, size: int) -> bool:
 def _is_near_one(quotient: Array) -> bool:
     """Return whether a quotient is so near to the identity, or its eigenvalues so near to one, that nothing comes near zero."""
     quotient = np.ascontiguousarray(quotient)
-    if is_near_one(quotient, _NEAR_ONE, _CALM, np.empty(quotient.shape)):
+    if is_near_one(quotient, NEAR_ONE, CALM, np.empty(quotient.shape)):
         return True
     return _is_calm(_finite_eigenvalues(quotient))
 
 
 def _is_calm(values: ComplexArray) -> bool:
     sizes = np.abs(values)
-    return bool(np.all((values.real > 0) & (sizes < _CALM) & (sizes > 1 / _CALM)))
+    return bool(np.all((values.real > 0) & (sizes < CALM) & (sizes > 1 / CALM)))
 
 
 def crossings(values: ComplexArray) -> tuple[int, bool]:

@@ -32,17 +32,17 @@ from contin.stepping.trial import TestFunction, Trial, sign_changed
 
 #: Where a step is looked at inside, on the cubic, as parts of it: also beside its ends, where a dip towards zero would show at
 #: no other place. Without those two of Mathieu's doublings, a part of .03 and .04 behind the beginning of a step, are passed.
-_LOOKS = (1 / 64, 1 / 4, 1 / 2, 3 / 4, 63 / 64)
+LOOKS = (1 / 64, 1 / 4, 1 / 2, 3 / 4, 63 / 64)
 #: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens: a
 #: little less than the distance pi of 1 from -1. A pair can reach -1 and come back, and be at the ends where it was nearly:
 #: with 0.5, and 1.5 changes, two period doublings of Mathieu's equation in one step are passed. With both ten times larger
 #: nearly all steps are looked at inside, and multipliers are computed up to three times as often.
-_NEAR = 3.0
+NEAR = 3.0
 #: It is looked at inside, too, where a logarithm is nearer than so many times its change over the step.
-_CHANGES = 3.0
+CHANGES = 3.0
 #: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
 #: to this part. Ten times smaller, two period doublings that nearly meet are passed.
-_DEEPER = 0.5
+DEEPER = 0.5
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
 #: larger, period doublings beside folds lose their coefficients.
 _ONE = 1e-5
@@ -229,7 +229,7 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     known = [trial.value(test) for _, trial in knots]
     if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, _from_doubling):
         return []
-    inside = [segment.step * part for part in _LOOKS]
+    inside = [segment.step * part for part in LOOKS]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
     values = [trial.value(test) for _, trial in looked]
     if not np.isfinite(values).all() or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
@@ -246,7 +246,7 @@ def _comes_near(segment: Segment, distances: Callable[[Sequence[complex]], list[
     """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
     for values, moves in _moves(segment):
         for distance, move in zip(distances(values), moves):
-            if not (distance > _NEAR and _CHANGES * move < distance):
+            if not (distance > NEAR and CHANGES * move < distance):
                 return True
     return False
 
@@ -309,7 +309,7 @@ def _dips(places: list[Place], values: list[float]) -> list[tuple[float, float]]
         if len(set(np.sign(at_three))) > 1:
             continue
         at, square, lowest = _parabola([s for s, _ in three], at_three)
-        if square > 0 and three[0][0] < at < three[2][0] and lowest < _DEEPER * min(map(abs, at_three)):
+        if square > 0 and three[0][0] < at < three[2][0] and lowest < DEEPER * min(map(abs, at_three)):
             found.append((at, square))
     return found
 
@@ -346,7 +346,7 @@ def _followed(segment: Segment, at: float, square: float, test: TestFunction) ->
         value = sign * here[1].value(test)
         if value < 0:
             return here
-        if not value < _DEEPER * lowest:
+        if not value < DEEPER * lowest:
             return None
         lowest = value
         apart = math.sqrt(value / square)

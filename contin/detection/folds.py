@@ -19,6 +19,7 @@ from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.detection.significance import on_plateau, passed_before, senses
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
+from contin.functions.kernel_parts import helper
 from contin.stepping.trial import TestFunction, Trial, sign_changed
 
 #: A component of the unit tangent below this may be round-off: it is believed where the parameter itself changes.
@@ -51,19 +52,29 @@ class _Parabola(NamedTuple):
     @property
     def dips(self) -> bool:
         """It comes near zero between the places."""
-        first, last, linear, square = self
-        return 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * min(first, last)
+        return dips(*self)
 
     @property
     def ends_low(self) -> bool:
         """It is near zero at one place already, and lower beside it."""
-        first, last, linear, square = self
-        inwards = linear if first < last else -linear - 2 * square
-        return min(first, last) < _BESIDE * square and inwards < _SHALLOW * square
+        return ends_low(*self)
 
     def times(self, sense: float) -> _Parabola:
         """Return the parabola multiplied by a sign."""
         return _Parabola(sense * self.first, sense * self.last, sense * self.linear, sense * self.square)
+
+
+@helper
+def dips(first: float, last: float, linear: float, square: float) -> bool:
+    """Return whether a parabola comes near zero between the places."""
+    return 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * min(first, last)
+
+
+@helper
+def ends_low(first: float, last: float, linear: float, square: float) -> bool:
+    """Return whether it is near zero at one place already, and lower beside it."""
+    inwards = linear if first < last else -linear - 2 * square
+    return min(first, last) < _BESIDE * square and inwards < _SHALLOW * square
 
 
 def may_turn(segment: Segment, fold: TestFunction) -> bool:

@@ -146,8 +146,9 @@ def _looked_at_closely(segment: Segment, places: list[Place]) -> list[Place]:
 
 
 def _passed(places: list[Place]) -> list[tuple[float, float]]:
-    """Return neighbours among places of a step between which a pair passes."""
-    return [(left[0], right[0]) for left, right in itertools.pairwise(places) if _passes_as_pair(left[1], right[1])]
+    """Return neighbours among places of a step between which a pair passes: none where eigenvalues do not move so far."""
+    pieces = zip(itertools.pairwise(places), _moving(places))
+    return [(left[0], right[0]) for (left, right), moves in pieces if moves and _passes_as_pair(left[1], right[1])]
 
 
 def _passes_as_pair(left: Trial, right: Trial) -> bool:

@@ -61,13 +61,13 @@ _OFF = 0.1
 _STRAYS = "the determinant changes its sign, and no branch point was found"
 _ADVICE = "a smaller max_step or accuracy, or more intervals may help"
 #: A branch can close on its first point after this many regular points.
-_FEWEST = 3
+FEWEST = 3
 #: A closing branch comes back to its first point along its tangent there: with this cosine at least, ...
 _SAME_WAY = 0.5
 #: ... and at a distance of this part of the step at most.
 _BACK = 0.1
 #: A first point inside a step is not further than so many steps from its end, nor from both ends together.
-_REACH = 2
+REACH = 2
 #: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point ...
 _SAME, _SAME_SHARE = 1e-4, 2e-3
 #: ... unless the parameter goes from the one to the other by what the tangent at the crossing says, up to this factor.
@@ -327,7 +327,7 @@ class Inspection:
     def may_close(self) -> bool:
         """Return whether the first point of the run may lie in this step."""
         home, x, _ = self.start
-        return self.segment.state.accepted >= _FEWEST and not self._is_elsewhere(home, x)
+        return self.segment.state.accepted >= FEWEST and not self._is_elsewhere(home, x)
 
     def _closed(self) -> SpecialPoint | None:
         """Return the end of a branch that comes back to its first point."""
@@ -342,7 +342,7 @@ class Inspection:
             if home.scales is not state.system.scales:
                 tangent = tangent / np.sqrt(inner(state.system, tangent, tangent))
         size = state.system.state_size
-        if np.max(np.abs(x[size:] - trial.x[size:])) > _REACH * step:
+        if np.max(np.abs(x[size:] - trial.x[size:])) > REACH * step:
             return None
         x = state.system.lifted(x, trial.x)
         first, (leaving,) = in_phase(state.system, x, (tangent,), trial.x)
@@ -365,10 +365,10 @@ class Inspection:
         if home.scales is not system.scales:
             return False
         first, size = x[home.state_size :].tolist(), system.state_size
-        if sum(math.dist(first, end[size:].tolist()) for end in (segment.state.x, segment.trial.x)) > _REACH * segment.step:
+        if sum(math.dist(first, end[size:].tolist()) for end in (segment.state.x, segment.trial.x)) > REACH * segment.step:
             return True  # the free parameters are
         kept, ends = lasting(home, x), (lasting(system, end) for end in (segment.state.x, segment.trial.x))
-        return sum(math.dist(kept, end) for end in ends) > _REACH * segment.step
+        return sum(math.dist(kept, end) for end in ends) > REACH * segment.step
 
     def _same_place(self, fold: SpecialPoint, found: list[SpecialPoint]) -> bool:
         """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.

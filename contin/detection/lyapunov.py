@@ -126,7 +126,7 @@ class Coefficient(NamedTuple):
 def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:
     """Return the first Lyapunov coefficient at a Hopf point; NaN where another eigenvalue is zero."""
     size = np.ones(system.state_size) if system.scales is None else system.scales.states
-    field, still, one = system.as_field(), np.zeros(len(x) - len(size)), np.eye(len(size))
+    field, one = system.as_field(), np.eye(len(size))
 
     def terms(point: Array) -> Array:
         jacobian = system.jacobian(point)
@@ -135,7 +135,7 @@ def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficie
 
         def along(*vectors: Any) -> Any:
             """Return B or C along directions of the states, of unknowns divided by their sizes."""
-            return of_complex(lambda parts: field.along(point, [np.append(part, still) for part in parts]), vectors)
+            return of_complex(lambda stacks: field.stack_along(point, stacks), vectors)
 
         constant = np.linalg.solve(matrix, along(q, q.conj()).real)
         twice = np.linalg.solve(2j * omega * one - matrix, along(q, q))

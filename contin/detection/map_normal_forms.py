@@ -86,8 +86,7 @@ class _Forms:
 
     def along(self, *vectors: Any) -> Any:
         """Return B or C along real or complex directions."""
-        still = np.zeros(len(self.system.free))
-        return of_complex(lambda parts: self.system.along(self.x, [np.append(part, still) for part in parts]), vectors)
+        return of_complex(lambda stacks: self.system.stack_along(self.x, stacks), vectors)
 
     def critical(self, multiplier: Any) -> tuple[Array, Array]:
         """Return v and w."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,6 +16,7 @@ from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton, correct
 from contin.stepping.settling import settled
+from contin.stepping.small import corrected_small
 from contin.stepping.state import State, Stop
 from contin.stepping.step import located
 from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
@@ -27,7 +29,7 @@ _ROUGH = 1e-3
 #: What that finds lies no further off the cubic than this part of the step, as branch points do.
 _OFF = 0.1
 #: Least cosine between the tangents at both ends that the cubic is made with: accepted steps turn by less.
-_LEAST_COSINE = 0.1
+LEAST_COSINE = 0.1
 
 #: Where on a step: the distance along the state's tangent, and the point.
 Place = tuple[float, Trial]
@@ -148,7 +150,7 @@ class Segment:
         """The coefficients of the cubic by powers of the part of the step, shape (4, size)."""
         state, trial, step = self.state, self.trial, self.step
         ahead = trial.x - state.x
-        rate = step / max(inner(state.system, state.tangent, trial.tangent), _LEAST_COSINE)
+        rate = step / max(inner(state.system, state.tangent, trial.tangent), LEAST_COSINE)
         a, b = state.tangent * step, trial.tangent * rate
         return np.array([state.x, a, 3 * ahead - 2 * a - b, a + b - 2 * ahead])
 
@@ -219,16 +221,29 @@ class Segment:
         row = np.zeros(system.size)
         row[at] = 1.0
         try:
-            place = find_zero(gap, *ends, _ROUGH * self.step)
-            done = correct(system, self.guess(place), row, value, self.newton)
+            there = self._corrected(self.guess(find_zero(gap, *ends, _ROUGH * self.step)), row, value)
         except ConvergenceError:
             return None
-        place = inner(system, state.tangent, done.x - state.x)
-        inside = left[0] < place < right[0] and self.distance(done.x, place) < _OFF * self.step
-        if not inside or (self.settles and system.on_switches(done.x) is not None):
+        place = inner(system, state.tangent, there.x - state.x)
+        inside = left[0] < place < right[0] and self.distance(there.x, place) < _OFF * self.step
+        if not inside or (self.settles and system.on_switches(there.x) is not None):
             return None
-        there = Trial(system, done.x, lambda: linearization(system, done.x, state.row), done.iterations, done.error)
         return place, there
+
+    def _corrected(self, guess: Array, row: Array, value: float) -> Trial:
+        """Return the point of the curve where a row has a value, with its tangent along the state's.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        system, state = self.state.system, self.state
+        small = corrected_small(system, guess, row, value, self.newton)
+        if small is None:
+            done = correct(system, guess, row, value, self.newton)
+            return Trial(system, done.x, lambda: linearization(system, done.x, state.row), done.iterations, done.error)
+        side = math.copysign(1.0, inner(system, state.tangent, small.tangent))  # the determinant goes with row.tangent
+        return Trial(system, small.x, Linearization(side * small.tangent, side * small.sign), small.iterations, small.error)
 
 
 def stop_of(test: TestFunction) -> Stop | None:

@@ -19,10 +19,9 @@ from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.linalg.orientation import oriented
 from contin.stepping.newton import UNITS, Newton, correct
+from contin.stepping.step import CLEAR
 from contin.stepping.trial import TestFunction, Trial, linearization
 
-#: Rates above this are significant without a look at a finer mesh. Ten times larger, more steps take twice as long.
-_CLEAR = 1e-6
 #: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
 STANDS = 1e-13
 #: Rates below this are round-off of tangents; it is 1e-16 to 1e-15 in the canard explosions of the tests.
@@ -48,7 +47,7 @@ def _sense_function(fold: TestFunction, newton: Newton) -> TestFunction:
 
 def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
     rate = trial.value(fold)
-    if not abs(rate) < _CLEAR:
+    if not abs(rate) < CLEAR:
         return float(np.sign(rate))
     if trial.system.refined() is None:  # without a mesh, there is round-off only
         return float(np.sign(rate)) if abs(rate) > _noise(trial, fold) else 0.0
@@ -85,7 +84,7 @@ def growing(system: Discretization, x: Array, tangent: Array, primary: str, newt
     small rate with one sign on both sides belongs to a parameter of another size.
     """
     at = system.parameter_index(primary)
-    if abs(tangent[at]) >= _CLEAR:
+    if abs(tangent[at]) >= CLEAR:
         found: Array = tangent * np.sign(tangent[at])
         return found
     row = system.weights * tangent

@@ -122,7 +122,7 @@ def _of_maps(system: MapSystem) -> list[TestFunction]:
 
 @own_test_functions.register
 def _of_equilibria(system: Algebraic) -> list[TestFunction]:
-    return [hopf()] if system.problem.dynamics else []
+    return [hopf()] if system.problem.dynamics and system.state_size > 1 else []
 
 
 @functools.singledispatch

@@ -199,9 +199,18 @@ class Algebraic(System):
 
     def along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of F along several directions, shape (equations,)."""
-        u, p, n = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size
-        wide = [self._wide(v, v[None, :n]) for v in directions]
-        found: Array = self._residual.along(_NO_TIME, u, self._none, p, wide)[0]
+        found: Array = self.stack_along(x, [v[None] for v in directions])[0]
+        return found
+
+    def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return it along several stacks of directions, shape (K, size) each or, of states alone, (K, n); (K, equations)."""
+        n, count = self.state_size, len(directions[0])
+        u, p = np.repeat(x[:n].reshape(1, -1), count, axis=0), self._scaled_parameters(x)
+        wide = [np.zeros((count, n + p.size)) for _ in directions]
+        for inputs, stack in zip(wide, directions):
+            inputs[:, :n] = stack[:, :n]
+            inputs[:, n + self._free] = stack[:, n:] if stack.shape[1] > n else 0.0
+        found: Array = self._residual.along(np.zeros(count), u, self._none, p, wide)
         return found
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:

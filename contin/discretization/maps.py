@@ -21,7 +21,7 @@ from contin.problems.map import MapProblem
 #: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
 _SHRUNK = 1e-7
 #: The logarithm of a multiplier is no smaller than that of this number: a superstable cycle has the multiplier zero.
-_NO_MULTIPLIER = 1e-300
+NO_MULTIPLIER = 1e-300
 #: Smallest number of unknown states for which the matrix is kept sparse: it has n + 1 entries a row. Dense factors of 200
 #: unknowns take as long as sparse ones.
 _MANY = 200
@@ -216,12 +216,18 @@ class MapSystem(Algebraic):
         columns: Array = self._derivatives(x, names)[1][:, :, self._n :].reshape(self.state_size, len(names))
         return columns
 
-    def along(self, x: Array, directions: Sequence[Array]) -> Array:
-        """Return the derivative of F along several directions, shape (equations,): f at every point; the rest is linear."""
-        wide = [self._wide(v, self.states(v)) for v in directions]
-        found: Array = self.problem.batch("map").along(*self._arguments(x, self.states(x)), wide).ravel()
+    def stack_along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along several stacks of directions: f at every point; the rest is linear."""
+        n, count = self._n, len(directions[0])
+        wide = [np.zeros((count, self.rounds, n + len(self.parameters))) for _ in directions]
+        for inputs, stack in zip(wide, directions):
+            inputs[:, :, :n] = stack[:, : self.state_size].reshape(count, self.rounds, n)
+            inputs[:, :, n + self._free] = stack[:, None, self.state_size :] if stack.shape[1] > self.state_size else 0.0
+        given = self._arguments(x, np.tile(self.states(x), (count, 1)))
+        flat = [inputs.reshape(count * self.rounds, -1) for inputs in wide]
+        found: Array = self.problem.batch("map").along(*given, flat).reshape(count, -1)
         if len(directions) == 1:
-            found = found - np.roll(self.states(directions[0]), -1, axis=0).ravel()
+            found = found - np.roll(directions[0][:, : self.state_size], -n, axis=1)
         return found
 
     def bent(self, x: Array, w: Array, v: Array) -> Array:
@@ -284,7 +290,7 @@ class MapSystem(Algebraic):
     def _logarithms(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers as they are computed."""
         values = log_eigenvalues(self.transitions(x))
-        values.real = np.maximum(values.real, np.log(_NO_MULTIPLIER))
+        values.real = np.maximum(values.real, np.log(NO_MULTIPLIER))
         return values
 
     def is_symmetric(self, x: Array) -> bool:

@@ -6,6 +6,7 @@ Directions are numbered, and a derivative along some of them belongs to a tuple 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -20,17 +21,17 @@ Numbers = tuple[int, ...]
 def of_complex(form: Callable[[Sequence[Array]], Array], vectors: Sequence[Any]) -> Any:
     """Return a real multilinear form of complex vectors, from its values at their real and imaginary parts.
 
+    ``form`` is called once, with a stack of each vector's parts, and returns the stack of values.
+
     Examples
     --------
     >>> print(of_complex(lambda v: v[0] * v[1], [np.array([1 + 2j]), np.array([3 - 1j])]).item())
     (5+5j)
     """
     parts = [[(1.0, vector)] if np.isrealobj(vector) else [(1.0, vector.real), (1j, vector.imag)] for vector in vectors]
-    total: Any = 0.0
-    for chosen in itertools.product(*parts):
-        factor = np.prod([part[0] for part in chosen])
-        total = total + factor * form([np.ascontiguousarray(part[1]) for part in chosen])
-    return total
+    every = list(itertools.product(*parts))
+    factors = np.array([math.prod(factor for factor, _ in chosen) for chosen in every])
+    return factors @ form([np.array(stack) for stack in zip(*([vector for _, vector in chosen] for chosen in every))])
 
 
 def of_lines(form: Callable[[Array], Array], directions: Sequence[Array]) -> Array:

@@ -15,10 +15,10 @@ from contin.arrays import Array, ComplexArray, Mask
 
 #: Round-off of a multiplier is looked at where the real part of its logarithm is smaller. In the restricted three-body problem
 #: it is 1e-10, and 4e-7 for a double multiplier one. Ten times larger, it is looked at along more of a branch for nothing.
-_NEAR_CIRCLE = 1e-6
+NEAR_CIRCLE = 1e-6
 #: That of an eigenvalue, where its real part is below this part of the largest eigenvalue: it is 1e-15 in chains of masses.
 #: Ten times larger, it is looked at for nothing where a matrix has eigenvalues of very different size.
-_NEAR_AXIS = 1e-9
+NEAR_AXIS = 1e-9
 #: Random roundings, and the seed that draws them. The largest change of ten is at most twice that of three.
 _DRAWS, _SEED = 3, 13
 #: A real part is zero if it is below so many times the largest change. With three draws the change is a tenth of the round-off
@@ -53,7 +53,7 @@ def on_circle(eigenvalues: Callable[[Array], ComplexArray], x: Array, values: Co
 
     Where no more than ``expected`` come near it, these are not looked at.
     """
-    near = np.abs(values.real) < _NEAR_CIRCLE
+    near = np.abs(values.real) < NEAR_CIRCLE
     if np.count_nonzero(near) <= expected:
         return np.zeros(len(values), dtype=bool)
     bound = np.full(len(values), _ON_CIRCLE)
@@ -65,7 +65,7 @@ def on_circle(eigenvalues: Callable[[Array], ComplexArray], x: Array, values: Co
 def may_be_on_axis(values: ComplexArray) -> Mask:
     """Return which eigenvalues are complex and so near to the axis that round-off decides; of matrices, shape (..., n)."""
     sizes = np.abs(values).max(axis=-1, initial=0.0, keepdims=True)
-    near: Mask = (np.abs(values.real) < _NEAR_AXIS * sizes) & (values.imag != 0) & (values.real != 0)
+    near: Mask = (np.abs(values.real) < NEAR_AXIS * sizes) & (values.imag != 0) & (values.real != 0)
     return near
 
 

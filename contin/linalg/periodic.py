@@ -22,6 +22,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.linalg.dense import eigenvalues
 
 #: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the
 #: eigenvalues of a block with such a spread are accurate.
@@ -135,7 +136,7 @@ def _eigenvalues(block: Array) -> list[complex]:
         return [complex(block[0, 0])]
     if len(block) == 2:
         return _of_two(*block.ravel().tolist())
-    found: list[complex] = np.linalg.eigvals(block).astype(complex).tolist()
+    found: list[complex] = eigenvalues(block).tolist()
     return found
 
 

@@ -23,20 +23,26 @@ from contin.functions.kernel_parts import Vector
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.stepping.one_call import (
-    CHORDS,
-    CLOSE,
     CONVERGED,
     ERROR,
-    EXACT,
-    FAR,
     ITERATIONS,
     NOT_FINITE,
-    ROUND_OFF,
     SIGN,
     STAGNATES,
     UPDATES,
     Control,
     correct_on_mesh,
+)
+from contin.stepping.updates import (
+    CHORDS,
+    CLOSE,
+    EXACT,
+    ROUND_OFF,
+    diverges,
+    estimated_rate,
+    has_converged,
+    stagnates,
+    wants_jacobian,
 )
 
 #: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
@@ -47,7 +53,7 @@ _DRAWS = 3
 #: A larger update is not taken for round-off in any case. Ten times larger, a matrix that is singular could pass.
 _COARSE = 1e-3
 #: Nor is one larger than this on the way: stiff meshes of strips leave 1e-8. Ten times larger, a step could end elsewhere.
-_STAGNANT = 1e-6
+STAGNANT = 1e-6
 #: Returns the size of each unknown at x.
 Sizes = Callable[[Array], Array]
 
@@ -185,7 +191,7 @@ def _in_one_call(
     if done == NOT_FINITE:
         raise ConvergenceError("the equations are not finite at the corrected point")
     updates = report[UPDATES : UPDATES + iterations].tolist()
-    if done == STAGNATES or (near is None and updates[-1] <= _STAGNANT):
+    if done == STAGNATES or (near is None and updates[-1] <= STAGNANT):
         return None
     raise _failure(updates)
 
@@ -218,7 +224,7 @@ def _newton(
                 break
             if progress.wants_jacobian:
                 factors = None
-        coarse = _COARSE if sizes is not None else _STAGNANT
+        coarse = _COARSE if sizes is not None else STAGNANT
         if size <= coarse and _is_noise(system, x, update, rows, coarse):
             return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), max(progress.sizes[-2:]))
     raise _failure(progress.sizes)
@@ -344,15 +350,8 @@ class _Progress:
         """Note an update, made with a ``fresh`` Jacobian or with an old one."""
         self.sizes.append(size)
         self._moved = size if fresh else self._moved + size
-        self.rate = self._estimated_rate(fresh)
-
-    def _estimated_rate(self, fresh: bool) -> float:
-        if len(self.sizes) < 2:  # nothing is known of how nonlinear the equations are
-            return min(self._moved, FAR) if fresh else 1.0
-        ratio = self.sizes[-1] / self.sizes[-2]
-        if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
-            return min(1.0, max(self.sizes[-1], ratio * min(1.0, ratio)))
-        return max(min(self._moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
+        before = self.sizes[-2] if len(self.sizes) > 1 else math.inf
+        self.rate = estimated_rate(size, before, self._moved, fresh)
 
     @property
     def error(self) -> float:
@@ -362,25 +361,22 @@ class _Progress:
     @property
     def converged(self) -> bool:
         """The error is below the tolerance."""
-        confirmed = len(self.sizes) > 1 or self.sizes[-1] <= self.tolerance
-        return confirmed and self.error <= self.tolerance
+        return has_converged(self.sizes[-1], self.rate, len(self.sizes), self.tolerance)
 
     @property
     def stagnates(self) -> bool:
         """Small updates no longer shrink: they are round-off, or there is no solution and unknowns are smaller still."""
-        return self.sizes[-1] < ROUND_OFF and len(self.sizes) > 1 and self.rate >= 0.5
+        return stagnates(self.sizes[-1], self.rate, len(self.sizes))
 
     @property
     def diverges(self) -> bool:
         """The last update is more than twice the one before."""
-        return len(self.sizes) > 2 and self.sizes[-1] > 2 * self.sizes[-2] > ROUND_OFF
+        return len(self.sizes) > 2 and diverges(self.sizes[-1], self.sizes[-2])
 
     @property
     def wants_jacobian(self) -> bool:
         """The next update is better made with a new Jacobian: chord steps would take longer."""
-        size = self.sizes[-1]
-        far = size > FAR or not self.rate < 0.5
-        return far or (self.rate > 0 and math.log(self.tolerance / size) < CHORDS * math.log(self.rate))
+        return wants_jacobian(self.sizes[-1], self.rate, self.tolerance)
 
 
 def _chords(

@@ -18,21 +18,7 @@ from contin.linalg.condensation import Factored
 from contin.linalg.elimination import factorize
 from contin.linalg.layout import Blocks
 from contin.linalg.substitution import solve
-
-#: After a larger update the Jacobian is taken anew, and a first update is trusted no further than this: from there chord steps
-#: converge slowly. Ten times larger changes nothing on the test bank: the estimated rate decides.
-FAR = 0.1
-#: Chord steps that cost about as much as one factorization. Ten times as many save 7 % of the factorizations on the test bank,
-#: and take more solves; ten times fewer take 49 % more factorizations.
-CHORDS = 4
-#: Updates that small and no longer shrinking may be round-off: far above that of one solve, far below what an iteration is
-#: worth. They are where round-off of x makes as much.
-ROUND_OFF = 1e-9
-#: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: then a
-#: few steps reach round-off, where slower ones would take as long as a factorization.
-CLOSE = 0.03
-#: An update of a few units in the last place: with it x solves the equations as well as any number can.
-EXACT = 1e-15
+from contin.stepping.updates import CHORDS, CLOSE, EXACT, diverges, estimated_rate, has_converged, stagnates, wants_jacobian
 
 #: What a call comes to: converged; updates no longer shrink; no convergence; the equations are not finite at x.
 CONVERGED, STAGNATES, FAILED, NOT_FINITE = range(4)
@@ -173,7 +159,7 @@ def _chord_steps(codes, mesh, room, matrix, x, tolerance, report):
 @helper
 def _iterate(codes, mesh, room, matrix, x, control, report):
     """Newton's method with a new Jacobian where chord steps are not expected to do."""
-    before, size, moved, rate, fresh, tolerance = 0.0, 0.0, 1.0, 1.0, True, control.tolerance
+    before, size, moved, fresh, tolerance = math.inf, math.inf, 1.0, True, control.tolerance
     for number in range(control.most):
         _evaluate(codes, mesh, room, x, fresh)
         _fill_residual(mesh, room, x)
@@ -185,23 +171,15 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
         if not size < math.inf:
             return FAILED
         moved = size if fresh else moved + size
-        if number == 0:
-            rate = min(moved, FAR)
-        elif fresh:
-            ratio = size / before
-            rate = min(1.0, max(size, ratio * min(1.0, ratio)))
-        else:
-            ratio = size / before
-            rate = max(min(moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
+        rate = estimated_rate(size, before, moved, fresh)
         report[ERROR] = size * rate
-        if (number > 0 or size <= tolerance) and size * rate <= tolerance:
+        if has_converged(size, rate, number + 1, tolerance):
             return CONVERGED
-        if size < ROUND_OFF and number > 0 and rate >= 0.5:
+        if stagnates(size, rate, number + 1):
             return STAGNATES
-        if number > 1 and size > 2 * before > ROUND_OFF:
+        if number > 1 and diverges(size, before):
             return FAILED
-        far = size > FAR or not rate < 0.5
-        fresh = far or (rate > 0 and math.log(tolerance / size) < CHORDS * math.log(rate))
+        fresh = wants_jacobian(size, rate, tolerance)
     return FAILED
 
 

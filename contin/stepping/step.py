@@ -16,10 +16,12 @@ from contin.arrays import Array
 from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import ReadOnlyVector, Vector
+from contin.functions.kernel_parts import ReadOnlyVector, Vector, helper
+from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
 from contin.stepping.newton import Corrected, Newton, correct
 from contin.stepping.settings import Settings
+from contin.stepping.small import corrected_small
 from contin.stepping.state import State
 from contin.stepping.trial import Linearization, Trial, linearization, linearization_of
 
@@ -28,6 +30,21 @@ _STILL = 0.01
 #: A step ends at this many times the distance to a limit, along the tangent, at most: beyond it, and not much. Ten times
 #: larger, a parameter that the equations divide by went through zero, and three branch points before it were lost.
 _BEYOND = 1.25
+#: A corrected point this many times further from its prediction than aimed at is not believed: it may lie on another branch.
+ASTRAY = 2.5
+#: Rates of the primary parameter above this are significant without a closer look (`contin.detection.significance`). Ten times
+#: larger, more steps on a mesh take twice as long.
+CLEAR = 1e-6
+#: Bounds on the factor from one step to the next, and the part of the largest angle that a step aims at.
+_SHORTER, _LONGER, _AIM = 0.3, 2.0, 0.8
+#: Part of its change in a step by which the primary parameter may miss its prediction. From a fold, where nothing is known of
+#: the curvature, it is one half.
+_MISSED = 0.75
+#: A difference of a parameter below this, relative to 1 + its size, may be round-off of the corrector. Twice the error that
+#: Newton's method left comes on top: where cycles shrink onto a Hopf point it is 1e-10, and steps of 1e-6 were refused.
+_NOISE = 1e-12
+#: Smallest angle and rate, in place of zero where they are divided by.
+_NO_ANGLE, _NO_RATE = 1e-12, 1e-300
 
 
 def aims(settings: Settings, system: Discretization) -> tuple[float, float]:
@@ -58,11 +75,17 @@ def up_to_limits(state: State, limits: Mapping[str, Sequence[float]], least: flo
         earlier = state.previous_tangent
         bend = 0.0 if earlier is None else (rate - earlier[at] * size) / (2 * state.previous_step)
         with np.errstate(over="ignore"):  # a limit may be the largest number
-            room = limits[name][int(rate > 0)] - value
-            square = rate * rate + 4 * bend * room
-            if rate * room > 0 and square >= 0:
-                step = min(step, _BEYOND * 2 * room / (rate + math.copysign(math.sqrt(square), rate)))
+            step = up_to(step, rate, bend, limits[name][int(rate > 0)] - value)
     return max(step, least)
+
+
+@helper
+def up_to(step: float, rate: float, bend: float, room: float) -> float:
+    """Return a step, shortened where it leads far beyond the limit of a parameter, which has so much room."""
+    square = rate * rate + 4 * bend * room
+    if rate * room > 0 and square >= 0:
+        return min(step, _BEYOND * 2 * room / (rate + math.copysign(math.sqrt(square), rate)))
+    return step
 
 
 def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
@@ -74,6 +97,10 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
         It is not found, or the equations are not finite there.
     """
     row = state.row
+    small = corrected_small(state.system, guess, row, row @ state.x + step, newton)
+    if small is not None:
+        linear = Linearization(small.tangent, small.sign, DenseFactors(small.matrix))
+        return Trial(state.system, small.x, linear, small.iterations, small.error)
     done = correct(state.system, guess, row, row @ state.x + step, newton, linearize=True)
     return trial_of(state.system, done, row)
 
@@ -96,7 +123,7 @@ def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
 
 
 def located(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Trial:
-    """Return the point of the curve at ``step``, linearized right there when its tangent is first asked for.
+    """Return the point of the curve at ``step``, linearized right there: when that is first asked for, if it takes long.
 
     ``factors`` from near by save Newton's method its own.
 
@@ -105,6 +132,9 @@ def located(state: State, guess: Array, step: float, newton: Newton, factors: Fa
     ConvergenceError
     """
     system, row = state.system, state.row
+    small = corrected_small(system, guess, row, row @ state.x + step, newton)
+    if small is not None:
+        return Trial(system, small.x, Linearization(small.tangent, small.sign), small.iterations, small.error)
     done = correct(system, guess, row, row @ state.x + step, newton, factors)
     return Trial(system, done.x, lambda: linearization(system, done.x, row), done.iterations, done.error)
 
@@ -133,9 +163,40 @@ def judged(state: State, guess: Array, trial: Trial) -> Judgement:
     system, sums = state.system, np.empty(6)
     fill_sums(Arc(state.x, state.tangent, trial.x, trial.tangent, guess), system.weights, system.state_size, sums)
     missed, whole, part, first, last, chord = sums.tolist()
+    return Judgement(math.sqrt(missed), turned(whole, part, first, last), math.sqrt(chord))
+
+
+@helper
+def turned(whole: float, part: float, first: float, last: float) -> float:
+    """Return the angle between tangents, as `Judgement` describes it, from what `fill_sums` gives."""
     sizes = math.sqrt(first), math.sqrt(last)
-    cosine = part / (sizes[0] * sizes[1]) if min(sizes) > _STILL else 1.0
-    return Judgement(math.sqrt(missed), max(_angle(whole), _angle(cosine) / 2), math.sqrt(chord))
+    cosine = part / (sizes[0] * sizes[1]) if min(sizes[0], sizes[1]) > _STILL else 1.0
+    return max(_angle(whole), _angle(cosine) / 2)
+
+
+@helper
+def is_astray(missed: float, change: float, error: float, value: float) -> bool:
+    """Return whether a parameter misses its prediction by much of what it changes at all, and by more than round-off.
+
+    ``error`` is that of Newton's method, ``value`` the parameter.
+    """
+    return missed > _MISSED * change and missed > (_NOISE + 2 * error) * (1 + abs(value))
+
+
+@helper
+def longest_step(longest: float, change: float, value: float, rate: float) -> float:
+    """Return the longest step, shortened so that a parameter changes by no more than this part of 1 + its size."""
+    return min(longest, change * (1 + abs(value)) / (abs(rate) + _NO_RATE))
+
+
+@helper
+def following_step(
+    step: float, missed: float, turn: float, order: int, accuracy: float, angle: float, shortest: float, longest: float
+) -> float:
+    """Return the next step: one whose prediction, with an error of this order, misses ``accuracy`` of it."""
+    factor = _LONGER if missed == 0 else (accuracy * step / missed) ** (1 / order)
+    factor = min(factor, _AIM * angle / max(turn, _NO_ANGLE))
+    return min(max(step * min(max(factor, _SHORTER), _LONGER), shortest), max(longest, shortest))
 
 
 class Arc(NamedTuple):
@@ -154,7 +215,14 @@ def fill_sums(arc: Arc, weights: ReadOnlyVector, states: int, sums: Vector) -> N
 
     |guess - last|^2, t.T of the tangents, and of the states alone t.T, |t|^2, |T|^2; |c|^2 of the chord.
     """
-    x, tangent, last, last_tangent, guess = arc
+    fill_sums_of(arc.x, arc.tangent, arc.last, arc.last_tangent, arc.guess, weights, states, sums)
+
+
+@helper
+def fill_sums_of(
+    x: Array, tangent: Array, last: Array, last_tangent: Array, guess: Array, weights: Array, states: int, sums: Array
+) -> None:
+    """Fill what `fill_sums` fills."""
     missed, whole, chord = 0.0, 0.0, 0.0
     part, first_size, last_size = 0.0, 0.0, 0.0
     for i in range(x.size):
@@ -172,5 +240,6 @@ def fill_sums(arc: Arc, weights: ReadOnlyVector, states: int, sums: Vector) -> N
     sums[4], sums[5] = last_size, chord
 
 
+@helper
 def _angle(cosine: float) -> float:
     return math.acos(min(1.0, max(-1.0, cosine))) if cosine == cosine else math.nan  # noqa: PLR0124

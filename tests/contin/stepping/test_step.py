@@ -72,7 +72,7 @@ def test_the_corrected_point_lies_at_its_distance_along_the_tangent(find, step):
     x, tangent = target(0.7, step)
     assert trial.x == pytest.approx(x, abs=1e-11)
     assert state.tangent @ (trial.x - state.x) == pytest.approx(step, abs=1e-13)
-    assert trial.is_linearized == (find is corrected)
+    assert trial.is_linearized or find is located
     assert trial.tangent == pytest.approx(tangent, abs=1e-11)
     assert trial.iterations > 1 and trial.newton_error < 1e-11
 
