@@ -10,6 +10,7 @@ import functools
 import gc
 import inspect
 import itertools
+import operator
 import types as python_types
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -86,7 +87,7 @@ class _Passes(compiler.Compiler):
 #: Passes that look for expressions of arrays, closures, `with` and other things that kernels have not. Without them kernels are
 #: the same, and compiled in 19 of 20 parts of the time.
 _SKIPPED = (
-    "WithLift",
+    "WithLifting",
     "RewriteSemanticConstants",
     "DeadBranchPrune",
     "MakeFunctionToJitFunction",
@@ -125,15 +126,36 @@ def _own_options(codegen: Any) -> Iterator[None]:
     time; where one process makes all kernels, it takes 180 MB.
     """
     collects, libraries, target = gc.isenabled(), codegen._library_class, codegen._tm
-    codegen._library_class, codegen._tm = _Library, _target()
+    functions: Any = types.BaseFunction
+    codegen._library_class, codegen._tm, functions.get_call_type = _Library, _target(), _resolved
     gc.disable()
     try:
         yield
     finally:
-        codegen._library_class, codegen._tm = libraries, target
+        codegen._library_class, codegen._tm, functions.get_call_type = libraries, target, _RESOLVE
         gc.freeze()
         if collects:
             gc.enable()
+
+
+#: numba's search for what a function is for types of its arguments.
+_RESOLVE: Any = types.BaseFunction.get_call_type
+#: What it has found.
+_RESOLVED: dict[Any, Any] = {}
+
+
+def _resolved(function: Any, context: Any, arguments: Any, names: Any) -> Any:
+    """Return what `_RESOLVE` finds, which is asked once for each operator: kernels are compiled in nine tenths of the time.
+
+    There are thousands of sums of two whole numbers, and for each numba tries all that it knows of sums. Of other functions it
+    makes versions for the options of who calls them.
+    """
+    if getattr(function.typing_key, "__module__", None) != operator.add.__module__:
+        return _RESOLVE(function, context, arguments, names)
+    key = function, tuple(arguments)
+    if key not in _RESOLVED:
+        _RESOLVED[key] = _RESOLVE(function, context, arguments, names)
+    return _RESOLVED[key]
 
 
 @functools.cache
