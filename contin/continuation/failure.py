@@ -12,7 +12,7 @@ from contin.errors import ConvergenceError
 from contin.names import exact_text
 from contin.stepping.settings import Settings
 from contin.stepping.state import State, Stop
-from contin.stepping.step import corrected, judged, predict
+from contin.stepping.step import aims, corrected, judged, predict
 from contin.stepping.trial import Trial
 
 #: Shorter steps that are tried, as parts of ``min_step``: the largest that goes on is told.
@@ -162,4 +162,4 @@ def _next(state: State, step: float, settings: Settings) -> Trial | None:
     except ConvergenceError:
         return None
     finite = np.isfinite(trial.system.residual(trial.x)).all() and np.isfinite(inner(state.system, trial.x, trial.x))
-    return trial if finite and judged(state, guess, trial).turn <= settings.angle else None
+    return trial if finite and judged(state, guess, trial).turn <= aims(settings, state.system)[0] else None

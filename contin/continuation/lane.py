@@ -34,6 +34,7 @@ from contin.results.point import Point
 from contin.stepping.settings import Settings
 from contin.stepping.small import Equations, equations_of, linear_of
 from contin.stepping.state import State
+from contin.stepping.step import aims
 from contin.stepping.trial import Linearization, TestFunction, Trial
 
 #: Steps of the first call after a step that was looked at, and at most: each call makes twice as many as the one before.
@@ -68,11 +69,11 @@ def _is_held(test: TestFunction, system: Discretization) -> bool:
     return test.value is not None and test.column in system.free
 
 
-def _control(settings: Settings, primary: int) -> Control:
+def _control(settings: Settings, system: Algebraic, primary: int) -> Control:
     """Return the settings as the kernel takes them."""
-    newton = settings.newton
+    newton, (angle, accuracy) = settings.newton, aims(settings, system)
     return Control(
-        newton.tolerance, newton.max_iterations, settings.accuracy, settings.angle, settings.change, settings.min_step,
+        newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step,
         settings.max_step, primary,
     )  # fmt: skip
 
@@ -109,7 +110,8 @@ class Lane:
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         (before, quotient, work), (real, imaginary) = np.empty((3, size, size)), np.empty((2, 1, size))
         self._rooms = (
-            equations, linear_of(size), Attempt(np.empty(size), np.empty(6), np.empty(LENGTH + 1)), _control(settings, primary),
+            equations, linear_of(size), Attempt(np.empty(size), np.empty(6), np.empty(LENGTH + 1)),
+            _control(settings, system, primary),
             Watch(
                 int(settings.branch_points), int(eigenvalues), int(noisy),
                 np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),

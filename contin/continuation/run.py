@@ -62,6 +62,7 @@ from contin.stepping.state import State, Stop, standing_at
 from contin.stepping.step import (
     ASTRAY,
     Judgement,
+    aims,
     corrected,
     following_step,
     is_astray,
@@ -568,7 +569,8 @@ class Continuation:
         if collapsed(state.system, state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         judgement = judged(state, guess, trial)
-        if not (judgement.turn <= settings.angle and judgement.missed <= ASTRAY * settings.accuracy * step):
+        angle, accuracy = aims(settings, state.system)
+        if not (judgement.turn <= angle and judgement.missed <= ASTRAY * accuracy * step):
             raise ConvergenceError(
                 f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
                 f"{judgement.missed / step:.2f} of it"
@@ -610,7 +612,7 @@ class Continuation:
             try:
                 guess = state.x + share * step * state.tangent
                 aside = located(state, guess, share * step, self.settings.newton)
-                if judged(state, guess, aside).turn <= self.settings.angle:
+                if judged(state, guess, aside).turn <= aims(self.settings, state.system)[0]:
                     return share * step, aside
             except ConvergenceError as error:
                 problem = error
@@ -642,6 +644,7 @@ class Continuation:
         ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
         """
         settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
+        angle, accuracy = aims(settings, state.system)
         order, longest, free = (
             2 if state.previous_tangent is None else 3,
             settings.max_step,
@@ -649,9 +652,7 @@ class Continuation:
         )
         for value, rate in zip(trial.x[free].tolist(), trial.tangent[free].tolist()):
             longest = longest_step(longest, settings.change, value, rate)
-        following = following_step(
-            step, judgement.missed, judgement.turn, order, settings.accuracy, settings.angle, settings.min_step, longest
-        )
+        following = following_step(step, judgement.missed, judgement.turn, order, accuracy, angle, settings.min_step, longest)
         way = self._sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
         way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
         return State(

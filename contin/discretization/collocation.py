@@ -22,6 +22,7 @@ from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.scales import Scales, usual
 from contin.discretization.switching import NOWHERE, Switching, joined, switching
 from contin.discretization.system import System
+from contin.discretization.workspace import Workspace, workspace
 from contin.errors import ProblemError
 from contin.functions.batch import Batch, Columns, Selections
 from contin.linalg.condensation import Factorization
@@ -247,22 +248,47 @@ class Collocation(System):
         self, x: Array, rows: Array, columns: Array, new: Callable[[tuple[int, ...]], Array] = np.empty
     ) -> tuple[Array, Blocks]:
         """Residual at x, and the blocks of [[F_x, columns^T], [rows]] as `Factorization` takes them."""
-        problem, n, d, k = self.problem, self._n, self._d, len(self.free)
-        p, u = self._scaled_parameters(x), self._scaled_states(x)
+        n, p, u = self._n, self._scaled_parameters(x), self._scaled_states(x)
         points = self.at_gauss_points(x)
         of_field, of_boundary = self._columns
         field, jacobian = self._field.jacobian(self._times, points, _NONE(n), p, of_field)
         boundary, ends = self._boundary.jacobian(_TIME, u[:1], u[-1:], p, of_boundary)
-        c, r = len(columns), len(rows) + problem.integral_size
-        conditions, width = problem.boundary_size, n * (d + 1) + k + c
-        blocks = Blocks(
-            new((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k + c)),
-            np.empty((conditions, n)), np.empty((conditions, n + k + c)),
-        )  # fmt: skip
+        blocks = self._empty_blocks(len(rows), len(columns), new)
         tables = Tables(self.basis.value, self.basis.slope, self.basis.weights)
         given = self._layout, tables, self._h, jacobian, ends, Bordering(columns, rows), blocks
         run(assemble, given, share(self.intervals, blocks.local.size), (True, False))
         return self._residual(x, field, boundary), blocks
+
+    def _empty_blocks(self, rows: int, columns: int, new: Callable[[tuple[int, ...]], Array] = np.empty) -> Blocks:
+        """Return blocks for so many rows and columns around F_x."""
+        problem, n, d, k = self.problem, self._n, self._d, len(self.free) + columns
+        r, conditions, width = rows + problem.integral_size, problem.boundary_size, n * (d + 1) + k
+        return Blocks(
+            new((self.intervals, n * d, width)), np.empty((self.intervals, r, width)), np.empty((r, k)),
+            np.empty((conditions, n)), np.empty((conditions, n + k)),
+        )  # fmt: skip
+
+    # --- in one call of a kernel ---------------------------------------------------------------------------------
+
+    @property
+    def linear_conditions(self) -> tuple[Array, Array] | None:
+        """Rows (q, size) and values (q,) of conditions beyond those of the problem; None where these are not linear."""
+        return np.empty((0, self.size)), np.empty(0)
+
+    @functools.cached_property
+    def workspace(self) -> Workspace | None:
+        """The arrays in which a kernel corrects points; None where Python evaluates functions, and on very long meshes."""
+        own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
+        if own is None or not recorded or not 0 <= self.size - self.equations <= 1:
+            return None
+        rows = len(own[0]) + self.size - self.equations
+        numbers = self.intervals * self._d * self._n * (self._n * (self._d + 1) + len(self.free))
+        return workspace(self, rows) if share(self.intervals, numbers).last == 1 else None
+
+    def unfilled_factors(self) -> Factorization:
+        """Return factors of the matrix of `workspace`, to be filled by a kernel."""
+        assert self.workspace is not None
+        return Factorization.unfilled(self._layout, self._empty_blocks(len(self.workspace.values.rows), 0))
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()

@@ -31,6 +31,11 @@ class Conditioned(Collocation):
     def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return their derivatives by any parameters, shape (q, len(names))."""
 
+    @property
+    def linear_conditions(self) -> tuple[Array, Array] | None:
+        """None: they may depend on the unknowns in any way."""
+        return None
+
     def conditions_along(self, x: Array, directions: Sequence[Array]) -> Array:
         """Return their derivative along two or three directions, shape (q,); 0 where they are linear."""
         return np.zeros(self.equations - self._conditions)

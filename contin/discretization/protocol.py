@@ -51,6 +51,8 @@ class Discretization(Equations, Protocol):
         Number of equations.
     weights : ndarray, shape (size,)
         Weights of the inner product.
+    aims : tuple of float
+        The usual `Settings.angle` and `Settings.accuracy`.
     intervals, degree : int
         Of the mesh; 0 without one.
     scales : object
@@ -65,6 +67,7 @@ class Discretization(Equations, Protocol):
     state_size: int
     equations: int
     weights: Array
+    aims: tuple[float, float] = (0.35, 0.02)
     intervals: int
     degree: int
     scales: Any

@@ -72,6 +72,34 @@ def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Cod
             return _Entry(context, done, hints, entry).code()
 
 
+class _Passes(compiler.Compiler):
+    """What numba does to a kernel or a helper, without what changes nothing there."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return numba's lists of passes."""
+        found: list[Any] = super().define_pipelines()
+        for each in found:
+            each.passes = [step for step in each.passes if step[0].__name__ not in _SKIPPED]
+        return found
+
+
+#: Passes that look for expressions of arrays, closures, `with` and other things that kernels have not. Without them kernels are
+#: the same, and compiled in 19 of 20 parts of the time.
+_SKIPPED = (
+    "WithLift",
+    "RewriteSemanticConstants",
+    "DeadBranchPrune",
+    "MakeFunctionToJitFunction",
+    "FindLiterallyCalls",
+    "LiteralUnroll",
+    "LiteralPropagationSubPipelinePass",
+    "InlineOverloads",
+    "NopythonRewrites",
+    "AnnotateTypes",
+    "NoPythonSupportedFeatureValidation",
+)
+
+
 def _compiled(function: Callable[..., Any], parameters: tuple[Any, ...], result: Any, reorder: bool) -> Any:
     """Return what numba makes of a function for types of its parameters; it finds the type of the result where that is None."""
     options = _OPTIONS if reorder else {**_OPTIONS, "fastmath": False}
@@ -80,7 +108,7 @@ def _compiled(function: Callable[..., Any], parameters: tuple[Any, ...], result:
     flags.no_compile, flags.enable_pyobject = True, False  # what numba runs itself is not wanted
     typing, context = cpu_target.typing_context, cpu_target.target_context
     library = _Part(context.codegen(), function.__qualname__)
-    return compiler.compile_extra(typing, context, _ready(function), parameters, result, flags, {}, library)
+    return compiler.compile_extra(typing, context, _ready(function), parameters, result, flags, {}, library, _Passes)
 
 
 @functools.cache
@@ -248,21 +276,26 @@ def _intrinsic(instruction: Instruction) -> Any:
     hints.pop("builder", None)
     result, parameters = _type(hints.pop("return")), list(hints.values())
     nothing = result is types.void
+    written: dict[str, JITCodeLibrary] = {}
 
     def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         parts = [_taken_apart(context, builder, *each) for each in zip(signature.args, arguments)]
-        function = _function(context, builder.module, parts)
-        value = builder.call(function, list(itertools.chain.from_iterable(parts)))
+        options = sorted(getattr(context.fastmath, "flags", ()))  # numba gives them to all sums and products of a module
+        name = ".".join([write.__module__, write.__qualname__, *options, *(str(len(part)) for part in parts)])
+        values = list(itertools.chain.from_iterable(parts))
+        returned = ir.VoidType() if nothing else context.get_value_type(result)
+        kind = ir.FunctionType(returned, [value.type for value in values])
+        if name not in written:
+            written[name] = _Part(context.codegen(), name)
+            module = written[name].create_ir_module(name)
+            _write(context, ir.Function(module, kind, name), parts)
+            context.post_lowering(module, written[name])
+            written[name].add_ir_module(module)
+        context.active_code_library.add_linking_library(written[name])
+        value = builder.call(cgutils.get_or_insert_function(builder.module, kind, name), values)
         return context.get_dummy_value() if nothing else value
 
-    def _function(context: Any, module: Any, parts: list[list[Any]]) -> Any:
-        options = sorted(getattr(context.fastmath, "flags", ()))  # numba gives them to all sums and products of the module
-        name = ".".join([write.__module__, write.__qualname__, *options, *(str(len(part)) for part in parts)])
-        if name in module.globals:
-            return module.globals[name]
-        returned = ir.VoidType() if nothing else context.get_value_type(result)
-        function = ir.Function(module, ir.FunctionType(returned, [value.type for part in parts for value in part]), name)
-        function.linkage = "linkonce_odr"  # one copy where modules are linked
+    def _write(context: Any, function: Any, parts: list[list[Any]]) -> None:
         if write.__name__ in _SMALL:
             function.attributes.add("optsize")
         builder, given = ir.IRBuilder(function.append_basic_block()), iter(function.args)
@@ -275,7 +308,6 @@ def _intrinsic(instruction: Instruction) -> Any:
         if isinstance(value, tuple):
             value = context.make_tuple(builder, result, value)
         builder.ret_void() if nothing else builder.ret(value)
-        return function
 
     def typed(context: Any, *given: Any) -> Any:
         return result(*(kind if hint is Any else _type(hint) for hint, kind in zip(parameters, given))), call

@@ -508,12 +508,13 @@ def _address(builder: Any, array: Any, offset: int) -> int:
 
 
 class Instructions(NamedTuple):
-    """A program as the kernel takes it; see `contin.functions.program.Program`."""
+    """A program as the kernel takes it; see `contin.functions.program.Program`. ``seed``: of `contin.functions.round_off`."""
 
     code: IndexMatrix
     lists: IndexVector
     scalars: Vector
     tables: Vector
+    seed: int = 0
 
 
 class Points(NamedTuple):
@@ -572,6 +573,35 @@ def evaluate(instructions: Instructions, first: int, last: int, points: Points, 
                 if moving:
                     _give_up(work, lists, row, lanes)
             now += 1
+    if instructions.seed:
+        for i in range(out.shape[0]):
+            for a in range(out.shape[1]):
+                out[i, a] = _moved(out[i, a], instructions.seed)
+        for i in range(jac.shape[0]):
+            for a in range(jac.shape[1]):
+                for b in range(jac.shape[2]):
+                    jac[i, a, b] = _moved(jac[i, a, b], instructions.seed)
+
+
+@instruction
+def _bits(builder: Any, value: float) -> int:
+    return builder.bitcast(value, _WORD)  # type: ignore[no-any-return]
+
+
+@instruction
+def _number_of(builder: Any, bits: int) -> float:
+    return builder.bitcast(bits, _DOUBLE)  # type: ignore[no-any-return]
+
+
+@helper
+def _moved(value, seed):
+    """Return a value moved as `contin.functions.round_off.move` does."""
+    if not SMALLEST_NORMAL <= abs(value) < math.inf:
+        return value
+    bits = _bits(value)
+    mixed = (bits ^ (seed * GOLDEN)) * FIRST_FACTOR
+    mixed = (mixed ^ ((mixed >> 27) & 0x1FFFFFFFFF)) * SECOND_FACTOR
+    return _number_of(bits + ((mixed >> 33) & 0x7FFFFFFF) % 3 - 1)
 
 
 def run(program: Program, points: Any, p: Array, out: Array, jac: Array) -> None:
@@ -579,14 +609,11 @@ def run(program: Program, points: Any, p: Array, out: Array, jac: Array) -> None
     try:
         instructions, room = program.rooms.pop()  # another thread has its own
     except IndexError:
-        instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables)
+        instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables, round_off.SEED)
         room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
     instructions.scalars[program.parameters : program.parameters + p.size] = p
     evaluate(instructions, program.first, program.last, points, room, out, jac)
     program.rooms.append((instructions, room))
-    if round_off.SEED:
-        round_off.move(out)
-        round_off.move(jac)
 
 
 def evaluated(program: Program, u: Array, count: int) -> Array:
@@ -596,6 +623,9 @@ def evaluated(program: Program, u: Array, count: int) -> Array:
     return out
 
 
+#: Factors of the hash, as in `contin.functions.round_off.move`, as signed numbers; the smallest number of full precision.
+GOLDEN, FIRST_FACTOR, SECOND_FACTOR = (factor - 2**64 for factor in round_off.FACTORS)
+SMALLEST_NORMAL = 2.2250738585072014e-308
 #: Codes of the operations that are written in Python.
 POLYGAMMA, TABLE_OF = CODES["polygamma"], CODES["table"]
 #: Bernoulli numbers B_2, B_4, ...

@@ -148,7 +148,7 @@ def instruction(write: Callable[Concatenate[Any, _Parameters], _Result]) -> Call
         def sum(builder: Any, x: float, y: float) -> float:
             return builder.fadd(x, y)
 
-    The body is written once in each module of machine code, as a function that all calls in it share.
+    The body is written once, as a function that all calls share.
     """
     written: Any = Instruction(write)
     return written  # type: ignore[no-any-return]

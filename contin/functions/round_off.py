@@ -17,6 +17,9 @@ from contin.arrays import Array
 #: The number in the environment; 0 leaves values alone.
 SEED = int(os.environ.get("CONTIN_ROUND_OFF") or 0)
 
+#: Factors of the hash (splitmix64).
+FACTORS = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
+
 
 def move(values: Array, seed: int | None = None) -> None:
     """Move numbers of a contiguous array of float or complex numbers in place, by `SEED` or another; zero, inf and NaN stay.
@@ -30,8 +33,8 @@ def move(values: Array, seed: int | None = None) -> None:
     """
     seed = SEED if seed is None else seed
     bits = values.view(np.float64).reshape(-1).view(np.uint64)
-    mixed = (bits ^ np.uint64(seed * 0x9E3779B97F4A7C15 % 2**64)) * np.uint64(0xBF58476D1CE4E5B9)  # splitmix64
-    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    mixed = (bits ^ np.uint64(seed * FACTORS[0] % 2**64)) * np.uint64(FACTORS[1])
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(FACTORS[2])
     numbers = bits.view(np.float64)
     with np.errstate(invalid="ignore"):
         normal = np.isfinite(numbers) & (np.abs(numbers) >= np.finfo(float).tiny)

@@ -18,16 +18,32 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array
+from contin.functions.kernel_parts import Matrix, Stack
 from contin.linalg.elimination import Eliminated, factorize
 from contin.linalg.ends import Ends
 from contin.linalg.layout import Blocks, Layout
 from contin.linalg.segments import Share, run, share
 from contin.linalg.substitution import solve, solve_transposed, work_size
 from contin.linalg.vector import LANES
+
+
+class Factored(NamedTuple):
+    """Where a factored matrix stands. ``corners`` (S, r, k) and ``carried`` (S, n + r, 2 n + k) are those of `factorize`.
+
+    ``first`` and ``last`` are the boundary conditions of the `Blocks`, ``work`` is that of solves, one at a time.
+    """
+
+    factors: Eliminated
+    corners: Stack
+    first: Matrix
+    last: Matrix
+    carried: Stack
+    work: Matrix
 
 
 class Factorization:
@@ -50,6 +66,19 @@ class Factorization:
     """
 
     def __init__(self, layout: Layout, blocks: Blocks) -> None:
+        self._take(layout, blocks)
+        factors, corners, first, last, carried, _ = self.room
+        given = layout, factors, corners, first, last, carried
+        self.sign = math.prod(run(factorize, given, self._whole, (True, False)))
+
+    @classmethod
+    def unfilled(cls, layout: Layout, blocks: Blocks) -> Factorization:
+        """Return one of this shape, with ``room`` in which a kernel factors a matrix; it then sets the ``sign``."""
+        found = cls.__new__(cls)
+        found._take(layout, blocks)
+        return found
+
+    def _take(self, layout: Layout, blocks: Blocks) -> None:
         local, border, corner, first, last = blocks
         intervals, rows, _ = local.shape
         (r, k), (conditions, n) = corner.shape, first.shape
@@ -57,29 +86,23 @@ class Factorization:
         if n + conditions + r != size:
             raise ValueError(f"{conditions} boundary conditions and {r} border rows for {n} states and {k} parameters")
         self._layout, self._whole = layout, share(intervals, local.size)
-        self._factors = Eliminated(
+        eliminated = Eliminated(
             local, border, np.empty((max(intervals - 1, 0), 2 * n + r, n + size)), np.empty((size, size)),
             np.empty((intervals, rows), np.int64), np.empty(size, np.int64),
         )  # fmt: skip
         segments = self._whole.last
-        self._unknowns = intervals * rows + n + k
-        self._work = np.empty((work_size(segments, intervals, rows, n, r, size), LANES))  # of solves, one at a time
-        carried = np.empty((segments, n + r, size))
-        self._left = carried, first, last
+        corners = corner[None] if segments == 1 else np.concatenate([corner[None], np.zeros((segments - 1, r, k))])
+        work = np.empty((work_size(segments, intervals, rows, n, r, size), LANES))
+        self.unknowns = intervals * rows + n + k
+        self.room = Factored(eliminated, corners, first, last, np.empty((segments, n + r, size)), work)
         #: Sign of the determinant up to a factor that depends on the shape only.
-        self.sign: float
-        if segments == 1:
-            self.sign = factorize(layout, self._factors, corner[None], first, last, carried, self._whole)
-        else:
-            corners = np.concatenate([corner[None], np.zeros((segments - 1, r, k))])
-            given = layout, self._factors, corners, first, last, carried
-            self.sign = math.prod(run(factorize, given, self._whole, (True, False)))
+        self.sign = math.nan
 
     @functools.cached_property
     def ends(self) -> Ends | None:
         """What is left between both ends of the mesh; None for a single interval, and for matrices of several segments."""
-        carried, first, last = self._left
-        return Ends(self._factors.chain, carried[0], first, last) if self._whole.last == 1 < len(self._factors.local) else None
+        factors, _, first, last, carried, _ = self.room
+        return Ends(factors.chain, carried[0], first, last) if self._whole.last == 1 < len(factors.local) else None
 
     def solve(self, b: Array) -> Array:
         """Return the x (unknowns,) with J x = b (equations,); for several, rows of x and b (m, ...)."""
@@ -92,16 +115,16 @@ class Factorization:
     def _solved(self, kernel: Callable[[Layout, Eliminated, Array, Array, Array, Share], None], given: Array) -> Array:
         """Return the solutions that a kernel finds for one or several right-hand sides."""
         given = np.ascontiguousarray(given, dtype=float)
-        rows = given.reshape(-1, self._unknowns)
+        rows = given.reshape(-1, self.unknowns)
         result = np.empty(rows.shape)
         if self._whole.last == 1:
-            kernel(self._layout, self._factors, rows, result, self._work, self._whole)
+            kernel(self._layout, self.room.factors, rows, result, self.room.work, self._whole)
         else:
             for first in range(0, len(rows), LANES):
                 these = slice(first, first + LANES)
                 run(
                     kernel,
-                    (self._layout, self._factors, rows[these], result[these], self._work),
+                    (self._layout, self.room.factors, rows[these], result[these], self.room.work),
                     self._whole,
                     (True, False, True),
                 )

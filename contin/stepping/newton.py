@@ -19,21 +19,32 @@ from contin.arrays import Array
 from contin.discretization.protocol import Equations
 from contin.errors import ConvergenceError
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Vector, helper
+from contin.functions.kernel_parts import Vector
+from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
+from contin.stepping.one_call import (
+    CLOSE,
+    CONVERGED,
+    ERROR,
+    EXACT,
+    ITERATIONS,
+    NOT_FINITE,
+    SIGN,
+    STAGNATES,
+    UPDATES,
+    Control,
+    correct_on_mesh,
+)
+from contin.stepping.progress import (
+    CHORDS,
+    ROUND_OFF,
+    diverges,
+    estimated_rate,
+    has_converged,
+    stagnates,
+    wants_jacobian,
+)
 
-#: After a larger update the Jacobian is taken anew, and a first update is trusted no further than this: from there chord steps
-#: converge slowly. Ten times larger changes nothing on the test bank: the estimated rate decides.
-_FAR = 0.1
-#: Chord steps that cost about as much as one factorization. Ten times as many save 7 % of the factorizations on the test bank,
-#: and take more solves; ten times fewer take 49 % more factorizations.
-_CHORDS = 4
-#: Updates that small and no longer shrinking may be round-off: far above that of one solve, far below what an iteration is
-#: worth. They are where round-off of x makes as much.
-_ROUND_OFF = 1e-9
-#: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: then a
-#: few steps reach round-off, where slower ones would take as long as a factorization.
-_CLOSE = 0.03
 #: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
 #: on meshes of many intervals.
 UNITS = 30
@@ -43,9 +54,6 @@ _DRAWS = 3
 _COARSE = 1e-3
 #: Nor is one larger than this on the way: stiff meshes of strips leave 1e-8. Ten times larger, a step could end elsewhere.
 STAGNANT = 1e-6
-#: An update of a few units in the last place: with it x solves the equations as well as any number can.
-_EXACT = 1e-15
-
 #: Returns the size of each unknown at x.
 Sizes = Callable[[Array], Array]
 
@@ -82,12 +90,15 @@ class Corrected:
     iterations : int
     error : float
         Estimated error left, the largest component relative to 1 + |x|.
+    tangent : ndarray, shape (size,), or None
+        The unit tangent right at x, where it was asked for and is at hand; the factors are from there, too.
     """
 
     x: Array
     factors: Factors
     iterations: int
     error: float
+    tangent: Array | None = None
 
 
 def correct(
@@ -98,6 +109,7 @@ def correct(
     newton: Newton = Newton(),
     factors: Factors | None = None,
     sizes: Sizes | None = None,
+    linearize: bool = False,
 ) -> Corrected:
     """Solve F(x) = 0 and row.x = target, starting from ``guess``.
 
@@ -114,6 +126,9 @@ def correct(
         ``sizes(x)`` returns the size of each unknown. Where it is given, the last update is also small relative to these, or as
         small as round-off of x allows: for unknowns that are not known to be of order one.
 
+    linearize : bool
+        The tangent right at the solution is wanted, if it costs no further call.
+
     Raises
     ------
     ConvergenceError
@@ -126,10 +141,59 @@ def correct(
     >>> print(round(correct(Algebraic(circle, []), [1.0]).x[0], 12))
     0.8
     """
+    in_one_call = sizes is None and getattr(system, "workspace", None) is not None
     if factors is not None:
         with contextlib.suppress(ConvergenceError):
-            return _chords(system, guess, row, target, newton, factors)
-    return _newton(system, guess, row, target, newton, sizes)
+            if in_one_call and isinstance(factors, Factorization) and factors.unknowns == len(guess):
+                done = _in_one_call(system, guess, row, target, newton, False, factors)
+            else:
+                done = _chords(system, guess, row, target, newton, factors)
+            if done is not None:
+                return done
+    done = _in_one_call(system, guess, row, target, newton, linearize) if in_one_call else None
+    return _newton(system, guess, row, target, newton, sizes) if done is None else done
+
+
+def _in_one_call(
+    system: Any,
+    guess: Sequence[float] | Array,
+    row: Array | None,
+    target: float,
+    newton: Newton,
+    linearize: bool,
+    near: Factorization | None = None,
+) -> Corrected | None:
+    """Return what a kernel comes to, by chord steps with factors from ``near`` by if these are given.
+
+    None where Python must decide whether updates are round-off.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    codes, mesh, values = system.workspace
+    if (row is None) != (system.size == system.equations):
+        return None
+    conditions, targets = system.linear_conditions
+    own = len(targets)
+    values.rows[:own], values.targets[:own] = conditions, targets
+    if row is not None:
+        values.rows[own], values.targets[own] = row, target
+    x, report = np.array(guess, dtype=float), np.empty(UPDATES + max(newton.max_iterations, CHORDS))
+    factors = system.unfilled_factors() if near is None else near
+    tangent, control = np.empty(x.size), Control(newton.tolerance, newton.max_iterations, near is not None, linearize)
+    done = correct_on_mesh(codes, mesh, values, factors.room, control, x, system.weights, tangent, report)
+    iterations, error = int(report[ITERATIONS]), float(report[ERROR])
+    if near is None:
+        factors.sign = float(report[SIGN])
+    if done == CONVERGED:
+        return Corrected(x, factors, iterations, error, tangent if linearize else None)
+    if done == NOT_FINITE:
+        raise ConvergenceError("the equations are not finite at the corrected point")
+    updates = report[UPDATES : UPDATES + iterations].tolist()
+    if done == STAGNATES or (near is None and updates[-1] <= STAGNANT):
+        return None
+    raise _failure(updates)
 
 
 def _newton(
@@ -151,7 +215,7 @@ def _newton(
             if not math.isfinite(size):
                 break
             progress.record(size, fresh)
-            if progress.converged or (progress.stagnates and _is_noise(system, x, update, rows, _ROUND_OFF)):
+            if progress.converged or (progress.stagnates and _is_noise(system, x, update, rows, ROUND_OFF)):
                 relative = 0.0 if sizes is None else _relative(update, sizes(x))
                 if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
                     return Corrected(x, factors, len(progress.sizes), progress.error)
@@ -315,46 +379,6 @@ class _Progress:
         return wants_jacobian(self.sizes[-1], self.rate, self.tolerance)
 
 
-@helper
-def estimated_rate(size: float, before: float, moved: float, fresh: bool) -> float:
-    """Return the estimated ratio of the error after an update to its size.
-
-    ``before`` is the size of the update before, infinite without one; ``moved`` the distance from where the Jacobian was taken,
-    which is ``fresh`` where it is the one of this update.
-    """
-    if before == math.inf:  # nothing is known of how nonlinear the equations are
-        return min(moved, _FAR) if fresh else 1.0
-    ratio = size / before
-    if fresh:  # quadratic: with a fresh Jacobian the next update is about the square of this one
-        return min(1.0, max(size, ratio * min(1.0, ratio)))
-    return max(min(moved, 1.0), ratio / (1 - ratio)) if ratio < 0.5 else 1.0
-
-
-@helper
-def has_converged(size: float, rate: float, updates: int, tolerance: float) -> bool:
-    """Return whether the error after so many updates is below the tolerance, and another update has confirmed that."""
-    return (updates > 1 or size <= tolerance) and size * rate <= tolerance
-
-
-@helper
-def stagnates(size: float, rate: float, updates: int) -> bool:
-    """Return whether small updates no longer shrink."""
-    return size < _ROUND_OFF and updates > 1 and rate >= 0.5
-
-
-@helper
-def diverges(size: float, before: float) -> bool:
-    """Return whether an update is more than twice the one before."""
-    return size > 2 * before > _ROUND_OFF
-
-
-@helper
-def wants_jacobian(size: float, rate: float, tolerance: float) -> bool:
-    """Return whether the next update is better made with a new Jacobian."""
-    far = size > _FAR or not rate < 0.5
-    return far or (rate > 0 and math.log(tolerance / size) < _CHORDS * math.log(rate))
-
-
 def _chords(
     system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, factors: Factors
 ) -> Corrected:
@@ -368,13 +392,13 @@ def _chords(
     x = np.array(guess, dtype=float)
     sizes: list[float] = []
     with np.errstate(all="ignore"):
-        while len(sizes) < _CHORDS:
+        while len(sizes) < CHORDS:
             residual = system.residual(x)
             update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
             sizes.append(_move(x, update))
-            if sizes[-1] <= _EXACT:
+            if sizes[-1] <= EXACT:
                 return Corrected(x, factors, len(sizes), sizes[-1])
-            if not sizes[-1] < _CLOSE * (sizes[-2] if len(sizes) > 1 else 1.0):
+            if not sizes[-1] < CLOSE * (sizes[-2] if len(sizes) > 1 else 1.0):
                 break
             if len(sizes) > 1:
                 ratio = sizes[-1] / sizes[-2]

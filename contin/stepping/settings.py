@@ -48,12 +48,13 @@ class Settings:
     errors : bool
         Solve labelled points again on the mesh halved, until that changes them by less than the mesh tolerance: the last change
         is their error estimate.
-    angle : float
-        Largest angle between the tangents of consecutive points, radians.
+    angle : float, optional
+        Largest angle between the tangents of consecutive points, radians. By default 0.35, and 0.7 for cycles.
     change : float
         Largest change of any free parameter p in one step, as a fraction of 1 + |p|.
-    accuracy : float
-        Distance between predicted and corrected point that the step aims at, as a fraction of the step.
+    accuracy : float, optional
+        Distance between predicted and corrected point that the step aims at, as a fraction of the step. By default 0.02, and
+        0.05 for cycles.
     scales : mapping of str to float
         Sizes of states and parameters, where those that the first point shows are not typical. Only those far from one matter.
     newton, mesh :
@@ -83,9 +84,9 @@ class Settings:
     folds: bool = True
     branch_points: bool = True
     errors: bool = True
-    angle: float = 0.35
+    angle: float | None = None
     change: float = 0.4
-    accuracy: float = 0.02
+    accuracy: float | None = None
     newton: Newton = field(default_factory=Newton)
     mesh: MeshControl = field(default_factory=MeshControl)
     test_functions: Sequence[TestFunction] = ()
@@ -120,7 +121,8 @@ class Settings:
             raise ProblemError(f"step: {exact_text(self.step)} must lie between {bounds}")
         checks.whole("max_points", self.max_points, 1, 10**9)
         for name in ("angle", "accuracy", "change"):
-            checks.number(name, getattr(self, name), 0, 1.5)
+            if name == "change" or getattr(self, name) is not None:
+                checks.number(name, getattr(self, name), 0, 1.5)
 
     def _check_columns(self) -> None:
         for name, size in checks.mapping("scales", self.scales, "positive numbers").items():
@@ -151,9 +153,9 @@ class Options(TypedDict, total=False):
     folds: bool
     branch_points: bool
     errors: bool
-    angle: float
+    angle: float | None
     change: float
-    accuracy: float
+    accuracy: float | None
     newton: Newton
     mesh: MeshControl
     test_functions: Sequence[TestFunction]

@@ -21,7 +21,8 @@ from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.functions.program import Program
 from contin.linalg.small import factor_small, solve_small
-from contin.stepping.newton import STAGNANT, Newton, diverges, estimated_rate, has_converged, stagnates, wants_jacobian
+from contin.stepping.newton import STAGNANT, Newton
+from contin.stepping.progress import diverges, estimated_rate, has_converged, stagnates, wants_jacobian
 
 #: What came of it: a point or step to be believed; none; one that is not decided here.
 BELIEVED, FAILED, ASKS = range(3)

@@ -20,6 +20,7 @@ from contin.functions.kernel_parts import ReadOnlyVector, Vector, helper
 from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
 from contin.stepping.newton import Corrected, Newton, correct
+from contin.stepping.settings import Settings
 from contin.stepping.small import corrected_small
 from contin.stepping.state import State
 from contin.stepping.trial import Linearization, Trial, linearization, linearization_of
@@ -44,6 +45,12 @@ _MISSED = 0.75
 _NOISE = 1e-12
 #: Smallest angle and rate, in place of zero where they are divided by.
 _NO_ANGLE, _NO_RATE = 1e-12, 1e-300
+
+
+def aims(settings: Settings, system: Discretization) -> tuple[float, float]:
+    """Return the largest angle between tangents, and the part of a step by which it aims to miss its prediction."""
+    angle, accuracy = system.aims
+    return settings.angle or angle, settings.accuracy or accuracy
 
 
 def predict(state: State, step: float) -> Array:
@@ -94,7 +101,8 @@ def corrected(state: State, guess: Array, step: float, newton: Newton) -> Trial:
     if small is not None:
         linear = Linearization(small.tangent, small.sign, DenseFactors(small.matrix))
         return Trial(state.system, small.x, linear, small.iterations, small.error)
-    return trial_of(state.system, _corrected(state, guess, step, newton), row)
+    done = correct(state.system, guess, row, row @ state.x + step, newton, linearize=True)
+    return trial_of(state.system, done, row)
 
 
 def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
@@ -105,6 +113,9 @@ def trial_of(system: Discretization, done: Corrected, row: Array) -> Trial:
     ConvergenceError
         The equations are not finite there.
     """
+    if done.tangent is not None:
+        linear = Linearization(done.tangent, done.factors.sign, done.factors)
+        return Trial(system, done.x, linear, done.iterations, done.error)
     residual, factors = system.linearize(done.x, (row,))
     if not np.isfinite(residual).all():
         raise ConvergenceError("the equations are not finite at the corrected point")
@@ -124,13 +135,9 @@ def located(state: State, guess: Array, step: float, newton: Newton, factors: Fa
     small = corrected_small(state.system, guess, row, row @ state.x + step, newton)
     if small is not None:
         return Trial(state.system, small.x, Linearization(small.tangent, small.sign), small.iterations, small.error)
-    done, system = _corrected(state, guess, step, newton, factors), state.system
+    system = state.system
+    done = correct(system, guess, row, row @ state.x + step, newton, factors)
     return Trial(system, done.x, lambda: linearization(system, done.x, row), done.iterations, done.error)
-
-
-def _corrected(state: State, guess: Array, step: float, newton: Newton, factors: Factors | None = None) -> Corrected:
-    row = state.row
-    return correct(state.system, guess, row, row @ state.x + step, newton, factors)
 
 
 class Judgement(NamedTuple):

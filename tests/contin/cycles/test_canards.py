@@ -142,11 +142,12 @@ def test_a_branch_that_bends_within_a_shorter_way_than_the_smallest_step():
     problem = AlgebraicProblem(oregonator, ["x", "z"], {"f": 0.3, "eps": 0.04, "q": 8e-4})
     rest = contin.trace(contin.solve(problem, [0.7, 0.7]), free=["f"], limits={"f": (0.2, 1)})
     (hopf,) = rest.labelled("HB")
-    branch = contin.trace(hopf, branch=1, limits={"f": (0.2, 1)}, max_points=65)
+    steps = {"angle": 0.35, "accuracy": 0.02}  # with longer ones the canards are passed at once
+    branch = contin.trace(hopf, branch=1, limits={"f": (0.2, 1)}, max_points=65, **steps)
     assert branch.stop.reason == "max points"
     (note,) = branch.notes
     assert note.startswith("from f = 0.5125426") and "steps below 1e-06 are taken" in note
     periods, highest = branch.column("period"), branch.column("max_x")[1:]
     assert 0 < periods.argmax() < len(periods) - 1 and np.all(np.diff(highest) > -1e-11 * highest[1:])  # within Newton's error
-    held = contin.trace(hopf, branch=1, limits={"f": (0.2, 1)}, max_points=90, min_step=1e-5)
+    held = contin.trace(hopf, branch=1, limits={"f": (0.2, 1)}, max_points=90, min_step=1e-5, **steps)
     assert held.stop.reason == "no convergence" and not held.notes  # one that was set is kept
