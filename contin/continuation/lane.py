@@ -73,8 +73,9 @@ def _control(settings: Settings, system: Algebraic, primary: int) -> Control:
     """Return the settings as the kernel takes them."""
     newton, (angle, accuracy) = settings.newton, aims(settings, system)
     return Control(
-        newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step, settings.max_step, primary
-    )
+        newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step,
+        settings.max_step, primary,
+    )  # fmt: skip
 
 
 class Lane:
@@ -109,7 +110,8 @@ class Lane:
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         (before, quotient, work), (real, imaginary) = np.empty((3, size, size)), np.empty((2, 1, size))
         self._rooms = (
-            equations, linear_of(size), Attempt(np.empty(size), np.empty(6), np.empty(LENGTH + 1)), _control(settings, system, primary),
+            equations, linear_of(size), Attempt(np.empty(size), np.empty(6), np.empty(LENGTH + 1)),
+            _control(settings, system, primary),
             Watch(
                 int(settings.branch_points), int(eigenvalues), int(noisy),
                 np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),

@@ -645,8 +645,11 @@ class Continuation:
         """
         settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
         angle, accuracy = aims(settings, state.system)
-        order = 2 if state.previous_tangent is None else 3
-        longest, free = settings.max_step, slice(state.system.state_size, None)
+        order, longest, free = (
+            2 if state.previous_tangent is None else 3,
+            settings.max_step,
+            slice(state.system.state_size, None),
+        )
         for value, rate in zip(trial.x[free].tolist(), trial.tangent[free].tolist()):
             longest = longest_step(longest, settings.change, value, rate)
         following = following_step(step, judgement.missed, judgement.turn, order, accuracy, angle, settings.min_step, longest)

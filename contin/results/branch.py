@@ -22,8 +22,7 @@ class Branch:
     """The points of one branch in order, and why its run ended.
 
     ``notes`` tell what was seen and not understood, with the place: special points that were bracketed and not located, or not
-    found again on a finer mesh; a change of the index, or of the number of unstable eigenvalues, that the labelled points do
-    not explain. Empty on most branches.
+    found again on a finer mesh; a change of the index that the labelled points do not explain. Empty on most branches.
 
     Examples
     --------

@@ -23,8 +23,10 @@ from contin.functions.kernel_parts import Vector
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.stepping.one_call import (
+    CLOSE,
     CONVERGED,
     ERROR,
+    EXACT,
     ITERATIONS,
     NOT_FINITE,
     SIGN,
@@ -33,10 +35,8 @@ from contin.stepping.one_call import (
     Control,
     correct_on_mesh,
 )
-from contin.stepping.updates import (
+from contin.stepping.progress import (
     CHORDS,
-    CLOSE,
-    EXACT,
     ROUND_OFF,
     diverges,
     estimated_rate,

@@ -18,7 +18,13 @@ from contin.linalg.condensation import Factored
 from contin.linalg.elimination import factorize
 from contin.linalg.layout import Blocks
 from contin.linalg.substitution import solve
-from contin.stepping.updates import CHORDS, CLOSE, EXACT, diverges, estimated_rate, has_converged, stagnates, wants_jacobian
+from contin.stepping.progress import CHORDS, diverges, estimated_rate, has_converged, stagnates, wants_jacobian
+
+#: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: then a
+#: few steps reach round-off, where slower ones would take as long as a factorization.
+CLOSE = 0.03
+#: An update of a few units in the last place: with it x solves the equations as well as any number can.
+EXACT = 1e-15
 
 #: What a call comes to: converged; updates no longer shrink; no convergence; the equations are not finite at x.
 CONVERGED, STAGNATES, FAILED, NOT_FINITE = range(4)

@@ -22,7 +22,7 @@ from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, he
 from contin.functions.program import Program
 from contin.linalg.small import factor_small, solve_small
 from contin.stepping.newton import STAGNANT, Newton
-from contin.stepping.updates import diverges, estimated_rate, has_converged, stagnates, wants_jacobian
+from contin.stepping.progress import diverges, estimated_rate, has_converged, stagnates, wants_jacobian
 
 #: What came of it: a point or step to be believed; none; one that is not decided here.
 BELIEVED, FAILED, ASKS = range(3)

@@ -131,10 +131,11 @@ def located(state: State, guess: Array, step: float, newton: Newton, factors: Fa
     ------
     ConvergenceError
     """
-    system, row = state.system, state.row
-    small = corrected_small(system, guess, row, row @ state.x + step, newton)
+    row = state.row
+    small = corrected_small(state.system, guess, row, row @ state.x + step, newton)
     if small is not None:
-        return Trial(system, small.x, Linearization(small.tangent, small.sign), small.iterations, small.error)
+        return Trial(state.system, small.x, Linearization(small.tangent, small.sign), small.iterations, small.error)
+    system = state.system
     done = correct(system, guess, row, row @ state.x + step, newton, factors)
     return Trial(system, done.x, lambda: linearization(system, done.x, row), done.iterations, done.error)
 
