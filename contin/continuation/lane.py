@@ -22,6 +22,7 @@ from contin.continuation.plain import (
     Control,
     Path,
     Quotient,
+    Rooms,
     Watch,
     plain_steps,
 )
@@ -109,7 +110,7 @@ class Lane:
         closing = np.where(np.append(system.circles, np.zeros(size - n)) > 0, 0.0, system.weights)
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         (before, quotient, work), (real, imaginary) = np.empty((3, size, size)), np.empty((2, 1, size))
-        self._rooms = (
+        self._rooms = Rooms(
             equations, linear_of(size), Attempt(np.empty(size), np.empty(6), np.empty(LENGTH + 1)),
             _control(settings, system, primary),
             Watch(
@@ -129,7 +130,7 @@ class Lane:
         path.x[1], path.tangents[1] = state.x, state.tangent
         path.tangents[0] = state.previous_tangent if bent else 0.0
         path.numbers[1] = state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0
-        made = plain_steps(*self._rooms, path, state.accepted, int(bent))
+        made = plain_steps(self._rooms, path, state.accepted, int(bent))
         trials = self._trials(path, made) if self._others or self.system.problem.functionals else []
         return Block(self.system, state, path, self._passed(trials, made), trials)
 

@@ -109,6 +109,18 @@ class Path(NamedTuple):
     numbers: Matrix
 
 
+class Rooms(NamedTuple):
+    """All that the kernel works with and in, but for the path."""
+
+    equations: Equations
+    linear: Linear
+    attempt: Attempt
+    control: Control
+    watch: Watch
+    quotient: Quotient
+    spectra: Spectra
+
+
 @helper
 def _attempted(
     equations: Equations, linear: Linear, attempt: Attempt, control: Control, path: Path, number: int, bend: float, step: float
@@ -172,11 +184,9 @@ def _made(
 
 
 @helper
-def _asks(
-    equations: Equations, linear: Linear, attempt: Attempt, control: Control, watch: Watch, quotient: Quotient, path: Path,
-    accepted: int, number: int, step: float,
-) -> bool:  # fmt: skip
+def _asks(rooms: Rooms, path: Path, accepted: int, number: int, step: float) -> bool:
     """Return whether an entry of the watch list asks for a closer look: all but those of eigenvalues."""
+    equations, linear, attempt, control, watch, quotient, _ = rooms
     x, new, had, size = path.x[number - 1], path.x[number], path.numbers[number - 1], path.x.shape[1]
     if had[SIGN_OF] != linear.found[SIGN]:
         return True
@@ -265,14 +275,12 @@ def _accept(
 
 
 @kernel(reorder=False, last=True)
-def plain_steps(
-    equations: Equations, linear: Linear, attempt: Attempt, control: Control, watch: Watch, quotient: Quotient,
-    spectra: Spectra, path: Path, accepted: int, bent: int,
-) -> int:  # fmt: skip
+def plain_steps(rooms: Rooms, path: Path, accepted: int, bent: int) -> int:
     """Make plain steps from row 1 of the path, up to its end or the first step that asks; return how many.
 
     ``accepted`` is the number of regular points up to row 1, ``bent`` 1 where row 0 has a tangent.
     """
+    equations, linear, attempt, control, watch, quotient, spectra = rooms
     evaluate_slopes(equations, path.x[1])
     fill_matrix(equations, path.tangents[1], linear.matrix)
     if watch.eigenvalues and fill_spectrum(equations, spectra, LAST):
@@ -290,7 +298,7 @@ def plain_steps(
             spectra.real[FIRST, i], spectra.imaginary[FIRST, i] = spectra.real[LAST, i], spectra.imaginary[LAST, i]
         bend = 0.5 / had[STEP] if number > 2 or bent else 0.0
         step = _made(equations, linear, attempt, control, watch, path, number, bend)
-        if step == 0.0 or _asks(equations, linear, attempt, control, watch, quotient, path, accepted, number, step):
+        if step == 0.0 or _asks(rooms, path, accepted, number, step):
             return number - 2
         if watch.eigenvalues and _eigenvalues_ask(equations, attempt, spectra, path, number, step):
             return number - 2

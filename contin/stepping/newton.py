@@ -171,7 +171,8 @@ def _in_one_call(
     ------
     ConvergenceError
     """
-    codes, mesh, values = system.workspace
+    work = system.workspace
+    values = work.values
     if (row is None) != (system.size == system.equations):
         return None
     conditions, targets = system.linear_conditions
@@ -182,7 +183,7 @@ def _in_one_call(
     x, report = np.array(guess, dtype=float), np.empty(UPDATES + max(newton.max_iterations, CHORDS))
     factors = system.unfilled_factors() if near is None else near
     tangent, control = np.empty(x.size), Control(newton.tolerance, newton.max_iterations, near is not None, linearize)
-    done = correct_on_mesh(codes, mesh, values, factors.room, control, x, system.weights, tangent, report)
+    done = correct_on_mesh(work, factors.room, control, x, system.weights, tangent, report)
     iterations, error = int(report[ITERATIONS]), float(report[ERROR])
     if near is None:
         factors.sign = float(report[SIGN])

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from contin.discretization.assembly import Bordering, assemble, at_points, collocate
-from contin.discretization.workspace import Codes, Mesh, Values
+from contin.discretization.workspace import Workspace
 from contin.functions.interpreter import Points, evaluate
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Vector, helper
@@ -214,13 +214,10 @@ def _linearize(codes, mesh, room, matrix, x, weights, tangent, report):
 
 @kernel(reorder=False)
 def correct_on_mesh(
-    codes: Codes, mesh: Mesh, room: Values, matrix: Factored, control: Control, x: Vector, weights: Vector, tangent: Vector,
-    report: Vector,
-) -> int:  # fmt: skip
-    """Correct x in place; return what it came to, with the numbers in the ``report``.
-
-    The last of ``room.rows`` and ``room.targets`` is the condition that makes the equations square on a curve.
-    """
+    work: Workspace, matrix: Factored, control: Control, x: Vector, weights: Vector, tangent: Vector, report: Vector
+) -> int:
+    """Correct x in place; return what it came to, with the numbers in the ``report``."""
+    codes, mesh, room = work
     if control.chords:
         done: int = _chord_steps(codes, mesh, room, matrix, x, control.tolerance, report)
     else:
