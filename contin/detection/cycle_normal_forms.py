@@ -170,7 +170,8 @@ class NormalForms:
 
     def _along(self, *directions: Any) -> Any:
         """Return B or C along directions at the Gauss points, real or complex."""
-        return of_complex(lambda parts: self.system.rates_along(self.x, parts), directions)
+        along = self.system.rates_along
+        return of_complex(lambda stacks: np.array([along(self.x, parts) for parts in zip(*stacks)]), directions)
 
     def _apply(self, v: Array) -> Array:
         """Return J v."""

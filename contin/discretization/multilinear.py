@@ -31,7 +31,8 @@ def of_complex(form: Callable[[Sequence[Array]], Array], vectors: Sequence[Any])
     parts = [[(1.0, vector)] if np.isrealobj(vector) else [(1.0, vector.real), (1j, vector.imag)] for vector in vectors]
     every = list(itertools.product(*parts))
     factors = np.array([math.prod(factor for factor, _ in chosen) for chosen in every])
-    return factors @ form([np.array(stack) for stack in zip(*([vector for _, vector in chosen] for chosen in every))])
+    stacks = [np.array(stack) for stack in zip(*([vector for _, vector in chosen] for chosen in every))]
+    return np.tensordot(factors, form(stacks), axes=1)
 
 
 def of_lines(form: Callable[[Array], Array], directions: Sequence[Array]) -> Array:
