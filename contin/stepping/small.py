@@ -82,13 +82,13 @@ SIGN, UPDATES, ERROR = range(3)
 def recorded(program: Program) -> Recorded:
     """Return a program with registers of its own."""
     room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
-    instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables)
+    instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables, round_off.SEED)
     return Recorded(instructions, program.first, program.last, room, program.parameters)
 
 
 def equations_of(system: Any) -> Equations | None:
     """Return the equations of a small problem whose functions are recorded, of a map with one round; None of others."""
-    if type(system) not in (Algebraic, MapSystem) or system.size > _SMALL or round_off.SEED:
+    if type(system) not in (Algebraic, MapSystem) or system.size > _SMALL:
         return None
     problem, is_map = system.problem, isinstance(system, MapSystem)
     batch = problem.batch("map" if is_map else "residual")
