@@ -22,8 +22,8 @@ _JUMP = 1e-3
 #: Part of the first bracket in which a function has come down to `_JUMP` of its values, even with the slope of a cube root, or
 #: jumps. Ten times larger saves three evaluations of 30 where it jumps, and takes such a root for a jump.
 _CLOSED = _JUMP**3
-#: A value at one end below this part of that at the other is round-off of zero.
-_NOISE = 1e-13
+#: A value at one end below this part of that at the other is round-off of zero: it is 3e-13 of eigenvalues of sparse matrices.
+_NOISE = 1e-11
 #: A zero takes 4 evaluations on average; where as many as bisection to round-off would need do not do, the function jumps.
 _MOST_EVALUATIONS = 60
 
