@@ -103,7 +103,7 @@ class Kernel:
         if found is not None:
             return found
         _share_work()
-        others = _by_length(other for other in _PENDING if other is not self and "code" not in vars(other))
+        others = _by_length(other for other in _shared() if other is not self and "code" not in vars(other))
         while True:
             found = self._made()
             if found is not None:
@@ -171,14 +171,19 @@ def kernel(function: Any = None, *, reorder: bool = True, last: bool = False) ->
 _PENDING: list[Kernel] = []
 #: Seconds between two looks whether another process has made what this one waits for.
 _WAIT = 0.05
-#: Kernels of these modules are worth a second process.
+#: Kernels of these modules are made by two processes.
 _PACKAGE = __name__.partition(".")[0] + "."
+
+
+def _shared() -> list[Kernel]:
+    """Return the engine's kernels that are not made yet; others may be wrong, and are made where they are called."""
+    return [each for each in _PENDING if each.name.startswith(_PACKAGE)]
 
 
 @functools.cache
 def _share_work() -> subprocess.Popen[bytes] | None:
     """Start a process that makes machine code of the package's kernels as well; say that there is something to wait for."""
-    modules = dict.fromkeys(each.function.__module__ for each in _PENDING if each.name.startswith(_PACKAGE))
+    modules = dict.fromkeys(each.function.__module__ for each in _shared())
     if not modules:
         return None
     if sys.stderr is not None and sys.stderr.isatty():

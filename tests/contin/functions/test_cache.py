@@ -80,8 +80,7 @@ def test_code_of_another_key_under_the_same_name_is_not_taken(kernel, tmp_path):
     assert other(X, 2) == 12.0
 
 
-def test_a_kernel_that_another_process_makes_is_waited_for(kernel, monkeypatch):
-    monkeypatch.setattr(kernels, "_PENDING", [])  # whoever waits makes others meanwhile, and some of other tests are wrong
+def test_a_kernel_that_another_process_makes_is_waited_for(kernel):
     kernel()(X, 2)
     key, path = kernel().key, cache.cache_directory() / f"k{kernel().key}.bin"
     made = path.read_bytes()
