@@ -59,15 +59,10 @@ def lane_of(
     if equations is None or settings.trivial is not None:
         return None
     known: Any = system
-    others = [test for test in tests if test not in own and not _is_held(test, known)]
+    others = [test for test in tests if test not in own and not test.holds_one_of(system.free)]
     if any(test.search or test.asks or test.looks for test in others):
         return None
     return Lane(known, equations, settings, start, tests, others, bool(own), noisy)
-
-
-def _is_held(test: TestFunction, system: Discretization) -> bool:
-    """Return whether a test function is that of a value of a free parameter."""
-    return test.value is not None and test.column in system.free
 
 
 def _control(settings: Settings, system: Algebraic, primary: int) -> Control:
@@ -103,7 +98,7 @@ class Lane:
     ) -> None:  # fmt: skip
         self.system, self.settings, self.noisy, self._others = system, settings, noisy, others
         size, n = system.size, system.state_size
-        held = [test for test in tests if _is_held(test, system)]
+        held = [test for test in tests if test.holds_one_of(system.free)]
         ends = np.array([settings.limits.get(name, (-np.inf, np.inf)) for name in system.free], dtype=float)
         sides = [(1.0 if test.value == settings.limits[test.column][1] else -1.0) if test.limit else 0.0 for test in held]
         home, x, _ = start

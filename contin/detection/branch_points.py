@@ -26,8 +26,6 @@ from contin.stepping.trial import Trial, sign_changed
 #: How far outside a step, as a part of it, a branch point may be found that changes the determinant's sign inside it: places
 #: of branch points are known to about the square root of round-off there.
 _OUTSIDE = 1e-6
-#: A branch point further off the cubic than this part of the step is another one.
-_OFF = 0.1
 #: A branch point that the curve passes at a larger distance is none: the branches do not cross. A mesh that is not symmetric
 #: parts them by the root of its error; ten times smaller, such branch points of coarse meshes would be lost.
 _GAP = 1e-2
@@ -129,7 +127,7 @@ class BranchPointSearch:
                 found = locate_branch_point(state.system, segment.guess(middle), segment.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
                 inside = segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
-                if inside and found.gap < self._gap and segment.distance(found.x, at) < _OFF * step:
+                if inside and found.gap < self._gap and segment.passes_by(found.x, at):
                     found = found.along(state.system, segment.direction(at))
                     return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:

@@ -28,8 +28,6 @@ from contin.problems.cycle import PERIOD
 from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial
 
-#: The Hopf point lies no further off the cubic through both ends of the step than this part of the step; branch points neither.
-_OFF = 0.1
 #: Smallest size of a cycle as a part of that before the step. A branch that ends at a Hopf point is this near to it at the end
 #: of a step by chance only, and the step is halved then; Newton's method that falls onto an equilibrium is nearer by far.
 _COLLAPSED = 1e-3
@@ -72,7 +70,7 @@ def _of_cycles(system: CycleCollocation, segment: Segment) -> SpecialPoint | Non
         x, frequency, error = _hopf_point(system, segment.guess(at))
     except ConvergenceError:
         return None
-    if not segment.distance(x, at) < _OFF * segment.step:
+    if not segment.passes_by(x, at):
         return None
     stop = Stop("Hopf", "the cycles shrink onto an equilibrium, a Hopf point")
     there, details = Trial.without_tangent(system, x), {"frequency": frequency, "pairs": 1}

@@ -56,8 +56,6 @@ _BESIDE = 1e-4
 #: The branch point where a branch ends on the trivial one has the trivial quantity at zero to this part of its values at the
 #: ends of the step; another branch point inside the step has not.
 _TRIVIAL = 1e-6
-#: It lies no further off the cubic through both ends of the step than this part of the step, as other branch points.
-_OFF = 0.1
 _STRAYS = "the determinant changes its sign, and no branch point was found"
 _ADVICE = "a smaller max_step or accuracy, or more intervals may help"
 #: A branch can close on its first point after this many regular points.
@@ -322,7 +320,7 @@ class Inspection:
         zero = max(_TRIVIAL * largest, round_off(point.trial, name, segment.newton))
         if not point.is_located or abs(point.trial[name]) > zero:
             return False
-        return segment.distance(point.trial.x, point.at) < _OFF * segment.step
+        return segment.passes_by(point.trial.x, point.at)
 
     def may_close(self) -> bool:
         """Return whether the first point of the run may lie in this step."""

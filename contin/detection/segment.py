@@ -26,7 +26,7 @@ from contin.stepping.trial import Linearization, TestFunction, Trial, linearizat
 _PRECISE, _SHARE = 1e-12, 1e-2
 #: Part of a step to which the place is known from which Newton's method begins that holds an unknown: it does the rest.
 _ROUGH = 1e-3
-#: What that finds lies no further off the cubic than this part of the step, as branch points do.
+#: Points of the curve lie no further off the cubic than this part of the step; others belong to another branch.
 _OFF = 0.1
 #: Least cosine between the tangents at both ends that the cubic is made with: accepted steps turn by less.
 LEAST_COSINE = 0.1
@@ -154,10 +154,10 @@ class Segment:
         a, b = state.tangent * step, trial.tangent * rate
         return np.array([state.x, a, 3 * ahead - 2 * a - b, a + b - 2 * ahead])
 
-    def distance(self, x: Array, at: float) -> float:
-        """Return how far x is from the cubic at a distance along the state's tangent."""
+    def passes_by(self, x: Array, at: float) -> bool:
+        """Return whether x lies near the cubic at a distance along the state's tangent, and not on another branch."""
         gap = x - self.guess(at)
-        return float(np.sqrt(inner(self.state.system, gap, gap)))
+        return float(np.sqrt(inner(self.state.system, gap, gap))) < _OFF * self.step
 
     def guessed(self, distance: float) -> Trial:
         """Return the cubic at a distance as a trial, with the state's tangent."""
@@ -187,8 +187,8 @@ class Segment:
         (a, first), (b, last) = left, right
         ends, name = (first.value(test), last.value(test)), test.name
         try:
-            if test.value is not None and test.column in first.system.free and ends[0] * ends[1] < 0:
-                held = self._held(test.column, test.value, left, right)
+            if test.holds_one_of(first.system.free) and ends[0] * ends[1] < 0:
+                held = self._held(test, left, right)
                 if held is not None:
                     return SpecialPoint(held[0], test.label, name, held[1], stop_of(test), None, test)
             if np.sign(ends[0]) == np.sign(ends[1]) or ends[0] == 0:  # a limit that the run starts on
@@ -201,14 +201,15 @@ class Segment:
         details = None if test.describe is None else test.describe(there)
         return SpecialPoint(at, test.label, name, there, stop_of(test), details, test)
 
-    def _held(self, name: str, value: float, left: Place, right: Place) -> Place | None:
+    def _held(self, test: TestFunction, left: Place, right: Place) -> Place | None:
         """Return the place between two where a free parameter has a value, with that held; None if it is not found.
 
         It begins where the cubic has the value. It finds no other place than one between the two, near the cubic.
         """
+        assert test.value is not None
         state, system = self.state, self.state.system
-        at = system.parameter_index(name)
-        value /= system.free_scales[at - system.state_size]
+        at = system.parameter_index(test.column)
+        value = test.value / system.free_scales[at - system.state_size]
         one, two, three, four = self._cubic[:, at].tolist()
 
         def gap(distance: float) -> float:
@@ -225,7 +226,7 @@ class Segment:
         except ConvergenceError:
             return None
         place = inner(system, state.tangent, there.x - state.x)
-        inside = left[0] < place < right[0] and self.distance(there.x, place) < _OFF * self.step
+        inside = left[0] < place < right[0] and self.passes_by(there.x, place)
         if not inside or (self.settles and system.on_switches(there.x) is not None):
             return None
         return place, there

@@ -39,7 +39,7 @@ def watch_list(
     fold, index : TestFunction, optional
         The rate of the primary parameter, and the index of a variational problem.
     """
-    held = [test for test in tests if test.value is not None and test.column in system.free]
+    held = [test for test in tests if test.holds_one_of(system.free)]
     entries: list[Entry] = [_determinant(settings.branch_points), Inspection.may_close]
     entries += [_value(system.free.index(test.column), test) for test in held]
     entries += [_sign(test) for test in tests if test not in held]

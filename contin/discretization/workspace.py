@@ -7,40 +7,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.discretization.assembly import Tables
-from contin.functions import round_off
 from contin.functions.batch import Batch
-from contin.functions.interpreter import LANES, Instructions, Room
+from contin.functions.interpreter import Loaded, load
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector
 from contin.functions.program import Program
 from contin.linalg.layout import Layout
 from contin.linalg.segments import Share, share
 
 
-class Code(NamedTuple):
-    """A program, and what it is run in; ``parameters`` is where these stand among its scalars."""
-
-    instructions: Instructions
-    first: int
-    last: int
-    room: Room
-    parameters: int
-
-    @classmethod
-    def of(cls, program: Program) -> Code:
-        """Return the code of a program, with registers of its own."""
-        instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables, round_off.SEED)
-        scratch = np.empty((max(program.unknowns, 1), program.unknowns + 1))
-        room = Room(np.empty(program.registers * LANES), scratch)
-        return cls(instructions, program.first, program.last, room, program.parameters)
-
-
 class Codes(NamedTuple):
     """Right-hand side and integrands, and boundary conditions; each alone and with its derivatives."""
 
-    field: Code
-    field_slopes: Code
-    ends: Code
-    ends_slopes: Code
+    field: Loaded
+    field_slopes: Loaded
+    ends: Loaded
+    ends_slopes: Loaded
 
 
 class Sizes(NamedTuple):
@@ -110,7 +91,7 @@ def workspace(system: Any, rows: int) -> Workspace:
     n, problem = system._n, system.problem
     field, ends = problem.batch("field"), problem.batch("boundary")
     of_field, of_ends = system._columns
-    codes = Codes(*map(Code.of, (*_programs(field, of_field.key), *_programs(ends, of_ends.key))))
+    codes = Codes(*map(load, (*_programs(field, of_field.key), *_programs(ends, of_ends.key))))
     scales, ones = system.scales, np.ones
     states = ones(n) if scales is None else scales.states
     free = system.free_scales

@@ -514,7 +514,7 @@ class Instructions(NamedTuple):
     lists: IndexVector
     scalars: Vector
     tables: Vector
-    seed: int = 0
+    seed: int
 
 
 class Points(NamedTuple):
@@ -604,16 +604,41 @@ def _moved(value, seed):
     return _number_of(bits + ((mixed >> 33) & 0x7FFFFFFF) % 3 - 1)
 
 
+class Loaded(NamedTuple):
+    """A program with registers of its own, as kernels run it; ``parameters`` is where these stand among its scalars."""
+
+    instructions: Instructions
+    first: int
+    last: int
+    room: Room
+    parameters: int
+
+
+def load(program: Program) -> Loaded:
+    """Return a program with registers of its own."""
+    instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables, round_off.SEED)
+    room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
+    return Loaded(instructions, program.first, program.last, room, program.parameters)
+
+
+@helper
+def run_loaded(loaded: Loaded, p: Array, points: Points, out: Array, jac: Array) -> None:
+    """Run a program in a kernel, with parameters p; see `evaluate`."""
+    for i in range(p.size):
+        loaded.instructions.scalars[loaded.parameters + i] = p[i]
+    evaluate(loaded.instructions, loaded.first, loaded.last, points, loaded.room, out, jac)
+
+
 def run(program: Program, points: Any, p: Array, out: Array, jac: Array) -> None:
     """Run a program at points (t, u, v) with parameters p; see `evaluate`. To name them, as `Points`, would take a tenth."""
     try:
-        instructions, room = program.rooms.pop()  # another thread has its own
+        loaded = program.rooms.pop()  # another thread has its own
     except IndexError:
-        instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables, round_off.SEED)
-        room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
-    instructions.scalars[program.parameters : program.parameters + p.size] = p
-    evaluate(instructions, program.first, program.last, points, room, out, jac)
-    program.rooms.append((instructions, room))
+        loaded = load(program)
+    instructions, first, last, room, parameters = loaded
+    instructions.scalars[parameters : parameters + p.size] = p
+    evaluate(instructions, first, last, points, room, out, jac)
+    program.rooms.append(loaded)
 
 
 def evaluated(program: Program, u: Array, count: int) -> Array:

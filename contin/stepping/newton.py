@@ -18,8 +18,6 @@ from contin import checks
 from contin.arrays import Array
 from contin.discretization.protocol import Equations
 from contin.errors import ConvergenceError
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Vector
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.stepping.one_call import (
@@ -42,6 +40,7 @@ from contin.stepping.progress import (
     estimated_rate,
     has_converged,
     stagnates,
+    subtract,
     wants_jacobian,
 )
 
@@ -125,7 +124,6 @@ def correct(
     sizes : callable, optional
         ``sizes(x)`` returns the size of each unknown. Where it is given, the last update is also small relative to these, or as
         small as round-off of x allows: for unknowns that are not known to be of order one.
-
     linearize : bool
         The tangent right at the solution is wanted, if it costs no further call.
 
@@ -212,7 +210,7 @@ def _newton(
             else:
                 residual = system.residual(x)
             update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
-            size = _move(x, update)
+            size = subtract(x, update)
             if not math.isfinite(size):
                 break
             progress.record(size, fresh)
@@ -257,7 +255,7 @@ def _settled(
             now = rounded_off(system, x, rows)
             least, noise = np.maximum(least, UNITS * np.maximum(noise, now)), now
         small = np.all(np.abs(update) <= least)
-        error, before = _move(x, update), np.abs(update)
+        error, before = subtract(x, update), np.abs(update)
         if small:
             return Corrected(x, factors, len(updates) + len(relative), error)
     raise _failure(relative)
@@ -396,7 +394,7 @@ def _chords(
         while len(sizes) < CHORDS:
             residual = system.residual(x)
             update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
-            sizes.append(_move(x, update))
+            sizes.append(subtract(x, update))
             if sizes[-1] <= EXACT:
                 return Corrected(x, factors, len(sizes), sizes[-1])
             if not sizes[-1] < CLOSE * (sizes[-2] if len(sizes) > 1 else 1.0):
@@ -406,18 +404,6 @@ def _chords(
                 if sizes[-1] * ratio / (1 - ratio) <= newton.tolerance:
                     return Corrected(x, factors, len(sizes), sizes[-1] * ratio / (1 - ratio))
     raise _failure(sizes)
-
-
-@kernel(reorder=False)
-def _move(x: Vector, update: Vector) -> float:
-    """Subtract the update from x, in place; return its largest component relative to 1 + |x|, NaN if one is NaN."""
-    largest = 0.0
-    for i in range(x.size):
-        size = abs(update[i]) / (1 + abs(x[i]))
-        if size > largest or size != size:  # noqa: PLR0124
-            largest = size
-        x[i] -= update[i]
-    return largest
 
 
 def _failure(sizes: list[float]) -> ConvergenceError:

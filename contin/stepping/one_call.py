@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 from contin.discretization.assembly import Bordering, assemble, at_points, collocate
 from contin.discretization.workspace import Workspace
-from contin.functions.interpreter import Points, evaluate
+from contin.functions.interpreter import Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Vector, helper
 from contin.linalg.condensation import Factored
 from contin.linalg.elimination import factorize
 from contin.linalg.layout import Blocks
 from contin.linalg.substitution import solve
-from contin.stepping.progress import CHORDS, diverges, estimated_rate, has_converged, stagnates, wants_jacobian
+from contin.stepping.progress import CHORDS, diverges, estimated_rate, has_converged, stagnates, subtract, wants_jacobian
 
 #: With factors from elsewhere the first update is below this, and each of the next below this part of the one before: then a
 #: few steps reach round-off, where slower ones would take as long as a factorization.
@@ -63,14 +63,6 @@ def _scale_slopes(slopes, sizes, inputs):
 
 
 @helper
-def _run(code, p, points, out, jacobian):
-    """Run a program with parameters p."""
-    for i in range(p.size):
-        code.instructions.scalars[code.parameters + i] = p[i]
-    evaluate(code.instructions, code.first, code.last, points, code.room, out, jacobian)
-
-
-@helper
 def _evaluate(codes, mesh, room, x, slopes):
     """Fill values at x and, with ``slopes``, derivatives."""
     sizes, n = mesh.sizes, room.points.shape[1]
@@ -85,13 +77,13 @@ def _evaluate(codes, mesh, room, x, slopes):
         room.end[0, a] = x[mesh.states - n + a] * sizes.states[a]
     inside, ends = Points(mesh.times, room.points, room.none), Points(room.zero, room.start, room.end)
     if slopes:
-        _run(codes.field_slopes, room.p, inside, room.field, room.jacobian)
-        _run(codes.ends_slopes, room.p, ends, room.boundary, room.at_ends)
+        run_loaded(codes.field_slopes, room.p, inside, room.field, room.jacobian)
+        run_loaded(codes.ends_slopes, room.p, ends, room.boundary, room.at_ends)
         _scale_slopes(room.jacobian, sizes.field, sizes.field_inputs)
         _scale_slopes(room.at_ends, sizes.ends, sizes.ends_inputs)
     else:
-        _run(codes.field, room.p, inside, room.field, room.nothing)
-        _run(codes.ends, room.p, ends, room.boundary, room.nothing)
+        run_loaded(codes.field, room.p, inside, room.field, room.nothing)
+        run_loaded(codes.ends, room.p, ends, room.boundary, room.nothing)
     _scale(room.field, sizes.field)
     _scale(room.boundary, sizes.ends)
 
@@ -128,18 +120,6 @@ def _solve(mesh, room, matrix):
 
 
 @helper
-def _subtract(x, update):
-    """Subtract an update; return its largest component relative to 1 + |x|, NaN if one is NaN."""
-    largest = 0.0
-    for i in range(x.size):
-        size = abs(update[i]) / (1 + abs(x[i]))
-        if size > largest or size != size:
-            largest = size
-        x[i] -= update[i]
-    return largest
-
-
-@helper
 def _chord_steps(codes, mesh, room, matrix, x, tolerance, report):
     """Chord steps with the factors at hand, for an x that is close."""
     before = 1.0
@@ -147,7 +127,7 @@ def _chord_steps(codes, mesh, room, matrix, x, tolerance, report):
         _evaluate(codes, mesh, room, x, False)
         _fill_residual(mesh, room, x)
         _solve(mesh, room, matrix)
-        size = _subtract(x, room.update[0])
+        size = subtract(x, room.update[0])
         report[ITERATIONS], report[ERROR], report[UPDATES + number] = number + 1, size, size
         if size <= EXACT:
             return CONVERGED
@@ -172,7 +152,7 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
         if fresh:
             report[SIGN] = _factor(mesh, room, matrix)
         _solve(mesh, room, matrix)
-        before, size = size, _subtract(x, room.update[0])
+        before, size = size, subtract(x, room.update[0])
         report[ITERATIONS], report[UPDATES + number] = number + 1, size
         if not size < math.inf:
             return FAILED

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from contin.functions.kernel_parts import helper
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Vector, helper
 
 #: After a larger update the Jacobian is taken anew, and a first update is trusted no further than this: from there chord steps
 #: converge slowly. Ten times larger changes nothing on the test bank: the estimated rate decides.
@@ -55,3 +56,15 @@ def wants_jacobian(size: float, rate: float, tolerance: float) -> bool:
     """Return whether the next update is better made with a new Jacobian."""
     far = size > FAR or not rate < 0.5
     return far or (rate > 0 and math.log(tolerance / size) < CHORDS * math.log(rate))
+
+
+@kernel(reorder=False)
+def subtract(x: Vector, update: Vector) -> float:
+    """Subtract the update from x, in place; return its largest component relative to 1 + |x|, NaN if one is NaN."""
+    largest = 0.0
+    for i in range(x.size):
+        size = abs(update[i]) / (1 + abs(x[i]))
+        if size > largest or size != size:  # noqa: PLR0124
+            largest = size
+        x[i] -= update[i]
+    return largest

@@ -15,29 +15,17 @@ import numpy as np
 from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.maps import MapSystem
-from contin.functions import round_off
-from contin.functions.interpreter import LANES, Instructions, Points, Room, evaluate
+from contin.functions.interpreter import Loaded, Points, load, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
-from contin.functions.program import Program
 from contin.linalg.small import factor_small, solve_small
 from contin.stepping.newton import STAGNANT, Newton
-from contin.stepping.progress import diverges, estimated_rate, has_converged, stagnates, wants_jacobian
+from contin.stepping.progress import diverges, estimated_rate, has_converged, stagnates, subtract, wants_jacobian
 
 #: What came of it: a point or step to be believed; none; one that is not decided here.
 BELIEVED, FAILED, ASKS = range(3)
 #: Largest number of unknowns: from some fifty on, LAPACK's factors are faster than those of a kernel.
 _SMALL = 32
-
-
-class Recorded(NamedTuple):
-    """A program as `contin.functions.interpreter.evaluate` takes it; ``at``: where its parameters stand among the scalars."""
-
-    instructions: Instructions
-    first: int
-    last: int
-    room: Room
-    at: int
 
 
 class Equations(NamedTuple):
@@ -47,8 +35,8 @@ class Equations(NamedTuple):
     ones. Of a map, ``is_map`` is 1 and ``gain`` what angles gain: F is the function less u and ``gain``.
     """
 
-    values: Recorded
-    slopes: Recorded
+    values: Loaded
+    slopes: Loaded
     sizes: Vector
     rows: Vector
     weights: Vector
@@ -79,13 +67,6 @@ class Linear(NamedTuple):
 SIGN, UPDATES, ERROR = range(3)
 
 
-def recorded(program: Program) -> Recorded:
-    """Return a program with registers of its own."""
-    room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
-    instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables, round_off.SEED)
-    return Recorded(instructions, program.first, program.last, room, program.parameters)
-
-
 def equations_of(system: Any) -> Equations | None:
     """Return the equations of a small problem whose functions are recorded, of a map with one round; None of others."""
     if type(system) not in (Algebraic, MapSystem) or system.size > _SMALL:
@@ -97,7 +78,7 @@ def equations_of(system: Any) -> Equations | None:
         return None
     n, count, size = system.state_size, system.equations, system.size
     return Equations(
-        recorded(batch._values_program()), recorded(batch._slopes(batch.columns(system._free).key)[0]),
+        load(batch._values_program()), load(batch._slopes(batch.columns(system._free).key)[0]),
         system.unscaled_factors, np.ones(count) if system.scales is None else system.scales.rows["residual"], system.weights,
         system.gain if is_map else np.zeros(count), int(is_map), system.parameters.copy(), system._free, np.zeros(1),
         np.empty((1, n)), np.empty((0, n)), np.empty((1, count)), np.zeros((1, count, size)), np.empty((0, 0, 0)),
@@ -158,20 +139,16 @@ def put(equations: Equations, x: Array) -> None:
 def evaluate_values(equations: Equations, x: Array) -> None:
     """Evaluate the functions."""
     put(equations, x)
-    code, points = equations.values, Points(equations.time, equations.states, equations.none)
-    for i in range(equations.parameters.size):
-        code.instructions.scalars[code.at + i] = equations.parameters[i]
-    evaluate(code.instructions, code.first, code.last, points, code.room, equations.found, equations.no_slopes)
+    points = Points(equations.time, equations.states, equations.none)
+    run_loaded(equations.values, equations.parameters, points, equations.found, equations.no_slopes)
 
 
 @helper
 def evaluate_slopes(equations: Equations, x: Array) -> None:
     """Evaluate the functions and their derivatives by the unknowns."""
     put(equations, x)
-    code, points = equations.slopes, Points(equations.time, equations.states, equations.none)
-    for i in range(equations.parameters.size):
-        code.instructions.scalars[code.at + i] = equations.parameters[i]
-    evaluate(code.instructions, code.first, code.last, points, code.room, equations.found, equations.slopes_found)
+    points = Points(equations.time, equations.states, equations.none)
+    run_loaded(equations.slopes, equations.parameters, points, equations.found, equations.slopes_found)
 
 
 @helper
@@ -221,14 +198,9 @@ def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, 
             missing += linear.row[i] * x[i]
         linear.update[size - 1] = missing
         solve_small(linear.lu, linear.exchanges, linear.update)
-        now = 0.0
-        for i in range(size):
-            part = abs(linear.update[i]) / (1 + abs(x[i]))
-            if not part <= now:
-                now = part
-            x[i] -= linear.update[i]
-            if not now < math.inf:
-                return FAILED
+        now = subtract(x, linear.update)
+        if not now < math.inf:
+            return FAILED
         moved = now if fresh else moved + now
         rate = estimated_rate(now, before, moved, fresh)
         if has_converged(now, rate, number, tolerance):

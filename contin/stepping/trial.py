@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -215,6 +215,10 @@ class TestFunction:
     unless: str = ""
     column: str = ""
     value: float | None = None
+
+    def holds_one_of(self, free: Sequence[str]) -> bool:
+        """Return whether it vanishes where a free parameter has a value."""
+        return self.value is not None and self.column in free
 
     def passed(self, before: float, after: float) -> bool:
         """Return whether there is a zero between two neighbouring points where the function has these values.

@@ -18,7 +18,7 @@ def bifpy_missing(python: str) -> str | None:
     if auto_07p.shutil.which("gfortran") is None:
         return "gfortran is not on the path"
     found = subprocess.run([python, "-c", "import bifpy"], capture_output=True)
-    return None if found.returncode == 0 else f"{python} has no bifpy (pip install bifpy)"
+    return None if found.returncode == 0 else "the interpreter has no bifpy (pip install bifpy)"
 
 
 def bifpy(python: str, statement: str, stop: str, intervals=40, degree=4, tolerance=1e-10) -> dict:
