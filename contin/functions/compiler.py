@@ -30,10 +30,10 @@ from contin.functions.kernel_parts import Helper, Instruction, Place, kernel_of,
 from contin.functions.machine_code import INNER, Code, machine
 
 #: Options of all kernels: division by zero gives inf; sums in any order, so that loops become vector instructions.
-#: Only compiled code calls what numba makes.
+#: Only compiled code calls what numba makes. Kernels make no arrays, so nothing counts who uses one (``_nrt``).
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy", "nogil": True, "fastmath": {"contract", "reassoc"},
-    "no_cpython_wrapper": True, "no_cfunc_wrapper": True,
+    "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False,
 }  # fmt: skip
 
 # LLVM's types.
@@ -373,7 +373,6 @@ class _Entry:
         entry.verify()
         module.link_in(entry)
         module.get_function(self.done.fndesc.llvm_func_name).name = self.name + INNER
-        module.link_in(llvm.parse_assembly(_NOTHING_TO_RELEASE))
         for function in module.functions:
             if not function.is_declaration and function.name not in (self.name, self.name + INNER):
                 function.linkage = "internal"
@@ -483,8 +482,6 @@ def _instructions(function: Any) -> int:
 _LONG = 30
 #: Instructions whose loops are not unrolled: long ones with many short loops. It takes a third of the time to compile.
 _SMALL = ("interpret",)
-#: Arrays that Python gives have no owner that compiled code releases, so this is never called where no others are made.
-_NOTHING_TO_RELEASE = "define void @NRT_MemInfo_call_dtor(i8* %nothing) { ret void }"
 #: Places in the tuple ``self``, see `contin.functions.machine_code.loaded`.
 _ARRAY, _NONE, _WRONG = range(3)
 #: What TypeError says.

@@ -502,7 +502,7 @@ def _give_up(work, lists, row, lanes):
 
 @instruction
 def _address(builder: Any, array: Any, offset: int) -> int:
-    """Return an address in an array, which must be a parameter of the kernel."""
+    """Return an address in an array."""
     there: int = builder.add(array.address, offset)
     return there
 

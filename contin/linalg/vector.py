@@ -38,9 +38,6 @@ class Rows(NamedTuple):
 
 
 # --- addresses -------------------------------------------------------------------------------------------------------
-#
-# numba frees an array after its last use, and does not see that an address is one: an array must be a parameter of the kernel
-# or of a helper that is not inlined, a part of one, or used again later.
 
 
 @instruction
