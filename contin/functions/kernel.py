@@ -29,6 +29,7 @@ from typing import Any, TypeVar, overload
 import llvmlite
 import numpy as np
 
+from contin import threads
 from contin.errors import ContinError
 from contin.functions import machine_code
 from contin.functions.cache import cache_directory
@@ -189,7 +190,7 @@ def _share_work() -> subprocess.Popen[bytes] | None:
     if sys.stderr is not None and sys.stderr.isatty():
         text = "contin: compiling the engine for this machine, once; this takes some 10 s"
         print(f"\r{text:<79}", file=sys.stderr)  # a line of progress may stand there
-    if (os.cpu_count() or 1) < 2 or not sys.executable:
+    if threads.count() < 2 or not sys.executable:
         return None
     quiet: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     with contextlib.suppress(OSError):  # this process makes all of it, then

@@ -23,7 +23,7 @@ _ROUND_OFF = float(np.finfo(float).eps)
 _STEPS, _EXCEPTIONAL = 60, 10
 
 
-@kernel(reorder=False)
+@kernel(reorder=False, last=True)
 def fill_eigenvalues(matrices: Stack, real: Matrix, imaginary: Matrix) -> None:
     """Fill in the eigenvalues of matrices, which are overwritten: a row for each, NaN where a matrix is not finite.
 

@@ -142,7 +142,7 @@ def test_a_pair_of_bifurcations_in_one_step(tmp_path):
 
 def test_a_mesh_too_coarse_for_the_index_is_halved(tmp_path):
     """A strip of finite width beyond kappa_n = 14: on the mesh of the run an eigenvalue of 1e-3 has the error 1e-2."""
-    scene = "{m: 3, n: 1, law: finite width, Gamma: 3, stability: true, limits: {kappa_n: [-5, 40]}}"
+    scene = "{m: 3, n: 1, law: finite width, Gamma: 3, stability: true, limits: {kappa_n: [-5, 20]}}"
     run_branch(parse(scene, "scene"), tmp_path / "x.h5", Display(silent=True))
     branch = read_branch(tmp_path / "x.h5")
     (event,) = branch.events[branch.events["label"] == b"SB"]

@@ -174,7 +174,10 @@ def test_a_run_goes_on_from_any_state(name):
         rest = list(Continuation(system, x, settings, state=state, start=run.start))
         assert len(rest) == len(seen) - number - 1
         for one, (_, other) in zip(rest, seen[number + 1 :]):
-            assert np.array_equal(one.x, other.x) and one.arclength == other.arclength and one.label == other.label
+            assert one.label == other.label
+            # some of OpenBLAS's kernels add up in an order that hangs on where an array lies in memory
+            assert np.allclose(one.x, other.x, rtol=1e-14, atol=1e-14)
+            assert one.arclength == pytest.approx(other.arclength, rel=1e-13, abs=1e-13)
 
 
 @pytest.mark.parametrize("most", [1, 2, 9, 10, 11, 40])

@@ -123,7 +123,8 @@ def oregonator(u, p):
     return (u.x * (1 - u.x) + p.f * (p.q - u.x) / (p.q + u.x) * u.z) / p.eps, u.x - u.z
 
 
-@pytest.mark.parametrize("eps", [0.1, pytest.param(0.05, marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize("eps", [0.1, 0.05])
 def test_canards_of_the_oregonator(eps):
     """Two variables, Tyson & Fife 1980: x spans three powers of ten. Both ways give one fold, and the other Hopf point."""
     problem = AlgebraicProblem(oregonator, ["x", "z"], {"f": 0.3, "q": 0.004 if eps == 0.1 else 0.01, "eps": eps})

@@ -275,6 +275,7 @@ def catalytic(u, p):
     return 5 * z**2 - 2 * u.x**2 - 10 * u.x * u.y, p.q * z - 0.1 * u.y - 10 * u.x * u.y, 0.0675 * (z - 0.4 * u.s)
 
 
+@pytest.mark.full
 def test_cycles_whose_period_changes_fast_beside_hopf_points():
     """The catalytic oscillator of MatCont's manual: both Hopf points of the equilibria are the ends of one branch of cycles."""
     equilibria = AlgebraicProblem(catalytic, ["x", "y", "s"], {"q": 0.5})
