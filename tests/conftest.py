@@ -12,12 +12,13 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VEC
     os.environ.setdefault(_name, "1")
 
 ROOT = Path(__file__).parent.parent
-#: The modules that take longest, some ten seconds or more, in order. They are handed out first: what comes last must be short, or
-#: one worker ends long before the other.
+#: The modules that take longest, some ten seconds or more, in order. They are handed out first: what comes last must be short,
+#: or one worker ends long before the other.
 FIRST = (
-    "branches/test_diagram", "branches/test_run", "branches/test_explore", "contin/continuation/test_sizes", "branches/test_solid",
-    "branches/test_stability", "branches/test_at_value", "contin/functions/test_cache", "ribbon_model/test_exact_rods",
-    "ribbon_model/test_descent", "ribbon_model/test_finite_width", "branches/test_open", "ribbon_model/test_stability",
+    "branches/test_diagram", "branches/test_run", "branches/test_explore", "contin/continuation/test_sizes",
+    "branches/test_solid", "branches/test_stability", "branches/test_at_value", "contin/functions/test_cache",
+    "ribbon_model/test_exact_rods", "ribbon_model/test_descent", "ribbon_model/test_finite_width", "branches/test_open",
+    "ribbon_model/test_stability",
     "contin/connections/test_grown_orbits", "branches/test_open_accuracy", "contin/discretization/test_switches",
     "contin/detection/test_random_equilibria", "contin/detection/test_hopf", "ribbon_model/test_exact", "branches/test_paper",
     "contin/continuation/test_repeatable", "contin/continuation/test_bank", "ribbon_model/test_phases", "branches/test_cli",

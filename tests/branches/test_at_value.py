@@ -80,7 +80,7 @@ def test_without_the_files_the_digits_hold_and_the_word_is_there(folder, kappa_n
 def test_the_preview_is_exact_where_it_says_so(law):
     """The answers of the preview come from a coarse curve; those of a curve five times finer are the same to 1e-9."""
     more = (
-        "[[1, 2]], Gamma: 30, limits: {kappa_n: [0, 4]}"
+        "[[1, 2]], Gamma: 30, limits: {kappa_n: [-4, 6]}"
         if law == "finite width"
         else "[[1, 2], [3, 4]], limits: {kappa_n: [-10, 20]}"
     )
