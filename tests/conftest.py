@@ -56,14 +56,27 @@ def pytest_xdist_auto_num_workers(config):
 REQUIRED = {"posix": os.name == "posix", "forks": sys.platform.startswith("linux")}
 
 
+def _left_out(items):
+    """Return the tests that take long: those marked so and, of one marked ``sample(n)``, all but n of its parameters."""
+    groups = {}
+    for item in items:
+        if mark := item.get_closest_marker("sample"):
+            groups.setdefault((item.path, item.originalname), (mark.args[0], []))[1].append(item)
+    for count, group in groups.values():
+        kept = {place * len(group) // count for place in range(count)}
+        yield from (item for place, item in enumerate(group) if place not in kept)
+    yield from (item for item in items if item.get_closest_marker("full"))
+
+
+@pytest.hookimpl(tryfirst=True)  # before those that are not asked for are left out
 def pytest_collection_modifyitems(config, items):
     for name, given in REQUIRED.items():
         for item, mark in ((item, item.get_closest_marker(name)) for item in items if not given):
             if mark is not None:
                 item.add_marker(pytest.mark.skip(reason=f"needs {name}: {mark.args[0]}"))
-    if not config.getoption("--full"):
-        for item in items:
-            if item.get_closest_marker("full"):
-                item.add_marker(pytest.mark.skip(reason="takes long: with --full only, which .ci/run asks for"))
+    for item in list(_left_out(items)):
+        item.add_marker(pytest.mark.full)
+        if not config.getoption("--full"):
+            item.add_marker(pytest.mark.skip(reason="takes long: with --full only, which .ci/run asks for"))
     places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(FIRST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))

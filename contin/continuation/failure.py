@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from contin.names import exact_text
 from contin.stepping.settings import Settings
 from contin.stepping.state import State, Stop
 from contin.stepping.step import aims, corrected, judged, predict
-from contin.stepping.trial import Trial
+from contin.stepping.trial import TestFunction, Trial
 
 #: Shorter steps that are tried, as parts of ``min_step``: the largest that goes on is told.
 _SHORTER = (1e-2, 1e-4)
@@ -24,12 +25,23 @@ _LOOSER = (1e3, 1e4, 1e5)
 _STEPS, _WAY, _MOST = 10, 2, 100
 #: Each of them is tried so much longer than the one before.
 _LONGER = 1.5
+#: A run fails where a test function that ends runs is zero, if it is below this part of its value at the first point: steps as
+#: small as min_step come much nearer, and regular points do not come so near.
+_NEARLY = 1e-2
 #: The way along the tangent on which a corner is looked for, and the part that its bend has of the usual change of the residual
 #: on such a way: for a smooth function, it is about as large as the way.
 _CORNER, _JUMP = 1e-4, 0.1
 #: On a tenth of the way the bend of a corner is a tenth, more than this part, and that of a smooth curve a hundredth, however
 #: small its radius.
 _LIKE = 0.05
+
+
+def met(ends: Sequence[TestFunction], here: Trial, first: Trial) -> Stop | None:
+    """Return the reason to stop where the domain of the equations ends: a test function that ends runs is nearly zero."""
+    for test in ends:
+        if abs(here.value(test)) < _NEARLY * abs(first.value(test)):
+            return Stop("event", f"met {test.name}")
+    return None
 
 
 def no_convergence(state: State, settings: Settings, error: ConvergenceError) -> Stop:

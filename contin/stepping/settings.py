@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypedDict
 
-from contin import checks
+from contin import checks, threads
 from contin.discretization.mesh import MeshControl
+from contin.discretization.protocol import Discretization
 from contin.errors import ProblemError
 from contin.names import exact_text
 from contin.stepping.newton import Newton
@@ -135,6 +136,28 @@ class Settings:
         for name, values in checks.mapping("zeros", self.zeros, "lists of numbers").items():
             for value in checks.sequence(f"zeros: {checks.plain(name)}", values, "numbers"):
                 checks.number(f"zeros: {checks.plain(name)}", value)
+
+
+def check(system: Discretization, settings: Settings) -> None:
+    """Refuse settings that name what a problem does not have, and a system with too many or too few free parameters.
+
+    Raises
+    ------
+    ProblemError
+    """
+    threads.count()  # refuses a wrong number, also where the problem is too small to use it
+    if len(system.free) != system.problem.free_size:
+        raise ProblemError(
+            f"free parameters: {len(system.free)} given ({', '.join(system.free)}), a curve of this problem needs "
+            f"{system.problem.free_size} (conditions - states + 1)"
+        )
+    if settings.primary is not None and settings.primary not in system.free:
+        raise ProblemError(f"primary: {settings.primary!r} is not one of the free parameters {', '.join(system.free)}")
+    known = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
+    trivial = () if settings.trivial is None else (settings.trivial,)
+    for name in (*settings.limits, *settings.zeros, *settings.extrema, *trivial):
+        if name not in known:
+            raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)})")
 
 
 class Options(TypedDict, total=False):

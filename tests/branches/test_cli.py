@@ -70,6 +70,7 @@ def test_bash_completes(line, wanted, command, tmp_path):
     assert subprocess.run(["bash", "-c", program], capture_output=True, text=True, cwd=tmp_path).stdout == wanted + "\n"
 
 
+@pytest.mark.full
 def test_completion_of_other_shells(command):
     fish = command("completion", "fish", program=PROGRAM).out
     assert "-a secondary" in fish and "'__fish_seen_subcommand_from run' -l overwrite" in fish

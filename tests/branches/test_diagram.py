@@ -189,6 +189,7 @@ def points_of(folder):
     return [read_branch(folder / primary_file(config)).points for config in parse(PAIR, "scene").branches]
 
 
+@pytest.mark.full
 def test_a_cluster_makes_no_difference(computed_here, tmp_path):
     """One process and a Dask cluster: the same bits."""
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
@@ -198,6 +199,7 @@ def test_a_cluster_makes_no_difference(computed_here, tmp_path):
     assert all(map(np.array_equal, computed_here, points_of(tmp_path / "dask")))
 
 
+@pytest.mark.full
 @pytest.mark.forks("workers inherit what the test has replaced")
 def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
     scene, compute = parse("{m: [1, 3], n: [2, 4], stride: 20}", "scene"), job.compute_branch

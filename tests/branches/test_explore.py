@@ -313,6 +313,7 @@ def distances_of(shape, n):
     return distances(np.column_stack([x, np.zeros((n, 9)), np.interp(S, shape.arclength, shape.eta)]))
 
 
+@pytest.mark.sample(1)
 @needs_chromium
 @pytest.mark.parametrize("name", ["m1_n2", "fig12", "laws"])
 def test_unfolded_strips_close_and_have_the_length(name, pages, browser):
@@ -495,6 +496,7 @@ def test_exact_solution_of_the_page_is_that_of_the_model(pages, browser):
             assert last["kappa_n"] == pytest.approx(curve[-1 if curve[-1].label == "BP" else 0].kappa_n, rel=1e-10)
 
 
+@pytest.mark.full
 @needs_chromium
 def test_compare_with_another_material(pages, browser):
     """The exact solution at the nu of the slider, and the branches of another material on the page, as thin lines."""

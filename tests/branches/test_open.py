@@ -161,6 +161,7 @@ def test_the_ribbon_ends_where_its_bending_vanishes(tmp_path):
         assert "the law 'finite width' goes on" in read_branch(path).stop
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "words, sentence",
     [
@@ -215,6 +216,7 @@ def test_a_scene_with_further_stages_goes_on(tip, root, tmp_path, tables):
         run_stages(other, path, Display(silent=True), resume=True)
 
 
+@pytest.mark.full
 def test_a_scene_of_many_strips(call, tmp_path):
     """Lists give one result for each combination, and one graph: the tip loads of Michell, 4.0126 sqrt(2/(1 + nu))."""
     (tmp_path / "tip.yaml").write_text(TIP.replace("nu: 0.3", "nu: [0.2, 0.9, 0.5]").replace("to: -6", "to: [-5, -6]"))

@@ -129,6 +129,7 @@ def elastica(F):
     return 2 * math.sqrt(F * m), energy[0]
 
 
+@pytest.mark.full
 def test_energy_and_moment_of_the_elastica_within_their_errors(tmp_path):
     """A cantilever under a dead load, after buckling; every labelled point, on meshes of any coarseness."""
     scene = (
@@ -151,6 +152,7 @@ def test_energy_and_moment_of_the_elastica_within_their_errors(tmp_path):
     assert checked >= 12
 
 
+@pytest.mark.full
 def test_errors_at_folds_and_branch_points_cover_the_difference_to_a_finer_run(tmp_path):
     """A clamped strip that is turned: two branch points and two folds; the finer run has degree 8 and a tolerance of 1e-12."""
     scene = (

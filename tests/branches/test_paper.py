@@ -67,6 +67,7 @@ def test_where_stable_buckled_states_exist(computed):
     ]
 
 
+@pytest.mark.full
 def test_where_folds_are_born(computed):
     """Two routes: the quadrature's slope at the circle, and the collocation's curve of folds, extrapolated."""
     rows = computed("curves")[0].rows

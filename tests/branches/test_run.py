@@ -273,6 +273,7 @@ def test_sigterm_does_the_same(tmp_path, silent, undisturbed, tables, number):
     assert tables(path) == undisturbed(config)
 
 
+@pytest.mark.full
 def test_the_number_of_threads_makes_no_difference(command, scene, tables):
     """With the index, whose eigenvalues come from LAPACK; and whatever the scheduler of a cluster sets."""
     found = []

@@ -67,6 +67,7 @@ def test_the_fold_of_the_single_loop_is_where_stability_ends(tmp_path):
     assert changes == [[-1, -1, 0, b""], [0, 1, 1, b""], [-1, -1, 0, b""]]
 
 
+@pytest.mark.full
 def test_a_pair_of_modes_changes_the_index_by_two(tmp_path):
     run_branch(
         parse("{m: 5, n: 2, stability: true, limits: {kappa_n: [-30, 0]}}", "scene"), tmp_path / "x.h5", Display(silent=True)
@@ -78,6 +79,7 @@ def test_a_pair_of_modes_changes_the_index_by_two(tmp_path):
     assert other == "2 mirrors, one two-fold axis, 4-fold rotary reflection"
 
 
+@pytest.mark.full
 def test_a_run_resumed_is_the_run_undisturbed(silent, tables, tmp_path):
     whole, stopped = tmp_path / "whole.h5", tmp_path / "stopped.h5"
     run_branch(parse(SCENE, "scene"), whole, silent())
@@ -86,6 +88,7 @@ def test_a_run_resumed_is_the_run_undisturbed(silent, tables, tmp_path):
     assert tables(whole) == tables(stopped)
 
 
+@pytest.mark.full
 def test_the_index_ends_with_the_law(silent, tmp_path):
     """Beyond the end of its convex energy a strip of finite width has no index; the run ends there, as without the index."""
     scene = "{m: 3, n: 1, law: finite width, Gamma: 10, stability: true, limits: {kappa_n: [-60, 100]}, stride: 50}"
@@ -108,6 +111,7 @@ AGREEMENT = {
 QUICK = {(7, 1, 0.3)}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("m", "n", "nu"), AGREEMENT)
 def test_the_index_changes_where_the_half_loop_branches(m, n, nu, request):
     """Within the errors of both: located by an eigenvalue on the cell, and as a branch point of the half loop's equations."""
@@ -129,6 +133,7 @@ def test_the_index_changes_where_the_half_loop_branches(m, n, nu, request):
             assert abs(point["kappa_n"] - places[0]) < 3 * error + 1e-12
 
 
+@pytest.mark.full
 def test_a_pair_of_bifurcations_in_one_step(tmp_path):
     """(5, 1) at nu = .302 loses its symmetry under the mirror, and twice under the axes, between two neighbouring points."""
     scene = "{m: 5, n: 1, nu: 0.302, stability: true, limits: {kappa_n: [-40, 0]}}"

@@ -176,6 +176,7 @@ def test_dimensions_for_a_barrier():
     assert "none between 28.6 and 715 mm" in answer(BLADE, 3, 5.0)
 
 
+@pytest.mark.full
 def test_a_chart_is_drawn(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("branches.strip_wants._GAMMAS", np.array([0.1, 1.0]))
     monkeypatch.setattr("branches.strip_wants._PARTS", np.linspace(0.1, 0.9, 3))

@@ -194,6 +194,7 @@ def test_beyond_the_fold_a_buckled_loop_snaps_to_three(sign, longest):
     assert (str(rest), rest.stability.index) == ("3-covered circle", 0)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("law", "m", "kappa_n", "expected"),
     [

@@ -19,6 +19,7 @@ SOME = [(1, 2), (3, 4), (7, 3), (3, 1)]
 each_branch = pytest.mark.parametrize("law, root", BRANCHES)
 
 
+@pytest.mark.sample(4)
 @each_branch
 @pytest.mark.parametrize("nu", [-0.6, 0.0, 0.3])
 def test_branches_leave_and_end_on_circles(law, root, nu):
@@ -63,6 +64,7 @@ def test_small_amplitude(law, root):
         assert (8 * values[0] - 6 * values[1] + values[2]) / 3 == pytest.approx(expected, rel=1e-11)
 
 
+@pytest.mark.sample(4)
 @each_branch
 @pytest.mark.parametrize("m, n, nu", [(1, 2, 0.3), (1, 4, 0.3), (3, 4, 0.5), (5, 6, -0.3), (5, 2, 0.3)])
 def test_frame_equations_close(law, root, m, n, nu):
@@ -96,6 +98,7 @@ def test_frame_equations_close(law, root, m, n, nu):
     assert abs(quarter[5]) < 1e-10
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("m, n", [(1, 2), (1, 4), (3, 4), (3, 1)])
 @each_branch
 def test_against_the_collocation(law, root, m, n):

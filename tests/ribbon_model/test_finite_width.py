@@ -218,6 +218,7 @@ def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
     assert Solution.of(middle).shape().closure() < 1e-10
 
 
+@pytest.mark.full
 def test_a_branch_stops_where_the_law_ends():
     """(3, 1) at Gamma = 10 runs off to where U loses its convexity; the quadrature is lost at the same kappa_n."""
     found = followed(3, 1, 10.0, test_functions=convexity.test_functions(FINITE_WIDTH))
@@ -227,6 +228,7 @@ def test_a_branch_stops_where_the_law_ends():
     assert not convexity.test_functions(RIBBON)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("nu", "Gamma", "fold"), [(0.28, 1.212, 45.619411), (0.32, 1.2, 43.075197)])
 def test_a_second_minimum_that_is_shallow_is_not_taken(nu, Gamma, fold):
     """(2, 10): at the planar place of the cell U - M.omega has a second minimum; the fold lies beyond where it appears.

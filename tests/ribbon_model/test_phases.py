@@ -95,6 +95,7 @@ def test_the_phases_that_a_message_recommends_are_no_loads(stiffness, turn):
     assert energies and np.ptp(energies) < 1e-8
 
 
+@pytest.mark.full
 def test_a_message_recommends_no_phase_where_none_fits():
     """The guess is far from any state, and a phase would only load the strip."""
     strip = OpenStrip(CUT, numbers={"turn": 1.0})

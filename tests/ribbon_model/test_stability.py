@@ -60,6 +60,7 @@ def test_circles_against_the_linear_theory():
                 assert found.index == linear.index(law, m, kappa_n, NU), (law.name, m, kappa_n)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("law", PAPER_LAWS.values(), ids=list(PAPER_LAWS))
 def test_circles_by_conjugate_points(law):
     for m, kappa_n in ((1, 2.7), (1, 3.25), (3, -1.3), (3, 2.2), (3, -7.1)):
@@ -98,6 +99,7 @@ def test_one_direction_changes_at_a_fold_and_keeps_the_symmetry(m, n):
         assert abs(before[0, "even"].negative - after[0, "even"].negative) == 1
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("m", "n", "law"),
     [
@@ -231,6 +233,7 @@ def test_two_directions_change_at_once():
     assert changed.multiplicity == 2 and changed.negative - after[changed.name].negative == 1
 
 
+@pytest.mark.full
 def test_with_a_force():
     """The secondary branch: index 2 on both sides of its start, where (3, 1) has 2 and 1; both methods."""
     _, found = secondary()

@@ -48,6 +48,7 @@ def test_every_point_of_a_fold_curve_through_a_cusp():
     assert folds.points[0]["mu"] > 0 > folds.points[-1]["mu"]
 
 
+@pytest.mark.full
 def test_fold_curve_of_a_boundary_value_problem():
     """Every point of the curve is a fold of the branch at its eps; the two folds of eps = .2 merge in one cusp."""
     folds = gelfand_folds()

@@ -16,6 +16,7 @@ def origin(field, parameters, **values):
     return contin.solve(AlgebraicProblem(field, ["x", "y", "z"], {**parameters, **values}), [0.0, 0.0, 0.0])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("r", [12.0, 20.0])
 def test_lorenz_from_both_sides(r):
     """r = 13.926557407520: Doedel, Krauskopf & Osinga (2006) and others give 13.9265574075."""
@@ -39,6 +40,7 @@ def shimizu_morioka(u, p):
     return u.y, u.x * (1 - u.z) - p.lam * u.y, -p.alpha * u.z + u.x**2
 
 
+@pytest.mark.full
 def test_shimizu_and_morioka():
     """By shooting: at the parameter found the orbit from the origin passes it on one side, and beside it on the other."""
     from scipy.integrate import solve_ivp
@@ -62,6 +64,7 @@ def koper(u, p):
     return p.e * (p.k * u.y - u.x**3 + 3 * u.x - p.l), u.x - 2 * u.y + u.z, u.y - u.z
 
 
+@pytest.mark.full
 def test_koper_as_in_autos_demo():
     """AUTO-07p's demo ``kpr`` finds this orbit by homotopy (ISTART = 3)."""
     saddle = contin.solve(AlgebraicProblem(koper, ["x", "y", "z"], {"l": -1.85, "k": -0.15, "e": 10.0}), [-0.95] * 3)

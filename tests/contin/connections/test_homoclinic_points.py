@@ -70,6 +70,7 @@ def test_a_saddle_focus():
     assert branch.labelled("NSF")[0]["r"] == pytest.approx(0.8, abs=1e-9)
 
 
+@pytest.mark.full
 def test_a_complex_pair_becomes_real():
     """At d = 0 the pair is a double eigenvalue; at d = -.09 = -r^2 one of them is zero."""
     branch = contin.trace(four_dimensional(), free=["d", "nu"], direction=-1, limits={"d": (-0.2, 2)})

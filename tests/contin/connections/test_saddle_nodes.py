@@ -112,6 +112,7 @@ def test_non_central_orbits_by_shooting():
         assert abs(missed(K, guess)) < 1e-6 * abs(beside[1] - beside[0])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("direction", "known"), [(1, (15.0379, 0.0942805)), (-1, (11.0181, 0.280979))])
 def test_curves_to_saddles_leave_and_come_back(direction, known):
     """AUTO's third and fifth run end at these places of the curves of orbits to saddles."""
@@ -129,6 +130,7 @@ def test_curves_to_saddles_leave_and_come_back(direction, known):
         assert again.points[0].system.problem.saddle_node and again.points[-1]["K"] == pytest.approx(6.5)
 
 
+@pytest.mark.full
 def test_the_time_does_not_matter_where_an_orbit_is_non_central():
     """Where the orbit comes in exponentially, the error of cutting off is below 1e-11 for all times."""
     longer = contin.curve(curve(1).points[-1], "time", limits={"time": (100, 3000)})

@@ -27,6 +27,7 @@ def located(branch, name, unit, count):
 # --- a limit is no size ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("limit", [1e3, 1e6, 1e10, 1e200, 1.7e308])
 @pytest.mark.parametrize("load", [1.0, 1e-6, 1e6])
 def test_buckling_loads_whatever_the_limit(limit, load):
@@ -174,6 +175,7 @@ ORBITS = [
 ]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("name", "limits", "numbers"), ORBITS)
 @pytest.mark.parametrize("direction", [1, -1])
 def test_unfolding_parameters_that_are_zero(name, limits, numbers, direction):

@@ -102,6 +102,7 @@ def test_the_homoclinic_orbit_is_found_from_a_guess():
     assert again["winding_phi"] == 1 and abs(again["current"] - first["current"]) < 1e-10
 
 
+@pytest.mark.full
 def test_the_homoclinic_orbit_is_grown_from_its_saddle():
     """The orbit comes back to the saddle one round further on; shooting along its manifolds as above."""
     rest = contin.AlgebraicProblem(junction, ["phi", "v"], {"current": 0.6, "beta": 2.0}, angles=["phi"])

@@ -214,6 +214,7 @@ def circuit(u, p):
     )
 
 
+@pytest.mark.full
 def test_a_curve_of_doublings_does_not_slide_onto_an_equilibrium():
     """An equilibrium solves the equations of the curve, too, with a period of half a round: not a point of it is one.
 

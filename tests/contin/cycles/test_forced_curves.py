@@ -182,6 +182,7 @@ def test_torus_bifurcations_end_on_a_symmetric_cycle(m1):
         assert point[name] == pytest.approx(value, abs=1e-10) and point.errors[name] < 1e-10
 
 
+@pytest.mark.full
 def test_folds_go_through_a_forcing_that_vanishes():
     """Van der Pol's oscillator, locked 1:1: at g = 0 the phase is free, and the curve goes on as its image u(t + T / 2) at -g.
 

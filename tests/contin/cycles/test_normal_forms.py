@@ -179,6 +179,7 @@ def test_of_a_torus_bifurcation(given, coordinates):
     assert point.name == f"torus, {'super' if expected < 0 else 'sub'}critical"
 
 
+@pytest.mark.full
 def test_of_a_torus_bifurcation_of_sixteen_states():
     """``spiral`` with twelve states that decay, all mixed by a reflection: it changes no length, and so not Re d.
 

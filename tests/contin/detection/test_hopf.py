@@ -142,6 +142,7 @@ def test_hopf_points_of_many_unknowns():
     assert all(point.normal_form < 0 for point in found)
 
 
+@pytest.mark.full
 def test_a_large_problem_may_start_at_zero():
     """u'' + lam (u - u^3) = 0 on 200 places: a branch point at an eigenvalue of the differences."""
     n = 200

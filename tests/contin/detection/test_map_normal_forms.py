@@ -60,6 +60,7 @@ def test_delayed_logistic_map():
     assert abs(point.normal_form + 1) < 1e-10
 
 
+@pytest.mark.full
 def test_henon_map():
     """Fold at a = -(1 - b)^2 / 4 and flip at a = 3 (1 - b)^2 / 4, coefficients by Kuznetsov's formulas in two dimensions."""
     b = 0.3

@@ -163,6 +163,7 @@ def test_folds_of_an_oscillator_with_a_spring_at_a_distance():
     assert max(point.discretization_error for point in branch.points) < 5e-12  # the tolerance, or round-off beside folds
 
 
+@pytest.mark.full
 def test_period_doubling_of_chuas_circuit():
     """Chua's diode is piecewise linear: the doubled cycle is a zero of the period map less 1 and of det(Dmap + 1)."""
     outer, inner = -5 / 7, -8 / 7
@@ -334,6 +335,7 @@ def test_a_point_is_looked_at_once(monkeypatch):
     assert finer.switching(carry(x)).places == pytest.approx(first.places, abs=1e-6)
 
 
+@pytest.mark.full
 def test_a_corner_in_python():
     """A function that cannot be recorded: two meshes agreed on a fold to 2e-14 that was off by 4e-8."""
     control = MeshControl(max_intervals=100)

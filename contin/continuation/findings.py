@@ -1,0 +1,81 @@
+"""What becomes of the special points that a step has found: located again, confirmed, with the index on both sides."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from contin.continuation.notes import Notes, why_lost
+from contin.detection.refinement import refined
+from contin.detection.second_variation import nullity_of
+from contin.detection.segment import Segment, SpecialPoint
+from contin.detection.test_functions import own_normal_form, with_normal_form
+from contin.stepping.settings import Settings
+from contin.stepping.trial import TestFunction
+
+#: Labels of points that must not be missed on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
+_CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
+#: Labels of points that no derivative by the solution tells.
+_BY_VALUES = ("EP", "UZ", "MX")
+
+#: The index on both sides of a special point; None where it is not defined.
+IndexChange = tuple[int | None, int | None]
+
+
+def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
+    """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
+    if not found.label:
+        return found  # a regular point
+    labelled = found.label != "MX" and found.name != "closed"  # closed: the first point once more
+    coarse = own_normal_form(found.trial.system, found)
+    if found.errors is None and labelled and settings.errors:
+        again = refined(found.same_as or found, settings)
+        details, errors, is_lost = found.details if found.same_as else again.details, again.errors, again.is_lost
+        if found.label not in _BY_VALUES and again.trial.system.switching(again.trial.x).jumps.any():
+            errors, is_lost = dict.fromkeys(errors, np.nan), True
+        found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors, is_lost=is_lost)
+    if coarse is not None:
+        better = own_normal_form(found.trial.system, found) if found.errors else coarse
+        found = with_normal_form(found, better or coarse, coarse)
+    return found
+
+
+def is_confirmed(point: SpecialPoint, segment: Segment, notes: Notes) -> bool:
+    """Return whether a special point was located and, where that was asked for, not missed on a finer mesh.
+
+    Others are noted: they get no label. The end of a run keeps its own. So does a point whose errors are not known because
+    Newton's method fails on the finer mesh; that is noted.
+    """
+    what = f"{point.label} {point.name.removeprefix('possible').strip()}".strip()
+    unknown = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
+    if point.stop is not None or (point.is_located and not (unknown and point.is_lost)):
+        if point.stop is None and unknown:
+            notes.add(f"{what} at {notes.place(point.trial)}: its ± is nan, since Newton's method failed at the second look")
+        return True
+    notes.inside(f"a possible {what} {why_lost(point.trial, point.is_located)}", segment)
+    return False
+
+
+def index_changes(
+    index: TestFunction | None, segment: Segment, special: Sequence[SpecialPoint], notes: Notes
+) -> list[IndexChange | None]:
+    """Return the index before and after each special point of a step, and note what contradicts itself."""
+    if index is None or not special:
+        return [None] * len(special)
+    groups = [list(group) for _, group in itertools.groupby(special, lambda point: (point.same_as or point).at)]
+    middles = [(a[-1].at + b[0].at) / 2 for a, b in itertools.pairwise(groups)]
+    last = special[-1]  # behind a limit the step does not belong to the branch
+    ends_there = last.stop is not None and last.test is not None and last.same_as is None
+    between = [segment.before, *(segment.near(s) for s in middles), last.trial if ends_there else segment.trial]
+    values = [trial.value(index) for trial in between]
+    whole = [None if np.isnan(value) else int(value) for value in values]
+    changes: list[IndexChange | None] = []
+    for group, (before, after), pair in zip(groups, itertools.pairwise(values), itertools.pairwise(whole)):
+        changes += [pair if nullity_of(point) else None for point in group]
+        if abs(after - before) > sum(map(nullity_of, group)) or (group[0].label == "LP" and after == before):
+            name = f"{group[0].label} {group[0].name}".strip()
+            notes.add(f"the index goes from {before:g} to {after:g} at {name} ({notes.place(group[0].trial)})")
+    return changes

@@ -1,0 +1,140 @@
+"""The first point of a run: corrected, on a mesh that serves, with sizes of its states and a direction."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.continuation.meshes import finer, is_poor
+from contin.continuation.scaling import renewed, scaled
+from contin.detection.accuracy import accuracy_of
+from contin.detection.significance import growing
+from contin.discretization.protocol import Discretization, inner
+from contin.errors import ConvergenceError
+from contin.names import value_names
+from contin.stepping.newton import Newton, correct
+from contin.stepping.settings import Settings
+from contin.stepping.settling import ROUNDS
+from contin.stepping.state import State, Stop, standing_at
+from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
+
+#: A start this far outside a limit (relative to 1 + its size) still lies on it: it was located there, to round-off.
+_SLACK = 1e-9
+#: A curve that begins where a test function that ends runs is zero has it positive this far along its tangent: what is known to
+#: 1e-10 is then told from round-off, and no regular start lies so near to an end.
+_ENTERS = 1e-6
+#: Rounds of correcting and adapting the mesh; each settles most of what is left.
+_ROUNDS = 3
+#: Finer and finer meshes that are tried.
+_ATTEMPTS = 4
+#: Distance from a first point that is exactly a branch point to where Newton's method begins. Ten times larger, the corrected
+#: point is a thousandth of a usual first step away.
+_BESIDE = 1e-6
+
+
+def on_branch(system: Discretization, x: Array, tangent: Array, settings: Settings, singular: bool) -> State:
+    """Return the state at a point of a branch, to go the way of its tangent; ``singular``: it is a branch point."""
+    system, carry = renewed(system, x)
+    x, tangent = carry(x), carry(tangent)
+    unit = tangent / np.sqrt(inner(system, tangent, tangent))
+    state = dataclasses.replace(standing_at(system, x, unit, settings.step), singular=singular)
+    return state if singular else _with_sign(state)
+
+
+def corrected_first(system: Discretization, x: Array, settings: Settings, primary: str) -> State:
+    """Return the state at the point that Newton's method finds from x, on a mesh on which its error is within the tolerance.
+
+    Raises
+    ------
+    ConvergenceError
+        Newton's method fails.
+    """
+    for _ in range(_ROUNDS):
+        system, x, row = _on_switches(system, x, settings, primary)
+        adapted = system.adapted(x, settings.mesh)
+        if adapted is None:
+            break
+        system, carry = adapted
+        x = carry(x)
+    else:
+        system, x, row = _on_switches(system, x, settings, primary)
+    linear = linearization(system, x, row)
+    rescaled, z = scaled(system, x, row, linear, primary, settings)
+    if rescaled is not system:
+        x, row = _correction(rescaled, z, primary, settings.newton)
+        system, linear = rescaled, linearization(rescaled, x, row)
+    system, x, linear = _accurate(system, x, linear, settings, primary)
+    unit = settings.direction * growing(system, x, linear.tangent, primary, settings.newton)
+    return _with_sign(standing_at(system, x, unit, settings.step))
+
+
+def _with_sign(state: State) -> State:
+    """Return a state with the sign of its determinant."""
+    return dataclasses.replace(state, sign=state.system.linearize(state.x, (state.row,))[1].sign)
+
+
+def _accurate(
+    system: Discretization, x: Array, linear: Linearization, settings: Settings, primary: str
+) -> tuple[Discretization, Array, Linearization]:
+    """Return the point on a mesh on which its error is within the tolerance, as far as one is found."""
+    for _ in range(_ATTEMPTS):
+        accuracy = accuracy_of(Trial(system, x, linear))
+        other = finer(system, x, accuracy.error, settings.mesh) if is_poor(accuracy, settings.mesh) else None
+        if other is None:
+            break
+        system, carry = other
+        system, x, row = _on_switches(system, carry(x), settings, primary)
+        linear = linearization(system, x, row)
+    return system, x, linear
+
+
+def _on_switches(system: Discretization, x: Array, settings: Settings, primary: str) -> tuple[Discretization, Array, Array]:
+    """Correct x, on a mesh with points where conditions that the solution decides switch; return the row held, too."""
+    x, row = _correction(system, x, primary, settings.newton)
+    for _ in range(ROUNDS if settings.mesh.every else 0):
+        moved = system.on_switches(x)
+        if moved is None:
+            break
+        system, carry = moved
+        x, row = _correction(system, carry(x), primary, settings.newton)
+    return system, x, row
+
+
+def _correction(system: Discretization, x: Array, primary: str, newton: Newton) -> tuple[Array, Array]:
+    """Correct x at fixed primary parameter or, where that is singular (at a fold), across a random direction.
+
+    Returns x and the row that was held.
+    """
+    fixed = np.zeros(system.size)
+    fixed[system.parameter_index(primary)] = 1.0
+    across = np.random.default_rng(3).standard_normal(system.size) * np.sqrt(system.weights)
+    failed: ConvergenceError | None = None
+    beside = x + _BESIDE * across / np.abs(across).max()  # of a branch point, where both are singular
+    for start, row in ((x, fixed), (x, across), (beside, across)):
+        try:
+            return correct(system, start, row, row @ start, newton, sizes=system.magnitudes).x, row
+        except ConvergenceError as error:
+            failed = failed or error
+    assert failed is not None
+    raise failed
+
+
+def begins_outside(trial: Trial, settings: Settings, own: Sequence[TestFunction], singular: bool) -> Stop | None:
+    """Return the reason to stop at the first point: it lies outside a limit, or outside the domain of the equations.
+
+    ``own`` are the test functions of the kind of problem. Where a curve begins, one that ends runs may be zero up to round-off,
+    and is positive a little further on.
+    """
+    for name, (low, high) in settings.limits.items():
+        size = min(1.0, high - low)
+        if not low - _SLACK * (size + abs(low)) <= trial[name] <= high + _SLACK * (size + abs(high)):
+            ends = " ... ".join(value_names((low, high)).values())
+            return Stop("limit", f"{name} = {trial[name]:.10g} at the start lies outside {ends}")
+    beside = Trial.without_tangent(trial.system, trial.x + _ENTERS * trial.tangent)
+    for test in own:
+        if test.terminal and trial.value(test) < 0 and (singular or not test.function(beside) > 0):
+            return Stop("event", f"{test.name} at the first point")
+    return None

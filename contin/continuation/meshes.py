@@ -1,0 +1,163 @@
+"""The mesh of a run: adapted now and then, finer where a point is not good enough, coarser where it is better than needed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.continuation.scaling import outgrown
+from contin.detection.accuracy import Accuracy, accuracy_of
+from contin.detection.hopf_end import collapsed
+from contin.detection.trivial import jumped
+from contin.discretization.mesh import MeshControl
+from contin.discretization.protocol import Carrier, Discretization, inner
+from contin.errors import ConvergenceError
+from contin.stepping.newton import correct
+from contin.stepping.settings import Settings
+from contin.stepping.state import State
+from contin.stepping.step import trial_of
+from contin.stepping.trial import TestFunction, Trial
+
+#: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
+#: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
+_MARGIN = 0.1
+#: Factor by which the number of intervals grows at most at a time: where the error is large, its estimate is no guide to how
+#: many are needed.
+_GROWTH = 4
+#: Part of the tolerance below which an error may be round-off: at the usual tolerance it is some 1e-14.
+_FAR_BELOW = 0.03
+#: Intervals, as a multiple of those that the density asks for, that may make round-off larger: 25 before a Hopf point behind
+#: canards. Ten times smaller, meshes before explosions become coarser, where errors of the mesh are taken for round-off.
+_FAR_TOO_MANY = 4
+
+#: A state, and its point with what is known of it beyond the state.
+Moved = tuple[State, Trial | None]
+
+
+def is_poor(accuracy: Accuracy, control: MeshControl) -> bool:
+    """Return whether a point has a larger error than the tolerance of the mesh, which a finer one would lower."""
+    if not (control.every and accuracy.error > control.tolerance and accuracy.trial is not None):
+        return False
+    return accuracy.trial.system.intervals < control.max_intervals and not accuracy.is_round_off
+
+
+def finer(system: Discretization, x: Array, error: float, control: MeshControl) -> tuple[Discretization, Carrier] | None:
+    """Return the system on a finer mesh that is adapted to x, as fine as the error takes; None if it may not be finer."""
+    count = min(max(_intervals_for(system, error, control), system.intervals + 1), control.max_intervals)
+    if count <= system.intervals:
+        return None
+    return system.adapted(x, dataclasses.replace(control, min_intervals=count, max_intervals=count))
+
+
+def _intervals_for(system: Discretization, error: float, control: MeshControl) -> int:
+    """Return the number of intervals with which a point of this error, of the order h^(2 d), is within the tolerance."""
+    order = 2 * max(system.degree, 1)
+    factor = min(float(error / (_MARGIN * control.tolerance)) ** (1 / order), _GROWTH)
+    return int(math.ceil(system.intervals * factor))
+
+
+@dataclasses.dataclass(frozen=True)
+class MeshPolicy:
+    """When a run changes its mesh, and whether it goes on from there.
+
+    Attributes
+    ----------
+    settings : Settings
+    tests : sequence of TestFunction
+        Those that have the same sign on every mesh.
+    sense : callable (trial) -> float
+        The sign of the way in which the primary parameter goes.
+    """
+
+    settings: Settings
+    tests: Sequence[TestFunction]
+    sense: Callable[[Trial], float]
+
+    def adapted(self, state: State, here: Callable[[], Trial]) -> Moved | None:
+        """Return the state on a mesh that is adapted to it, if one is due and serves; ``here`` returns the state's point."""
+        control = self.settings.mesh
+        due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
+        if state.singular or not due or state.accepted % due:
+            return None
+        fewest = self._fewest_intervals(state)
+        half = max(control.min_intervals, state.system.intervals // 2)
+        for count in (half, fewest) if self._is_too_fine(state, here) else (fewest,):
+            wanted = control if count == control.min_intervals else dataclasses.replace(control, min_intervals=count)
+            other = outgrown(state.system, state.x, state.system.adapted(state.x, wanted))
+            moved = None if other is None else self.moved(state, here, other)
+            if moved is not None:
+                return moved
+        return None
+
+    def moved(self, state: State, here: Callable[[], Trial], other: tuple[Discretization, Carrier]) -> Moved | None:
+        """Return the state on another mesh, or with other sizes, corrected there; None where the run does not go on from there.
+
+        It does not where the point is not found there, where a special point would fall between the meshes, or where a mesh of
+        fewer intervals is not good enough.
+        """
+        newton, (system, carry) = self.settings.newton, other
+        tangent = carry(state.tangent)
+        length = float(np.sqrt(inner(system, tangent, tangent)))
+        tangent /= length
+        previous, step = None if state.previous_tangent is None else carry(state.previous_tangent), state.step
+        if system.scales is not state.system.scales:
+            previous, step = None, float(np.clip(step * length, self.settings.min_step, self.settings.max_step))
+        x, row = carry(state.x), system.weights * tangent
+        if state.singular:  # a corrected point has a tangent of any of the branches; the first step corrects what is carried
+            return dataclasses.replace(state, system=system, x=x, tangent=tangent, step=step), None
+        try:
+            done = correct(system, x, row, row @ x, newton)
+            end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0), row)
+        except ConvergenceError:
+            return None  # the old mesh still serves; the step control will notice if it does not
+        before = here()
+        if collapsed(system, x, done.x) or self.sense(before) * self.sense(end) < 0:
+            return None
+        if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self.tests):
+            return None  # the next point will do as well
+        if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, newton):
+            return None
+        if system.intervals < state.system.intervals and not self._serves(state, end):
+            return None
+        return dataclasses.replace(
+            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign,
+            discretization_error=end.discretization_error,
+        ), end  # fmt: skip
+
+    def _fewest_intervals(self, state: State) -> int:
+        """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.
+
+        An error far below the tolerance may be round-off, which does not grow on coarser meshes: half of the intervals may do.
+        """
+        control, now, error = self.settings.mesh, state.system.intervals, state.discretization_error
+        if math.isnan(error) or not now:
+            return control.min_intervals
+        far_below = error < _FAR_BELOW * control.tolerance
+        count = now // 2 if far_below else min(_intervals_for(state.system, error, control), now)
+        return max(control.min_intervals, min(count, control.max_intervals))
+
+    def _serves(self, state: State, end: Trial) -> bool:
+        """Return whether the state's point is as good on a mesh of fewer intervals as it should be, or as it was.
+
+        Round-off does not grow there. Where canards amplify it, they amplify errors of the mesh, too, and these do.
+        """
+        accuracy, before, control = accuracy_of(end), state.discretization_error, self.settings.mesh
+        return not is_poor(accuracy, control) and not (before > control.tolerance and accuracy.error > before)
+
+    def _is_too_fine(self, state: State, here: Callable[[], Trial]) -> bool:
+        """Return whether the error is round-off above the tolerance, on far more intervals than the density asks for.
+
+        Half of them may do then: short intervals make it larger, as where cycles shrink after canards. Where the parameter
+        stands still, in an explosion, errors of the mesh are taken for round-off.
+        """
+        control = self.settings.mesh
+        if not state.discretization_error > control.tolerance or not accuracy_of(here()).is_round_off:
+            return False
+        wanted = state.system.adapted(state.x, control)
+        if wanted is None or wanted[0].intervals * _FAR_TOO_MANY > state.system.intervals:
+            return False
+        return bool(self.sense(here()))

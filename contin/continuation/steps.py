@@ -1,0 +1,147 @@
+"""One careful step: predicted, corrected, believed or refused; and the state behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from contin.arrays import Array
+from contin.detection.hopf_end import collapsed
+from contin.detection.segment import Place, Segment
+from contin.detection.significance import STANDS, free_values, sense
+from contin.detection.trivial import crossed, jumped
+from contin.errors import ConvergenceError
+from contin.stepping.settings import Settings
+from contin.stepping.settling import settled
+from contin.stepping.state import State
+from contin.stepping.step import (
+    ASTRAY,
+    Judgement,
+    aims,
+    corrected,
+    following_step,
+    is_astray,
+    judged,
+    located,
+    longest_step,
+    predict,
+)
+from contin.stepping.trial import TestFunction, Trial
+
+#: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
+#: The next one is taken where the equations are still too nearly singular for Newton's method.
+_ASIDE = (0.01, 0.1, 0.5)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How the steps of a run are made.
+
+    Attributes
+    ----------
+    settings : Settings
+    primary : str
+        The parameter whose folds are told.
+    fold : TestFunction, optional
+        None where folds are not wanted.
+    """
+
+    settings: Settings
+    primary: str
+    fold: TestFunction | None
+
+    def attempt(self, state: State, here: Trial, step: float) -> tuple[Segment, Judgement]:
+        """Make one step of a given length from the state's point, as far as it can be believed by itself.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        settings = self.settings
+        guess = predict(state, step)
+        trial = corrected(state, guess, step, settings.newton)
+        if collapsed(state.system, state.x, trial.x):
+            raise ConvergenceError("the cycle at the corrected point is an equilibrium")
+        judgement = judged(state, guess, trial)
+        angle, accuracy = aims(settings, state.system)
+        if not (judgement.turn <= angle and judgement.missed <= ASTRAY * accuracy * step):
+            raise ConvergenceError(
+                f"tangents turn by {judgement.turn:.2f} rad in one step, the prediction is off by "
+                f"{judgement.missed / step:.2f} of it"
+            )
+        if self.fold is not None and self._jumped(state, guess, trial, step):
+            raise ConvergenceError(f"{self.primary} does not go where the tangents at both ends say")
+        low, before = self._aside(state, step) if state.singular else (0.0, here)
+        self._stay_off_trivial(state, before, trial)
+        if settings.mesh.every:
+            trial = settled(trial, state.tangent, settings.newton)
+        return Segment(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), judgement
+
+    def accepted(self, segment: Segment, judgement: Judgement, turned: bool) -> State:
+        """Return the state behind a step, on the mesh that its end has settled on.
+
+        The next step is chosen so that the predictor's error is ``accuracy`` of it.
+        ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
+        """
+        settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
+        angle, accuracy = aims(settings, state.system)
+        order, longest = 2 if state.previous_tangent is None else 3, settings.max_step
+        free = slice(state.system.state_size, None)
+        for value, rate in zip(trial.x[free].tolist(), trial.tangent[free].tolist()):
+            longest = longest_step(longest, settings.change, value, rate)
+        following = following_step(step, judgement.missed, judgement.turn, order, accuracy, angle, settings.min_step, longest)
+        way = self.sense(trial) if turned or self._has_moved(state.x, trial) else 0.0
+        way = 0.0 if way * state.sense < 0 and not turned else way  # a fold that was not seen: the next step has it behind it
+        sensed = free_values(trial) if way else state.sensed
+        end, previous = trial.settled, None if state.singular else state.tangent
+        if previous is not None and end.system is not state.system:
+            previous = state.system.carrier(end.system)(previous)
+        return State(
+            end.system, end.x, end.tangent, previous, step, following, end.sign, state.arclength + judgement.length,
+            state.accepted + 1, False, way or state.sense, sensed, end.discretization_error,
+        )  # fmt: skip
+
+    def sense(self, trial: Trial) -> float:
+        """Return the sense in which the primary parameter goes; zero where that cannot be told, or is not wanted."""
+        return 0.0 if self.fold is None else sense(trial, self.fold, self.settings.newton)
+
+    def _stay_off_trivial(self, state: State, before: Trial, trial: Trial) -> None:
+        """Raise ConvergenceError where the corrected point lies on the trivial branch, or where the first step passes it."""
+        name, newton = self.settings.trivial, self.settings.newton
+        if name is None:
+            return
+        if jumped(before, trial, name, newton):
+            raise ConvergenceError(f"the corrected point lies on the trivial branch, {name} = {trial[name]:.1e}")
+        if state.singular and crossed(before, trial, name, newton):
+            raise ConvergenceError(f"{name} changes its sign in the first step")
+
+    def _aside(self, state: State, step: float) -> Place:
+        """Return the nearest point beside a branch point that Newton's method finds, with a tangent along the branch.
+
+        At a branch point tangent and determinant say nothing: this one stands in where a step's test functions start from.
+        """
+        problem = ConvergenceError("another branch was met right beside the branch point")
+        for share in _ASIDE:
+            try:
+                guess = state.x + share * step * state.tangent
+                aside = located(state, guess, share * step, self.settings.newton)
+                if judged(state, guess, aside).turn <= aims(self.settings, state.system)[0]:
+                    return share * step, aside
+            except ConvergenceError as error:
+                problem = error
+        raise problem
+
+    def _jumped(self, state: State, guess: Array, trial: Trial, step: float) -> bool:
+        """Return whether the primary parameter misses its prediction by much of what it changes at all.
+
+        It may be a small part of the whole: the distance from the prediction does not show it then, and folds would be jumped.
+        """
+        at = trial.system.parameter_index(self.primary)
+        missed = abs(guess[at] - trial.x[at])
+        tangents = [state.tangent, trial.tangent] + ([] if state.previous_tangent is None else [state.previous_tangent])
+        change = step * max(abs(tangent[at]) for tangent in tangents)
+        return bool(is_astray(missed, change, trial.newton_error, trial.x[at]) and self.sense(trial))
+
+    def _has_moved(self, start: Array, trial: Trial) -> bool:
+        """Return whether a step has moved the primary parameter by more than round-off: tangents are blurred at Hopf points."""
+        at = trial.system.parameter_index(self.primary)
+        return bool(abs(trial.x[at] - start[at]) > STANDS * (1 + abs(trial.x[at])))
