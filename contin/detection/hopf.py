@@ -95,11 +95,12 @@ def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
         return []  # all eigenvalues are real
     inside = sorted({segment.step * part / _PARTS for part in range(1, _PARTS)} - {s for s, _ in knots})
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda knot: knot[0])
-    if not any(_moving(looked)):
+    moves = _moving(looked)
+    if not any(moves):
         return []
-    passed = _passed(looked)
+    passed = _passed(looked, moves)
     if segment.trial.system.size <= _SMALL:  # otherwise each place takes long
-        closely = _passed(_looked_at_closely(segment, looked))
+        closely = _passed(*_looked_at_closely(segment, looked, moves))
         if len(closely) > len(passed):
             passed, inside = closely, sorted({*inside, *(s for pair in closely for s in pair)} - {s for s, _ in knots})
     if passed:
@@ -131,24 +132,25 @@ def _moving(places: list[Place]) -> list[bool]:
     return [not far < distance for far, distance in zip(fastest * lengths, distances)]
 
 
-def _looked_at_closely(segment: Segment, places: list[Place]) -> list[Place]:
+def _looked_at_closely(segment: Segment, places: list[Place], moves: list[bool]) -> tuple[list[Place], list[bool]]:
     """Return the places and, where eigenvalues move far between two of them, further ones between these, on the cubic.
 
-    A pair may pass the axis and come back: where two pairs nearly meet their real parts have narrow peaks.
+    A pair may pass the axis and come back: where two pairs nearly meet their real parts have narrow peaks. ``moves`` tells
+    where eigenvalues move far, and comes back for the new places.
     """
     for _ in range(_CLOSER):
-        far = [pair for pair, moves in zip(itertools.pairwise(places), _moving(places)) if moves]
-        if not far:
+        between = [(left[0] + right[0]) / 2 for (left, right), far in zip(itertools.pairwise(places), moves) if far]
+        if not between:
             break
-        between = [(left[0] + right[0]) / 2 for left, right in far]
         places = sorted([*places, *((s, segment.guessed(s)) for s in between)], key=lambda place: place[0])
-    return places
+        moves = _moving(places)
+    return places, moves
 
 
-def _passed(places: list[Place]) -> list[tuple[float, float]]:
+def _passed(places: list[Place], moves: list[bool]) -> list[tuple[float, float]]:
     """Return neighbours among places of a step between which a pair passes: none where eigenvalues do not move so far."""
-    pieces = zip(itertools.pairwise(places), _moving(places))
-    return [(left[0], right[0]) for (left, right), moves in pieces if moves and _passes_as_pair(left[1], right[1])]
+    pieces = zip(itertools.pairwise(places), moves)
+    return [(left[0], right[0]) for (left, right), far in pieces if far and _passes_as_pair(left[1], right[1])]
 
 
 def _passes_as_pair(left: Trial, right: Trial) -> bool:
@@ -159,6 +161,9 @@ def _passes_as_pair(left: Trial, right: Trial) -> bool:
 
 def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
     """Return the eigenvalues at both ends that changed the side of the imaginary axis."""
+    system: Any = left.system
+    if not (np.any(system.eigenvalues(left.x).real > 0) or np.any(system.eigenvalues(right.x).real > 0)):
+        return np.empty(0, complex), np.empty(0, complex)  # as where all is stable
     first, last = _matched(left, right)
     changed = (first.real > 0) != (last.real > 0)
     upper = (first.imag > -_REAL * (1 + np.abs(first))) | (last.imag > -_REAL * (1 + np.abs(last)))
