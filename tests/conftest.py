@@ -2,6 +2,7 @@
 
 import os
 import sys
+import zlib
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,7 @@ MOST_WORKERS = 8
 
 def pytest_addoption(parser):
     parser.addoption("--full", action="store_true", help="tests that take long, all examples of random input, every fault")
+    parser.addoption("--part", metavar="K/N", help="of the tests that take long, the K-th of N parts, K from 0 on")
 
 
 def pytest_configure(config):
@@ -74,9 +76,12 @@ def pytest_collection_modifyitems(config, items):
         for item, mark in ((item, item.get_closest_marker(name)) for item in items if not given):
             if mark is not None:
                 item.add_marker(pytest.mark.skip(reason=f"needs {name}: {mark.args[0]}"))
+    part, parts = map(int, (config.getoption("--part") or "0/1").split("/"))
     for item in list(_left_out(items)):
         item.add_marker(pytest.mark.full)
         if not config.getoption("--full"):
-            item.add_marker(pytest.mark.skip(reason="takes long: with --full only, which .ci/run asks for"))
+            item.add_marker(pytest.mark.skip(reason="takes long: with --full only"))
+        elif zlib.crc32(item.nodeid.encode()) % parts != part:
+            item.add_marker(pytest.mark.skip(reason="takes long, and belongs to another part of those that do"))
     places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(FIRST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))
