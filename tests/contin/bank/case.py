@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,13 +42,19 @@ class Case:
     name : str
     run : callable
         ``run()`` computes the branch.
-    specials : sequence of Special
-        Everything labelled after the first point, in the order of the run, its end included.
+    known : sequence of Special, or callable
+        Everything labelled after the first point, in the order of the run, its end included. What takes long is computed when
+        it is asked for.
     """
 
     name: str
     run: Callable[[], Branch]
-    specials: Sequence[Special]
+    known: Sequence[Special] | Callable[[], Sequence[Special]]
+
+    @functools.cached_property
+    def specials(self) -> Sequence[Special]:
+        """What is known."""
+        return self.known() if callable(self.known) else self.known
 
 
 def value(point: Point, name: str) -> float:

@@ -257,5 +257,5 @@ CASES = [
     ]),
     Case("ring of four", ring, [*(Special("BP", {"lam": x}) for x in (0.0, 1.0, 2.0)), Special("EP", {"lam": 3.0})]),
     Case("Duffing's resonance", resonance, [*resonance_folds(), Special("EP", {"w": 5.0})]),
-    Case("grid of 3 x 3", grid, coarse()),
+    Case("grid of 3 x 3", grid, coarse),
 ]  # fmt: skip
