@@ -1,6 +1,7 @@
 """The house rules of contin, read from its source: sizes, comments of constants, and what may import what."""
 
 import ast
+import functools
 import io
 import itertools
 import re
@@ -103,8 +104,14 @@ def bare_constants(tree, text):
 # --- the package ----------------------------------------------------------------------------------------------------
 
 
-SOURCES = {path: path.read_text(encoding="utf-8") for path in FILES}
-TREES = {path: ast.parse(text) for path, text in SOURCES.items()}
+@functools.cache
+def source(path):
+    return path.read_text(encoding="utf-8")
+
+
+@functools.cache
+def tree_of(path):
+    return ast.parse(source(path))
 
 
 def said(check):
@@ -117,17 +124,17 @@ def listed(found):
 
 
 def test_no_function_is_longer_than_a_screen():
-    found = said(lambda path: long_functions(TREES[path]))
+    found = said(lambda path: long_functions(tree_of(path)))
     assert not found, listed(found)
 
 
 def test_no_function_has_more_than_eight_arguments():
-    found = said(lambda path: crowded_functions(TREES[path]))
+    found = said(lambda path: crowded_functions(tree_of(path)))
     assert not found, listed(found)
 
 
 def test_every_constant_says_where_it_comes_from():
-    found = said(lambda path: bare_constants(TREES[path], SOURCES[path]))
+    found = said(lambda path: bare_constants(tree_of(path), source(path)))
     assert not found, listed(found)
 
 
