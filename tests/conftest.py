@@ -1,6 +1,7 @@
 """Shared by all tests: one thread each, the option ``--full``, workers, and the order of modules."""
 
 import os
+import signal
 import sys
 import zlib
 from pathlib import Path
@@ -11,6 +12,10 @@ import pytest
 # linear algebra wait for a busy one, matrices as small as these take thirty times as long.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "CONTIN_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# A shell that starts the tests in the background lets them ignore SIGINT, and the tests of interrupts would wait for ever.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parent.parent
 #: The modules that take longest, some ten seconds or more, in order. They are handed out first: what comes last must be short,
