@@ -152,7 +152,7 @@ class Algebraic(System):
     def _own_jacobian(self, u: Array, p: Array) -> Any:
         """Return the user's Jacobian; dense unless `is_sparse`."""
         matrix = self.problem.jacobian_at(u, p)
-        return matrix if self.is_sparse or isinstance(matrix, np.ndarray) else matrix.toarray()
+        return matrix if self.is_sparse else _dense(matrix)
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
@@ -236,7 +236,7 @@ class Algebraic(System):
         """Return F_u in the user's units at other states (K, n), with the parameters of x; shape (K, equations, n)."""
         p = self.all_parameters(x)
         if self.problem.jacobian is not None:
-            return np.array([np.asarray(self._own_jacobian(u, p)) for u in states])
+            return np.array([_dense(self.problem.jacobian_at(u, p)) for u in states])
         batch, columns = self._by_states
         times = _NO_TIME if len(states) == 1 else np.zeros(len(states))
         return batch.jacobian(times, states, self._none, p, columns)[1]
@@ -394,3 +394,8 @@ _KEPT = 64
 #: Entries on both sides of the diagonal that differ by less, relative to the largest entry, are equal: round-off of sums.
 _SYMMETRIC = 1e-13
 _NO_TIME = np.zeros(1)
+
+
+def _dense(matrix: Any) -> Array:
+    """Return a matrix that a user gives, which may be sparse, as an array."""
+    return matrix if isinstance(matrix, np.ndarray) else np.asarray(matrix.toarray())

@@ -54,7 +54,8 @@ def test_a_fold_in_an_explosion():
     (fold,) = branch.labelled("LP")
     assert [point.label for point in branch if point.label] == ["HB", "LP", "EP"]
     assert fold.errors["a"] < 1e-8 and 1 < fold.errors["period"] < 60
-    before = [point for point in branch if point.arclength < fold.arclength - fold.errors["period"] and not point.label]
+    before = [point for point in branch if point.arclength < fold.arclength and not point.label]
+    before = [point for point in before if point["period"] < fold["period"] - fold.errors["period"]]
     assert {point.floquet().unstable for point in before} == {1}
     assert branch.points[-1].floquet().unstable == 0
 
