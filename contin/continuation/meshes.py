@@ -10,6 +10,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.continuation.scaling import outgrown
+from contin.continuation.steps import Steps
 from contin.detection.accuracy import Accuracy, accuracy_of
 from contin.detection.hopf_end import collapsed
 from contin.detection.trivial import jumped
@@ -66,16 +67,19 @@ class MeshPolicy:
 
     Attributes
     ----------
-    settings : Settings
+    steps : Steps
+        How the steps of the run are made, with its settings.
     tests : sequence of TestFunction
         Those that have the same sign on every mesh.
-    sense : callable (trial) -> float
-        The sign of the way in which the primary parameter goes.
     """
 
-    settings: Settings
+    steps: Steps
     tests: Sequence[TestFunction]
-    sense: Callable[[Trial], float]
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the run."""
+        return self.steps.settings
 
     def adapted(self, state: State, here: Callable[[], Trial]) -> Moved | None:
         """Return the state on a mesh that is adapted to it, if one is due and serves; ``here`` returns the state's point."""
@@ -115,7 +119,7 @@ class MeshPolicy:
         except ConvergenceError:
             return None  # the old mesh still serves; the step control will notice if it does not
         before = here()
-        if collapsed(system, x, done.x) or self.sense(before) * self.sense(end) < 0:
+        if collapsed(system, x, done.x) or self.steps.sense(before) * self.steps.sense(end) < 0:
             return None
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self.tests):
             return None  # the next point will do as well
@@ -160,4 +164,4 @@ class MeshPolicy:
         wanted = state.system.adapted(state.x, control)
         if wanted is None or wanted[0].intervals * _FAR_TOO_MANY > state.system.intervals:
             return False
-        return bool(self.sense(here()))
+        return bool(self.steps.sense(here()))

@@ -135,14 +135,12 @@ class Continuation:
         start: Start | None = None,
         singular: bool = True,
     ) -> None:
-        self.settings = settings
         self.stop: Stop | None = None
         self._end: Trial | None = None  # the state's point, with what is known of it beyond the state
         check(system, settings)
         self.primary = settings.primary or system.free[0]
+        self._steps = Steps(settings, self.primary, fold(self.primary) if settings.folds else None)
         self._state: State | Callable[[], State] = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
-        self._fold = fold(self.primary) if settings.folds else None
-        self._steps = Steps(settings, self.primary, self._fold)
         self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
         general = [
@@ -151,15 +149,25 @@ class Continuation:
         ]  # fmt: skip
         self._tests = [*general, *self._own]
         self._ends = [test for test in self._tests if test.terminal and not test.limit]
-        self._meshes = MeshPolicy(settings, general, self._steps.sense)
+        self._meshes = MeshPolicy(self._steps, general)
         self._index = index_of(self.state.system)
-        self._watch = watch_list(self.state.system, settings, self._tests, self._fold, self._index)
+        self._watch = watch_list(self.state.system, settings, self._tests, self._steps.fold, self._index)
         self._notes = Notes(self.primary, settings.mesh.tolerance, bool(settings.mesh.every))
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
         self._lane_for: object = None
         self._known_lane: Lane | None = None
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the steps from here on."""
+        return self._steps.settings
+
+    @settings.setter
+    def settings(self, settings: Settings) -> None:
+        self._steps = dataclasses.replace(self._steps, settings=settings)
+        self._meshes = dataclasses.replace(self._meshes, steps=self._steps)
 
     @property
     def state(self) -> State:
@@ -273,7 +281,7 @@ class Continuation:
         self._notes.noise(segment, max(self.settings.newton.tolerance, NOISY))
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
-        elif self._fold is not None and self.state.accepted == _STANDING and not self.state.sense:
+        elif self._steps.fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
             if self.stop is None and not segment.trial.system.intervals:
                 place = f"{self.primary} stays at {segment.trial[self.primary]:.10g}, as far as can be told"
@@ -290,8 +298,6 @@ class Continuation:
         here, least = self._here()[self.primary], exact_text(self.settings.min_step)
         self._notes.add(f"from {self.primary} = {here:.10g} on, steps below {least} are taken: the branch bends sharply there")
         self.settings = dataclasses.replace(self.settings, min_step=shorter)
-        self._steps = dataclasses.replace(self._steps, settings=self.settings)
-        self._meshes = dataclasses.replace(self._meshes, settings=self.settings)
         return True
 
     # --- one step ------------------------------------------------------------------------------------------------
@@ -351,7 +357,7 @@ class Continuation:
         while True:
             try:
                 segment, judgement = self._steps.attempt(state, self._here(), step)
-                inspection = Inspection(segment, settings, self.start, self._fold)
+                inspection = Inspection(segment, settings, self.start, self._steps.fold)
                 if not (state.singular or segment.is_moved or any(asks(inspection) for asks in self._watch)):
                     return Step(segment, judgement)
                 doubt = inspection.doubt() or self._contradiction(segment, inspection) or self._lost_end(segment, inspection)

@@ -390,9 +390,9 @@ _MANY = 200
 _FEW = 0.1
 #: Sets of eigenvalues that are kept: more than a search for Hopf points compares.
 _KEPT = 64
-#: The t of functions that do not take it.
 #: Entries on both sides of the diagonal that differ by less, relative to the largest entry, are equal: round-off of sums.
 _SYMMETRIC = 1e-13
+#: The t of functions that do not take it.
 _NO_TIME = np.zeros(1)
 
 
