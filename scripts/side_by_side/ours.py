@@ -28,13 +28,13 @@ def forget() -> None:
                     clear()
 
 
-def points(demo: Demo) -> list[list[dict]]:
-    """Return contin's labelled points of each part of a demo."""
-    return [of_contin(part.branches(), part) for part in demo.parts]
+def branches(demo: Demo) -> list:
+    """Return what contin computes for each part of a demo."""
+    return [part.branches() for part in demo.parts]
 
 
 def run(name: str, repeats: int) -> dict:
-    """Return the points of a demo, and processor seconds.
+    """Return the points of a demo, and processor seconds of what contin computes; the comparison is not in them.
 
     ``first`` are those of this process up to the end of its first run, ``again`` those of a further run: the median of at most
     ``repeats``, and of the first run itself where it takes long, or for 0.
@@ -42,12 +42,13 @@ def run(name: str, repeats: int) -> dict:
     (demo,) = [demo for demo in DEMOS if demo.name == name]
     forget()
     loaded = time.process_time()
-    found = points(demo)
+    found = branches(demo)
     first = time.process_time()
     further = [] if repeats and first < PATIENCE else [first - loaded]
     while len(further) < repeats and sum(further) < PATIENCE:
         forget()
         began = time.process_time()
-        points(demo)
+        branches(demo)
         further.append(time.process_time() - began)
-    return {"points": found, "first": first, "again": statistics.median(further)}
+    points = [of_contin(each, part) for each, part in zip(found, demo.parts)]
+    return {"points": points, "first": first, "again": statistics.median(further)}
