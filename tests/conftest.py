@@ -86,6 +86,8 @@ def pytest_collection_modifyitems(config, items):
         item.add_marker(pytest.mark.full)
         if not config.getoption("--full"):
             item.add_marker(pytest.mark.skip(reason="takes long: with --full only"))
+        elif parts > 1 and item.get_closest_marker("hours"):
+            item.add_marker(pytest.mark.skip(reason="takes longer than a part of the tests may"))
         elif zlib.crc32(item.nodeid.encode()) % parts != part:
             item.add_marker(pytest.mark.skip(reason="takes long, and belongs to another part of those that do"))
     places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(FIRST)}

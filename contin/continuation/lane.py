@@ -1,4 +1,9 @@
-"""The lane of plain steps: when it may be taken, and points and states of what `contin.continuation.plain` makes."""
+"""The lane of plain steps: when it may be taken, and points and states of what its kernels make.
+
+The kernels are those of `contin.continuation.plain`, without a mesh, and of `contin.continuation.plain_on_mesh`. What they do
+not know (users' functions, functionals, the index, the trivial branch) is asked of the points that they have made: the lane
+ends before the step that asks.
+"""
 
 from __future__ import annotations
 
@@ -10,30 +15,41 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.continuation.plain import (
+from contin.continuation.plain import Quotient, Rooms, plain_steps
+from contin.continuation.plain_on_mesh import MeshRooms, ends_are_calm, multipliers_ask, rests, step_on_mesh
+from contin.continuation.rules import (
     ARCLENGTH,
+    CLOSES,
     ERROR_LEFT,
     ITERATIONS,
-    LENGTH,
+    JUDGED,
+    MESH_ERROR,
     NUMBERS,
     SIGN_OF,
     STEP,
     Attempt,
     Control,
+    Frame,
     Path,
-    Quotient,
-    Rooms,
     Watch,
-    plain_steps,
 )
-from contin.detection.inspection import Start
+from contin.detection.homoclinic import STILL, homoclinic
+from contin.detection.inspection import Start, is_elsewhere
+from contin.detection.second_variation import index_of, stability_of
+from contin.detection.segment import SpecialPoint
 from contin.detection.spectra import spectra_of
-from contin.discretization.algebraic import Algebraic
+from contin.detection.trivial import crossed, jumped
+from contin.discretization.collocation import Collocation
+from contin.discretization.cycles import CycleCollocation, ForcedCollocation, PeriodicCollocation
+from contin.discretization.defect import estimate, estimate_of
+from contin.discretization.monodromy import monodromy_of
 from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
+from contin.linalg.ends import Relations
 from contin.results.point import Point
+from contin.stepping import one_call
 from contin.stepping.settings import Settings
-from contin.stepping.small import Equations, equations_of, linear_of
+from contin.stepping.small import equations_of, linear_of
 from contin.stepping.state import State
 from contin.stepping.step import aims
 from contin.stepping.trial import Linearization, TestFunction, Trial
@@ -55,95 +71,223 @@ def lane_of(
     noisy : bool
         Round-off of Newton's method was noted.
     """
-    equations = equations_of(system)
-    if equations is None or settings.trivial is not None:
-        return None
     known: Any = system
-    others = [test for test in tests if test not in own and not test.holds_one_of(system.free)]
+    kind = SmallLane if equations_of(system) is not None else MeshLane if _is_smooth(known) else None
+    if kind is None:
+        return None
+    others = [test for test in tests if not (kind.knows(test) and test in own) and not test.holds_one_of(system.free)]
     if any(test.search or test.asks or test.looks for test in others):
         return None
-    return Lane(known, equations, settings, start, tests, others, bool(own), noisy)
+    return kind(known, settings, start, tests, others, noisy)
 
 
-def _control(settings: Settings, system: Algebraic, primary: int) -> Control:
-    """Return the settings as the kernel takes them."""
-    newton, (angle, accuracy) = settings.newton, aims(settings, system)
-    return Control(
-        newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step,
-        settings.max_step, primary,
-    )  # fmt: skip
+def _is_smooth(system: Any) -> bool:
+    """Return whether a kernel makes steps on a mesh: functions are recorded, and have no jumps that the mesh must know of."""
+    if type(system) not in (Collocation, CycleCollocation, ForcedCollocation) or system.workspace is None:
+        return False
+    return system.intervals > 1 and not system.breaks.size and not system.has_selections and system.size == system.equations + 1
+
+
+def _quotient(size: int) -> Quotient:
+    (before, quotient, work), (real, imaginary) = np.empty((3, size, size)), np.empty((2, 1, size))
+    return Quotient(before, quotient, work, np.empty((1, size, size)), real, imaginary)
 
 
 class Lane:
-    """Plain steps of one system, with what the kernel works in.
+    """Plain steps of one system, with what a kernel works in.
 
     Parameters
     ----------
-    system : Algebraic
-    equations : Equations
-        Those of the system.
+    system : Discretization
     settings : Settings
     start : tuple (system, x, tangent)
         The first point of the run.
     tests, others : sequence of TestFunction
         All, and those that the kernel does not know.
-    eigenvalues : bool
-        Eigenvalues are watched.
     noisy : bool
     """
 
     def __init__(
-        self, system: Algebraic, equations: Equations, settings: Settings, start: Start, tests: Sequence[TestFunction],
-        others: Sequence[TestFunction], eigenvalues: bool, noisy: bool,
+        self, system: Any, settings: Settings, start: Start, tests: Sequence[TestFunction], others: Sequence[TestFunction],
+        noisy: bool,
     ) -> None:  # fmt: skip
-        self.system, self.settings, self.noisy, self._others = system, settings, noisy, others
-        size, n = system.size, system.state_size
+        self.system, self.settings, self.noisy, self._start = system, settings, noisy, start
+        self._others, self._index = others, index_of(system)
+        primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
+        newton, (angle, accuracy) = settings.newton, aims(settings, system)
+        self._frame = Frame(system.weights, system.state_size, system.free_scales)
+        self._attempt = Attempt(np.empty(system.size), np.empty(6), np.zeros(JUDGED))
+        self._control = Control(
+            newton.tolerance, newton.max_iterations, accuracy, angle, settings.change, settings.min_step, settings.max_step,
+            primary,
+        )  # fmt: skip
         held = [test for test in tests if test.holds_one_of(system.free)]
         ends = np.array([settings.limits.get(name, (-np.inf, np.inf)) for name in system.free], dtype=float)
         sides = [(1.0 if test.value == settings.limits[test.column][1] else -1.0) if test.limit else 0.0 for test in held]
-        home, x, _ = start
-        closing = np.where(np.append(system.circles, np.zeros(size - n)) > 0, 0.0, system.weights)
-        primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
-        (before, quotient, work), (real, imaginary) = np.empty((3, size, size)), np.empty((2, 1, size))
-        self._rooms = Rooms(
-            equations, linear_of(size), Attempt(np.empty(size), np.empty(6), np.empty(LENGTH + 1)),
-            _control(settings, system, primary),
-            Watch(
-                int(settings.branch_points), int(eigenvalues), int(noisy),
-                np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),
-                np.array([test.value for test in held], dtype=float), np.array(sides), ends[:, 0].copy(), ends[:, 1].copy(),
-                home.carrier(system)(x), closing,
-            ),
-            Quotient(before, quotient, work, np.empty((1, size, size)), real, imaginary), spectra_of(n, size),
+        self._watch = Watch(
+            int(settings.branch_points), int(any(self.knows(test) for test in tests)), int(noisy),
+            np.array([system.parameter_index(test.column) for test in held], dtype=np.int64),
+            np.array([test.value for test in held], dtype=float), np.array(sides), ends[:, 0].copy(), ends[:, 1].copy(),
+            *self._home(),
         )  # fmt: skip
+
+    @staticmethod
+    def knows(test: TestFunction) -> bool:
+        """Return whether the kernel watches for what a test function, one of the kind of problem, looks for."""
+        return test.asks is not None
+
+    def serves(self, system: Discretization, settings: Settings, noisy: bool) -> bool:
+        """Return whether the lane is that of a system of the same run, with these settings."""
+        return self.settings is settings and self.noisy == noisy and self.system is system
+
+    def _home(self) -> tuple[Array, Array]:
+        """Return the first point of the run, or the last of its unknowns, and by which weights distances to it are measured."""
+        raise NotImplementedError
+
+    def _make(self, path: Path, accepted: int, bent: int) -> int:
+        """Make plain steps from row 1 of a path; return how many."""
+        raise NotImplementedError
 
     def steps(self, state: State, most: int) -> Block:
         """Make plain steps from a state, no more than ``most``."""
         size = state.x.size
-        path = Path(np.empty((most + 2, size)), np.empty((most + 2, size)), np.empty((most + 2, NUMBERS)))
+        path = Path(np.empty((most + 2, size)), np.empty((most + 2, size)), np.zeros((most + 2, NUMBERS)))
         bent = state.previous_tangent is not None
         path.x[1], path.tangents[1] = state.x, state.tangent
         path.tangents[0] = state.previous_tangent if bent else 0.0
-        path.numbers[1] = state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0
-        made = plain_steps(self._rooms, path, state.accepted, int(bent))
-        trials = self._trials(path, made) if self._others or self.system.problem.functionals else []
-        return Block(self.system, state, path, self._passed(trials, made), trials)
+        path.numbers[1, :MESH_ERROR] = (
+            state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0,
+        )  # fmt: skip
+        made = self._make(path, state.accepted, int(bent))
+        return Block(self.system, state, path, *self._passed(path, made))
 
-    def _trials(self, path: Path, made: int) -> list[Trial]:
-        """Return the state's point, and the ends of the steps."""
+    def _passed(self, path: Path, made: int) -> tuple[int, list[int | None] | None]:
+        """Return how many of the steps pass nothing that the kernel does not know, and the index at their ends, if any."""
+        wanted = self._others or self._index is not None or self.settings.trivial is not None
+        if not (wanted or path.numbers[2 : made + 2, CLOSES].any()):
+            return made, None
         signs = path.numbers[1:, SIGN_OF].tolist()
         rows = zip(path.x[1 : made + 2], path.tangents[1:], signs)
-        return [Trial(self.system, x, Linearization(tangent, sign)) for x, tangent, sign in rows]
-
-    def _passed(self, trials: Sequence[Trial], made: int) -> int:
-        """Return how many of the steps pass no zero of a test function that the kernel does not know."""
+        trials = [Trial(self.system, x, Linearization(tangent, sign)) for x, tangent, sign in rows]
+        passed = made
         for number, (before, trial) in enumerate(itertools.pairwise(trials)):
+            step, closes = path.numbers[number + 2, (STEP, CLOSES)].tolist()
             try:
-                if any(test.passed(before.value(test), trial.value(test)) for test in self._others):
-                    return number
+                if (closes and not is_elsewhere(self._start, before, trial, step)) or self._asks(before, trial):
+                    passed = number
+                    break
             except ConvergenceError:
-                return number
-        return made
+                passed = number
+                break
+        if self._index is None:
+            return passed, None
+        return passed, [stability_of(SpecialPoint(0.0, "", "", trial)).index for trial in trials[1 : passed + 1]]
+
+    def _asks(self, before: Trial, trial: Trial) -> bool:
+        """Return whether a step asks for a closer look by what the kernel does not know."""
+        if any(test.passed(before.value(test), trial.value(test)) for test in self._others):
+            return True
+        if self._index is not None and abs(before.value(self._index) - trial.value(self._index)) > 0:
+            return True
+        name, newton = self.settings.trivial, self.settings.newton
+        return name is not None and (jumped(before, trial, name, newton) or crossed(before, trial, name, newton))
+
+
+class SmallLane(Lane):
+    """That of a small problem without a mesh."""
+
+    def __init__(self, system: Any, *given: Any) -> None:
+        super().__init__(system, *given)
+        equations = equations_of(system)
+        assert equations is not None
+        self._rooms = Rooms(
+            equations, linear_of(system.size), self._frame, self._attempt, self._control, self._watch, _quotient(system.size),
+            spectra_of(system.state_size, system.size),
+        )  # fmt: skip
+
+    def _home(self) -> tuple[Array, Array]:
+        system, (home, x, _) = self.system, self._start
+        circles = np.append(system.circles, np.zeros(system.size - system.state_size))
+        return home.carrier(system)(x), np.where(circles > 0, 0.0, system.weights)
+
+    def _make(self, path: Path, accepted: int, bent: int) -> int:
+        return int(plain_steps(self._rooms, path, accepted, bent))
+
+
+class MeshLane(Lane):
+    """That of a problem on a mesh, up to where the mesh changes."""
+
+    def __init__(self, system: Any, *given: Any) -> None:
+        super().__init__(system, *given)
+        settings, newton, n = self.settings, self.settings.newton, system.states_count
+        cycles, autonomous = isinstance(system, PeriodicCollocation), isinstance(system, CycleCollocation)
+        self._work, self._factors = system.workspace, system.unfilled_factors()
+        self._rooms = MeshRooms(
+            self._work, self._factors.room, one_call.Control(newton.tolerance, newton.max_iterations, 0, 1),
+            np.empty(one_call.UPDATES + newton.max_iterations), np.empty(system.state_size if autonomous else 0),
+            self._frame, self._attempt, self._control, self._watch,
+        )  # fmt: skip
+        self._still = STILL if autonomous and homoclinic() in given[2] else 0.0
+        self._poor = settings.mesh.tolerance if settings.mesh.every else np.inf
+        self._monodromy = monodromy_of(system) if cycles else None
+        width = 2 * n + len(system.free)
+        shapes = (system.intervals - 1, n, width), (width - n, width)
+        self._relations = [Relations(np.empty(shapes[0]), np.empty(shapes[1])) for _ in range(2)]
+        self._quotient, self._watched = _quotient(width), settings.branch_points
+        self._spectra, self._estimate = spectra_of(n - autonomous, 0), estimate_of(system.defect)
+
+    def serves(self, system: Any, settings: Settings, noisy: bool) -> bool:
+        """Return whether the lane is that of a system of the same run, with these settings."""
+        if not (self.settings is settings and self.noisy == noisy and getattr(system, "workspace", None) is self._work):
+            return False
+        self.system = system  # with another reference
+        return True
+
+    @staticmethod
+    def knows(test: TestFunction) -> bool:
+        """Return whether the kernel watches for what a test function, one of the kind of problem, looks for."""
+        return test.asks is not None or test == homoclinic()
+
+    def _home(self) -> tuple[Array, Array]:
+        home, x, _ = self._start
+        first = x[home.state_size :].copy()
+        if home.scales is not self.system.scales:
+            first[:] = np.nan
+        return first, np.ones(first.size)
+
+    def _make(self, path: Path, accepted: int, bent: int) -> int:
+        work, factored, newton, report, amplitude, frame, *_ = self._rooms
+        values = work.values
+        conditions, targets = self.system.linear_conditions
+        values.rows[: len(targets)], values.targets[: len(targets)] = conditions, targets
+        values.rows[-1] = frame.weights * path.tangents[1]
+        if amplitude.size:
+            amplitude[:] = self.system.amplitude_row
+        spare = path.tangents[2] if len(path.x) > 2 else np.empty(path.x.shape[1])
+        given = newton._replace(most=0), path.x[1], frame.weights, spare, report
+        if one_call.correct_on_mesh(work, factored, *given) != one_call.CONVERGED:
+            return 0
+        before, after = self._relations
+        if self._watched and not ends_are_calm(factored, before, after, self._quotient, 1):
+            return 0
+        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1):
+            return 0
+        for number in range(2, len(path.x)):
+            before, after = after, before
+            bend = 0.5 / path.numbers[number - 1, STEP] if number > 2 or bent else 0.0
+            if not step_on_mesh(self._rooms, path, accepted, number, bend):
+                return number - 2
+            if self._still and rests(values.field, values.points.shape[1], self._still):
+                return number - 2
+            if self._watched and not ends_are_calm(factored, before, after, self._quotient, 0):
+                return number - 2
+            if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0):
+                return number - 2
+            error = estimate(work, factored, self._estimate, path.x[number])
+            if not error <= self._poor:
+                return number - 2
+            path.numbers[number, MESH_ERROR] = error
+        return len(path.x) - 2
 
 
 class Block:
@@ -155,21 +299,18 @@ class Block:
         How many.
     """
 
-    def __init__(self, system: Algebraic, base: State, path: Path, made: int, trials: Sequence[Trial]) -> None:
-        self._system, self._base, self._path, self.made, self._trials = system, base, path, made, trials
+    def __init__(self, system: Any, base: State, path: Path, made: int, indices: list[int | None] | None) -> None:
+        self._system, self._base, self._path, self.made, self._indices = system, base, path, made, indices
 
     def state(self, row: int) -> State:
         """Return the state behind a step, by its row of the path."""
         base, (x, tangents, numbers) = self._base, self._path
-        step, following, sign, arclength, _, _, sense, told = numbers[row].tolist()
+        step, following, sign, arclength, _, _, sense, told, error, _ = numbers[row].tolist()
         sensed = self._free(x[int(told)]) if told else base.sensed
         return State(
             base.system, x[row], tangents[row], tangents[row - 1], step, following, sign, arclength, base.accepted + row - 1,
-            False, sense, sensed, 0.0,
+            False, sense, sensed, error,
         )  # fmt: skip
-
-    def _functionals(self, row: int) -> dict[str, float]:
-        return self._trials[row - 1].functionals if self._trials else {}
 
     def _free(self, x: Array) -> Array:
         """Return the free parameters in the user's units."""
@@ -180,17 +321,22 @@ class Block:
         """Yield what returns the state behind each step, and the point there."""
         system, (x, tangents, numbers) = self._system, self._path
         names, rows = tuple(system.problem.parameters), range(2, self.made + 2)
-        values = np.tile(system.parameters, (self.made, 1))
+        values = np.empty((self.made, len(names)))
+        values[:] = system.parameters
         values[:, system._free] = self._free(x[2 : self.made + 2])
         arclengths = (numbers[1 : self.made + 1, ARCLENGTH] + numbers[2 : self.made + 2, STEP]).tolist()
-        told = numbers[2 : self.made + 2, (ITERATIONS, ERROR_LEFT)].tolist()
-        for row, given, arclength, (iterations, error) in zip(rows, values.tolist(), arclengths, told):
+        told = numbers[2 : self.made + 2, (ITERATIONS, ERROR_LEFT, MESH_ERROR)].tolist()
+        indices = [None] * self.made if self._indices is None else self._indices
+        for row, given, arclength, (iterations, error, mesh_error), index in zip(
+            rows, values.tolist(), arclengths, told, indices
+        ):
             point = object.__new__(Point)  # its own __init__ would take half of the time of a step
-            vars(point).update(_REGULAR, parameters=dict(zip(names, given)), functionals=self._functionals(row))
+            vars(point).update(_REGULAR, parameters=dict(zip(names, given)))
             vars(point).update(x=x[row], tangent=tangents[row], system=system, arclength=arclength, errors={})
-            vars(point).update(iterations=int(iterations), newton_error=error)
+            vars(point).update(iterations=int(iterations), newton_error=error, discretization_error=mesh_error, index=index)
             yield functools.partial(self.state, row), point
 
 
-#: What all points of plain steps have.
+#: What all points of plain steps have. Functionals are computed when they are first asked for.
 _REGULAR = vars(Point("", "", {}, {}, np.empty(0), np.empty(0), None, 0.0, 0, 0.0, discretization_error=0.0))  # type: ignore
+del _REGULAR["functionals"]

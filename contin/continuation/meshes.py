@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Sequence
 
@@ -61,6 +62,12 @@ def _intervals_for(system: Discretization, error: float, control: MeshControl) -
     return int(math.ceil(system.intervals * factor))
 
 
+@functools.lru_cache(maxsize=64)
+def _with_fewest(control: MeshControl, count: int) -> MeshControl:
+    """Return the same with another least number of intervals."""
+    return dataclasses.replace(control, min_intervals=count)
+
+
 @dataclasses.dataclass(frozen=True)
 class MeshPolicy:
     """When a run changes its mesh, and whether it goes on from there.
@@ -82,15 +89,14 @@ class MeshPolicy:
         return self.steps.settings
 
     def adapted(self, state: State, here: Callable[[], Trial]) -> Moved | None:
-        """Return the state on a mesh that is adapted to it, if one is due and serves; ``here`` returns the state's point."""
+        """Return the state on a mesh that is adapted to it, if one serves; ``here`` returns the state's point."""
         control = self.settings.mesh
-        due = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
-        if state.singular or not due or state.accepted % due:
+        if state.singular:
             return None
         fewest = self._fewest_intervals(state)
         half = max(control.min_intervals, state.system.intervals // 2)
         for count in (half, fewest) if self._is_too_fine(state, here) else (fewest,):
-            wanted = control if count == control.min_intervals else dataclasses.replace(control, min_intervals=count)
+            wanted = control if count == control.min_intervals else _with_fewest(control, count)
             other = outgrown(state.system, state.x, state.system.adapted(state.x, wanted))
             moved = None if other is None else self.moved(state, here, other)
             if moved is not None:
@@ -114,7 +120,7 @@ class MeshPolicy:
         if state.singular:  # a corrected point has a tangent of any of the branches; the first step corrects what is carried
             return dataclasses.replace(state, system=system, x=x, tangent=tangent, step=step), None
         try:
-            done = correct(system, x, row, row @ x, newton)
+            done = correct(system, x, row, row @ x, newton, linearize=True)
             end = trial_of(system, dataclasses.replace(done, iterations=0, error=0.0), row)
         except ConvergenceError:
             return None  # the old mesh still serves; the step control will notice if it does not
@@ -128,9 +134,8 @@ class MeshPolicy:
         if system.intervals < state.system.intervals and not self._serves(state, end):
             return None
         return dataclasses.replace(
-            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign,
-            discretization_error=end.discretization_error,
-        ), end  # fmt: skip
+            state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
+        ), end
 
     def _fewest_intervals(self, state: State) -> int:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.

@@ -25,7 +25,7 @@ from contin.continuation.first import begins_outside, corrected_first, on_branch
 from contin.continuation.lane import FEWEST, MOST, Lane, lane_of
 from contin.continuation.meshes import MeshPolicy, Moved, finer, is_poor
 from contin.continuation.notes import Notes, unsettled
-from contin.continuation.plain import NOISY
+from contin.continuation.rules import NOISY
 from contin.continuation.steps import Steps
 from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.detection.extrema import extremum
@@ -156,6 +156,7 @@ class Continuation:
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
+        self._adapted = -1  # regular points at which the mesh was looked at last
         self._lane_for: object = None
         self._known_lane: Lane | None = None
 
@@ -211,11 +212,14 @@ class Continuation:
     def _plain(self) -> Iterator[Point]:
         """Make plain steps, many at a time, up to the first that wants a closer look; yield their points."""
         most = FEWEST
-        while (lane := self._lane) is not None and not self.state.singular:
-            most = min(most, self.settings.max_points - 1 - self.state.accepted)  # the last one has a label
-            block = lane.steps(self.state, max(most, 0))
+        while True:
+            due, lane, state = self._adapt(), self._lane, self.state
+            if lane is None or state.singular:
+                return
+            most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
+            block = lane.steps(state, max(most, 0))
             for self._state, point in block.points():
-                self._end, self._accuracy = None, Accuracy(0.0)
+                self._end, self._accuracy = None, Accuracy(point.discretization_error)
                 yield point
             if block.made < most or most <= 0:
                 return
@@ -227,8 +231,18 @@ class Continuation:
         system, settings, noisy = depends = self.state.system, self.settings, self._notes.is_noisy
         if self._lane_for != depends:
             self._lane_for = depends
-            self._known_lane = lane_of(system, settings, self.start, self._tests, self._own, noisy)
+            if self._known_lane is None or not self._known_lane.serves(system, settings, noisy):
+                self._known_lane = lane_of(system, settings, self.start, self._tests, self._own, noisy)
         return self._known_lane
+
+    def _adapt(self) -> int:
+        """Adapt the mesh, or borders, if that is due; return after how many steps the mesh is due again."""
+        state, control = self.state, self.settings.mesh
+        every = control.every if state.system.intervals else 1  # without a mesh it is borders that are renewed, at no cost
+        if every and state.accepted % every == 0 and self._adapted != state.accepted:
+            self._go_on(self._meshes.adapted(state, self._here))
+            self._adapted = state.accepted
+        return every - state.accepted % every if every and state.system.intervals else MOST
 
     def predicted(self, step: float) -> Array:
         """Return the guess (shape (size,), of ``state.system``) from which the corrector starts at a distance ``step``."""
@@ -248,7 +262,7 @@ class Continuation:
 
     def _advance(self) -> Iterator[Point]:
         """Make one step: yield the labelled points inside it, then the point at its end."""
-        self._go_on(self._meshes.adapted(self.state, self._here))
+        self._adapt()
         try:
             step = self._accurate_step()
         except ConvergenceError as error:

@@ -35,7 +35,7 @@ _MEDIUM = 128
 #: Sum of the squared sines of the angles by which relations may turn, and least pivot as a part of the mean: then the condensed
 #: matrix decides. It disagreed with the whole one in none of 7,300 steps of the tests (from a turn of .55 and a pivot of .35 on
 #: in some), except beside a layer, where it is right.
-_TURN, _PIVOT = 0.5, 0.2
+TURN, PIVOT = 0.5, 0.2
 #: A condensed matrix that differs from the identity by less has no eigenvalue near zero.
 NEAR_ONE = 0.9
 #: Directions added in a round, and the largest number of them: where more change, the step is divided, which takes as long as
@@ -90,10 +90,10 @@ def _condensed(before: Factors, after: Factors) -> Array | None:
     """Return the quotient of the condensed matrices; None where there are none, and where they do not decide."""
     if not (isinstance(before, Factorization) and isinstance(after, Factorization) and before.ends and after.ends):
         return None
-    if not min(before.ends.least_pivot, after.ends.least_pivot) > _PIVOT:
+    if not min(before.ends.least_pivot, after.ends.least_pivot) > PIVOT:
         return None
     quotient, turn = compared(before.ends, after.ends)
-    return quotient if turn < _TURN and np.isfinite(quotient).all() else None
+    return quotient if turn < TURN and np.isfinite(quotient).all() else None
 
 
 def _finite_eigenvalues(matrix: Array) -> ComplexArray:

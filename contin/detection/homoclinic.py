@@ -7,6 +7,7 @@ longer cycles mean nothing.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +25,7 @@ from contin.stepping.trial import TestFunction, Trial, linearization
 
 #: A branch ends where the least speed of a cycle is below this part of the largest: the square root of round-off. Ten times
 #: larger, homoclinic points are known to 1e-14 and not to the last digit.
-_STILL = 1e-8
+STILL = 1e-8
 #: A cycle is looked at where its least speed is below this part of the largest, ...
 _SLOW = 0.05
 #: ... and is near an equilibrium while it is closer than this part of its size, ...
@@ -36,7 +37,7 @@ _NOTHING = 1e-13
 #: Newton's method for the equilibrium: updates at most, and the size of the last one relative to 1 + the states.
 _UPDATES, _CONVERGED = 30, 1e-10
 #: A saddle-node lies within this distance in the parameter, relative to 1 + that, where the least speed of a cycle beside it is
-#: below `_STILL`, to which it is proportional. Slow stretches of relaxation oscillations have none within 1e-2.
+#: below `STILL`, to which it is proportional. Slow stretches of relaxation oscillations have none within 1e-2.
 _BESIDE = 1e-6
 
 
@@ -75,6 +76,7 @@ def _number(value: complex) -> str:
     return f"{value.real:.6g} +- {value.imag:.6g} i" if value.imag else f"{value.real:.6g}"
 
 
+@functools.cache  # one for all runs
 def homoclinic() -> TestFunction:
     """Return the test function that ends a branch of cycles at a homoclinic orbit, unless the user has limited the period."""
     return TestFunction("EP", "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD)
@@ -89,7 +91,7 @@ def _liveliness(trial: Trial) -> float:
     speeds = _speeds(system, trial.x)
     if not speeds.min() > 0:
         return 1.0
-    value = float(np.log10(speeds.min() / speeds.max() / _STILL))
+    value = float(np.log10(speeds.min() / speeds.max() / STILL))
     return value if value > 0 or resting_place(system, trial.x) is not None else 1.0
 
 

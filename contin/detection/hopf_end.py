@@ -30,7 +30,7 @@ from contin.stepping.trial import TestFunction, Trial
 
 #: Smallest size of a cycle as a part of that before the step. A branch that ends at a Hopf point is this near to it at the end
 #: of a step by chance only, and the step is halved then; Newton's method that falls onto an equilibrium is nearer by far.
-_COLLAPSED = 1e-3
+COLLAPSED = 1e-3
 #: Newton's updates of the equilibrium, and secants, at most: both converge from near by, in four to six.
 _UPDATES = 20
 #: Newton's method ends with an update below this, relative to 1 + the states, the secant method with such a step: a few units
@@ -87,7 +87,7 @@ def collapsed(system: Discretization, x: Array, z: Array) -> bool:
 @collapsed.register
 def _of_equilibria_as_cycles(system: CycleCollocation, x: Array, z: Array) -> bool:
     """An equilibrium solves the equations of cycles with any period, and those of curves of them with some."""
-    return abs(system.amplitude(z)) < _COLLAPSED * abs(system.amplitude(x))
+    return abs(system.amplitude(z)) < COLLAPSED * abs(system.amplitude(x))
 
 
 def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, Array]:

@@ -324,8 +324,10 @@ class Inspection:
 
     def may_close(self) -> bool:
         """Return whether the first point of the run may lie in this step."""
-        home, x, _ = self.start
-        return self.segment.state.accepted >= FEWEST and not self._is_elsewhere(home, x)
+        segment = self.segment
+        if segment.state.accepted < FEWEST:
+            return False
+        return not is_elsewhere(self.start, segment.beginning(), segment.trial, segment.step)
 
     def _closed(self) -> SpecialPoint | None:
         """Return the end of a branch that comes back to its first point."""
@@ -354,20 +356,6 @@ class Inspection:
         there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
         return SpecialPoint(at, "EP", "closed", there, Stop("closed", "the branch closed on its first point"))
 
-    def _is_elsewhere(self, home: Discretization, x: Array) -> bool:
-        """Return whether the first point is certainly not in this step: it is too far from both ends together.
-
-        Without this each step would carry the first point to its mesh and bring it in phase.
-        """
-        segment, system = self.segment, self.segment.trial.system
-        if home.scales is not system.scales:
-            return False
-        first, size = x[home.state_size :].tolist(), system.state_size
-        if sum(math.dist(first, end[size:].tolist()) for end in (segment.state.x, segment.trial.x)) > REACH * segment.step:
-            return True  # the free parameters are
-        kept, ends = lasting(home, x), (lasting(system, end) for end in (segment.state.x, segment.trial.x))
-        return sum(math.dist(kept, end) for end in ends) > REACH * segment.step
-
     def _same_place(self, fold: SpecialPoint, found: list[SpecialPoint]) -> bool:
         """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.
 
@@ -395,6 +383,21 @@ class Inspection:
         if abs(rate) < _STATIONARY or abs(change) < _STANDS * (1 + abs(p)):
             return False
         return bool(1 / _EXPLAINED < change / expected < _EXPLAINED)
+
+
+def is_elsewhere(start: Start, before: Trial, trial: Trial, step: float) -> bool:
+    """Return whether the first point of a run is certainly not in a step: it is too far from both ends together.
+
+    Without this each step would carry the first point to its mesh and bring it in phase.
+    """
+    system, (home, x, _) = trial.system, start
+    if home.scales is not system.scales:
+        return False
+    first, size = x[home.state_size :].tolist(), system.state_size
+    if sum(math.dist(first, end.x[size:].tolist()) for end in (before, trial)) > REACH * step:
+        return True  # the free parameters are
+    kept, ends = lasting(home, x), (lasting(system, end.x) for end in (before, trial))
+    return sum(math.dist(kept, end) for end in ends) > REACH * step
 
 
 def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:

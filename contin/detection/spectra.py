@@ -123,11 +123,15 @@ def may_pass_axis(equations: Equations, spectra: Spectra) -> bool:
 
 
 @helper
+def may_cross_between(spectra: Spectra) -> bool:
+    """Return whether multipliers may pass -1, or the unit circle as a pair, by both ends of a step alone."""
+    return _crosses(spectra) or _comes_near(spectra, False) or _comes_near(spectra, True)
+
+
+@helper
 def may_double_or_twist(equations: Equations, spectra: Spectra) -> bool:
     """Return whether multipliers may pass -1, or the unit circle as a pair; inside the step where they come near either."""
-    _fill_values(spectra, FIRST)
-    _fill_values(spectra, LAST)
-    if not spectra.values[FIRST] * spectra.values[LAST] > 0 or _outside(spectra, FIRST) != _outside(spectra, LAST):
+    if _crosses(spectra):
         return True
     doubles, twists = _comes_near(spectra, False), _comes_near(spectra, True)
     if not (doubles or twists):
@@ -137,6 +141,14 @@ def may_double_or_twist(equations: Equations, spectra: Spectra) -> bool:
             return True
         _fill_values(spectra, number)
     return (doubles and _dips(spectra)) or (twists and _moves_far(spectra))
+
+
+@helper
+def _crosses(spectra: Spectra) -> bool:
+    """Return whether multipliers have passed -1 or the circle from one end of a step to the other."""
+    _fill_values(spectra, FIRST)
+    _fill_values(spectra, LAST)
+    return not spectra.values[FIRST] * spectra.values[LAST] > 0 or _outside(spectra, FIRST) != _outside(spectra, LAST)
 
 
 @helper

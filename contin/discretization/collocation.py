@@ -190,21 +190,27 @@ class Collocation(System):
     # --- the discretization error --------------------------------------------------------------------------------
 
     @functools.cached_property
-    def _defect(self) -> Defect:
+    def defect(self) -> Defect:
+        """What the estimates of errors on this mesh share."""
         return Defect(self)
 
     def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
         """Return the estimated error of a solution that is due to the mesh, relative to 1 + size; see `Defect`."""
-        return self._defect.error(x, factors, columns)
+        return self.defect.error(x, factors, columns)
 
     def newton_error(self, x: Array, factors: Factors) -> float:
         """Return what Newton's method or round-off has left, measured in the same way."""
-        return self._defect.left_by_newton(x, self.residual(x), factors)
+        return self.defect.left_by_newton(x, self.residual(x), factors)
 
     @property
     def states_count(self) -> int:
         """Number of states, n."""
         return self._n
+
+    @property
+    def order_of_states(self) -> Indices:
+        """The states in the order of the columns of a linearized system, shape (n,)."""
+        return self._layout.order
 
     @property
     def integrated(self) -> tuple[str, ...]:
@@ -542,6 +548,11 @@ class Collocation(System):
         off = np.abs(nearest - moving.places) > _CLOSE * (self.mesh[-1] - self.mesh[0])
         places = np.where(off if closely else ~moving.settled, moving.places, nearest)
         return np.unique(np.concatenate([self.breaks, places]))
+
+    @property
+    def has_selections(self) -> bool:
+        """Conditions on states or free parameters switch the equations."""
+        return bool(self._selections)
 
     @functools.cached_property
     def _selections(self) -> list[tuple[str, Selections]]:

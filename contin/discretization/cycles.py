@@ -15,6 +15,7 @@ from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
 from contin.discretization.extremes import extremes
 from contin.discretization.mesh import MeshControl
+from contin.discretization.monodromy import DRIFTED, Monodromy, fill_multipliers, monodromy_of
 from contin.discretization.protocol import Carrier
 from contin.discretization.rounding import on_circle
 from contin.discretization.scales import Scales
@@ -23,8 +24,8 @@ from contin.functions.batch import Columns
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks
-from contin.linalg.periodic import log_eigenvalues, log_eigenvalues_along
-from contin.linalg.transitions import interval_matrices, transitions
+from contin.linalg.periodic import log_eigenvalues_along
+from contin.linalg.transitions import interval_matrices
 from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
 from contin.problems.cycle import PERIOD, CycleProblem, rounds_of
 
@@ -33,11 +34,8 @@ from contin.problems.cycle import PERIOD, CycleProblem, rounds_of
 _OPPOSITE = 1e-6
 #: A pair at an angle whose square is below so many times the error of the multiplier 1 may be a double one.
 _SPLIT = 100.0
-#: Logarithms of multipliers that differ by less are those of a pair; multipliers of so many orbits are kept.
-_EQUAL, _KEPT = 1e-9, 50
-#: Where the logarithm of the multiplier 1 is larger, the direction of the flow is split off: others are hidden by as
-#: much. It is 1e-7 where both multipliers of a conservative system are 1. Ten times smaller, the same is done there.
-_DRIFTED = 1e-6
+#: Multipliers of so many orbits are kept.
+_KEPT = 50
 #: An orbit of a smaller size, relative to 1 + its states, is an equilibrium: at a branch point less is round-off.
 _SHRUNK = 1e-7
 #: Share of the period's relative change in the length of a step: weight of (change of T)^2 / (1 + T)^2. With 1 in place of it
@@ -266,24 +264,23 @@ class PeriodicCollocation(Collocation):
             self._known[key] = np.where(neutral & is_pair(values), 1j * values.imag, values), neutral, values
         return self._known[key]
 
+    @functools.cached_property
+    def _monodromy(self) -> Monodromy:
+        return monodromy_of(self)
+
     def _computed(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers as they are computed."""
-        jacobian = self._jacobian_of_field(x)
-        matrices = transitions(self.basis.value, self.basis.slope, self._h, jacobian)
-        if self.order > 1:
-            matrices = np.concatenate([matrices, np.linalg.inv(self.turn)[None]])
-        values = self._logarithms(x, matrices)
-        total = float(self._quadrature @ jacobian.trace(axis1=1, axis2=2))
-        reals = values.real.tolist()
-        smallest = [place for place, value in enumerate(reals) if value <= min(reals) + _EQUAL]
-        if smallest and not self._is_own_error(values, smallest):
-            # by Liouville's formula: over one interval a Gauss method takes e^-1000 for a number near one
-            values[smallest] += (total - sum(reals)) / len(smallest)
-        return _in_the_plane(values, total) if self.autonomous and self._n == 2 and self.order == 1 else values
+        room = self._monodromy
+        room.jacobian[:] = self._jacobian_of_field(x)
+        if fill_multipliers(room, 0) == DRIFTED:
+            values = self._along_the_flow(x, room.matrices)
+            room.real[:], room.imaginary[:] = values.real, values.imag
+            fill_multipliers(room, 1)
+        return room.real + 1j * room.imaginary
 
-    def _logarithms(self, x: Array, transitions: Array) -> ComplexArray:
-        """Return the logarithms of the eigenvalues of the product of the transition matrices."""
-        return log_eigenvalues(transitions)
+    def _along_the_flow(self, x: Array, transitions: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers where the one that is 1 has drifted: the flow's direction is split off."""
+        raise NotImplementedError
 
     def is_drifted(self, x: Array) -> bool:
         """Return whether round-off has moved a multiplier that is known, so that those on this mesh are in doubt."""
@@ -296,10 +293,6 @@ class PeriodicCollocation(Collocation):
         angles = self.order * values.imag
         found: ComplexArray = self.order * values.real + 1j * (math.pi - (math.pi - angles) % (2 * math.pi))
         return found
-
-    def _is_own_error(self, values: ComplexArray, smallest: list[int]) -> bool:
-        """Return whether the smallest multipliers are those whose error shall show."""
-        return False
 
     @abstractmethod
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
@@ -415,15 +408,11 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
             first /= self.scales.states
         return np.asarray(first / np.linalg.norm(first), dtype=float)
 
-    def _logarithms(self, x: Array, transitions: Array) -> ComplexArray:
-        """Return the logarithms of all multipliers; where the one that is 1 has drifted, the flow's direction is split off.
+    def _along_the_flow(self, x: Array, transitions: Array) -> ComplexArray:
+        """Return the logarithms of all multipliers, with the direction of the flow split off.
 
         After a repelling stretch, as of a canard, round-off in that direction hides all other multipliers.
         """
-        values = log_eigenvalues(transitions)
-        if np.abs(values).min() <= _DRIFTED or not np.isfinite(transitions).all():
-            self._drifted.discard(x.tobytes())
-            return values
         self._drifted.add(x.tobytes())
         flow = self.rates(x, np.ascontiguousarray(self._scaled_states(x)[:: self._d]))
         return log_eigenvalues_along(transitions, np.concatenate([flow[: len(transitions)], flow[:1]]))
@@ -432,10 +421,6 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         """Return whether the multiplier that is 1 is off before the direction of the flow is split off."""
         self.eigenvalues(x)
         return x.tobytes() in self._drifted
-
-    def _is_own_error(self, values: ComplexArray, smallest: list[int]) -> bool:
-        """Return whether the smallest multiplier is the one that is 1: its error shall show."""
-        return int(np.abs(values).argmin()) in smallest
 
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a torus bifurcation; None near a double multiplier -1.
@@ -462,13 +447,18 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 
         It is the product of both, without their means, over that of the reference with itself.
         """
-        if self._amplitude is None:  # it is linear in x
+        return float(self.amplitude_row @ x[: self.state_size])
+
+    @property
+    def amplitude_row(self) -> Array:
+        """The row that takes the states in x to `amplitude`, shape (state_size,)."""
+        if self._amplitude is None:
             weights = self.weights[: self.state_size : self._n]
             group = sum(np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)) / self.order
             reference = self.reference - group @ (weights @ self.reference)
             row = weights[:, None] * (reference - (weights @ reference) @ group) / (weights @ np.sum(reference**2, axis=1))
             self._amplitude = (row if self.scales is None else row * self.scales.states).ravel()
-        return float(self._amplitude @ x[: self.state_size])
+        return self._amplitude
 
     # --- meshes and references -----------------------------------------------------------------------------------
 
@@ -511,7 +501,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
             states = self.states(x)
             if np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():
                 return None
-            return self._referring_to(states), np.copy
+            return self._referring_to(states), np.array
         other = self._with(mesh=mesh)
         other._set_reference(self._between(self.states(x), other.nodes))
         return other, self.carrier(other)
@@ -534,12 +524,6 @@ def _gains(once: Array, symmetry: Array, order: int) -> Array:
 def is_opposite(frequency: float) -> bool:
     """Return whether a multiplier with this angle is -1, up to round-off."""
     return abs(frequency - math.pi) < _OPPOSITE
-
-
-def _in_the_plane(values: ComplexArray, total: float) -> ComplexArray:
-    """Return the logarithms, that of the multiplier that is not 1 by Liouville's formula: neither negative nor complex."""
-    one = min(values.tolist(), key=abs)
-    return np.array(sorted([complex(one.real if one.imag == 0 else abs(one)), complex(total)], key=lambda value: -value.real))
 
 
 def is_pair(values: ComplexArray) -> Mask:

@@ -31,8 +31,12 @@ from contin.arrays import Array
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.mesh import near
 from contin.discretization.switching import Switching
+from contin.discretization.workspace import Codes, Sizes, Values, Workspace, put_free, scale
+from contin.functions.interpreter import Loaded, Points, load, run_loaded
 from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector
+from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
+from contin.linalg.condensation import Factored
+from contin.linalg.substitution import solve
 
 #: Distance from a jump, relative to the interval, at which rates are taken on either side: jumps are mesh points to 1e-12 of
 #: the domain. Ten times larger, the rates are off by 1e-8 of their change in the interval.
@@ -327,3 +331,103 @@ def largest_miss(weights: Vector, integrands: Matrix, known: Vector, sizes: Vect
         if missed > largest or missed != missed:  # noqa: PLR0124
             largest = missed
     return largest
+
+
+class Estimate(NamedTuple):
+    """What `estimate` works with and in: the tables, points and weights of `Defect`, and rooms for what it computes.
+
+    ``integrals`` is the program of the integrands of functionals, ``least`` (m,) are their sizes, m may be 0.
+    """
+
+    tables: Finer
+    times: Vector
+    weights: Vector
+    mesh: Vector
+    conditions: int
+    integrals: Loaded
+    least: Vector
+    known: Vector
+    quadrature: Vector
+    rates: Matrix
+    changed: Matrix
+    at_mesh: Matrix
+    user_at_mesh: Matrix
+    points: Matrix
+    user_points: Matrix
+    field: Matrix
+    integrands: Matrix
+    at_gauss: Matrix
+    left: Matrix
+    error: Matrix
+    better: Vector
+
+
+def estimate_of(defect: Defect) -> Estimate:
+    """Return the room of a mesh, whose right-hand side jumps nowhere."""
+    system, n = defect.system, defect.n
+    points, mesh, count = defect.times.size, system.mesh.size, len(system.integrated)
+    values = system.workspace.values
+    width, empty = values.field.shape[1], np.empty
+    program = system.problem.batch("functionals" if count else "field")._values_program()
+    return Estimate(
+        defect.tables, defect.times, defect.weights, system.mesh, defect.conditions, load(program), defect.least_sizes,
+        empty(count), system.gauss_weights, empty((mesh, width)), empty((mesh, width)), empty((mesh, n)), empty((mesh, n)),
+        empty((points, n)), empty((points, n)), empty((points, width)), empty((points, count)),
+        empty((values.points.shape[0], count)), empty((1, system.equations + 1)), empty((1, system.size)), empty(system.size),
+    )  # fmt: skip
+
+
+@helper
+def _in_units(scaled: Array, sizes: Array, found: Array) -> None:
+    """Fill in states in the user's units."""
+    for i in range(scaled.shape[0]):
+        for a in range(scaled.shape[1]):
+            found[i, a] = scaled[i, a] * sizes[a]
+
+
+@helper
+def _fill_field(codes: Codes, sizes: Sizes, values: Values, times: Array, states: Array, found: Array) -> None:
+    """Fill in right-hand side and integrands of conditions, divided by their sizes, at states in the user's units."""
+    run_loaded(codes.field, values.p, Points(times, states, values.none), found, values.nothing)
+    scale(found, sizes.field)
+
+
+@kernel
+def estimate(work: Workspace, factored: Factored, room: Estimate, x: Vector) -> float:
+    """Return `Defect.error` at x, for factors right there and states ``work.values.points`` at its Gauss points."""
+    codes, mesh, values = work
+    sizes, n, h = mesh.sizes, room.points.shape[1], mesh.h
+    degree, size = room.tables.slope.shape[0], x.size
+    put_free(mesh, values, x)
+    for b in range(room.known.size):
+        room.known[b] = 0.0
+    if room.known.size:
+        run_loaded(room.integrals, values.p, Points(mesh.times, values.points, values.none), room.at_gauss, values.nothing)
+        for q in range(room.quadrature.size):
+            for b in range(room.known.size):
+                room.known[b] += room.quadrature[q] * room.at_gauss[q, b]
+    for j in range(room.mesh.size):
+        for a in range(n):
+            room.at_mesh[j, a] = x[j * degree * n + a]
+    _in_units(room.at_mesh, sizes.states, room.user_at_mesh)
+    _fill_field(codes, sizes, values, room.mesh, room.user_at_mesh, room.rates)
+    fill_points(n, room.tables, h, x, room.rates[:-1], room.rates[1:], room.points)
+    _in_units(room.points, sizes.states, room.user_points)
+    _fill_field(codes, sizes, values, room.times, room.user_points, room.field)
+    for i in range(room.left.shape[1]):
+        room.left[0, i] = 0.0
+    fill_left(n, room.tables, h, x, room.field, room.left[0], room.conditions)
+    solve(mesh.layout, factored.factors, room.left, room.error, factored.work, mesh.whole)
+    for i in range(size):
+        room.better[i] = x[i] - room.error[0, i]
+    largest = move(n, room.tables, x, room.error[0], room.points, room.at_mesh)
+    put_free(mesh, values, room.better)
+    _in_units(room.at_mesh, sizes.states, room.user_at_mesh)
+    _fill_field(codes, sizes, values, room.mesh, room.user_at_mesh, room.changed)
+    largest = largest_change(n, room.mesh[-1] - room.mesh[0], room.rates, room.changed, largest)
+    if room.known.size:
+        _in_units(room.points, sizes.states, room.user_points)
+        given = Points(room.times, room.user_points, values.none)
+        run_loaded(room.integrals, values.p, given, room.integrands, values.nothing)
+        largest = largest_miss(room.weights, room.integrands, room.known, room.least, largest)
+    return float(largest)

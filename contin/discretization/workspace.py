@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contin.arrays import Array
 from contin.discretization.assembly import Tables
 from contin.functions.batch import Batch
 from contin.functions.interpreter import Loaded, load
-from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector
+from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.functions.program import Program
 from contin.linalg.layout import Layout
 from contin.linalg.segments import Share, share
@@ -84,6 +85,21 @@ class Workspace(NamedTuple):
     codes: Codes
     mesh: Mesh
     values: Values
+
+
+@helper
+def scale(values: Array, sizes: Array) -> None:
+    """Divide rows by sizes."""
+    for i in range(values.shape[0]):
+        for a in range(values.shape[1]):
+            values[i, a] /= sizes[a]
+
+
+@helper
+def put_free(mesh: Mesh, values: Values, x: Array) -> None:
+    """Put the free parameters of x among all, in the user's units."""
+    for i in range(mesh.free.size):
+        values.p[mesh.free[i]] = x[mesh.states + i] * mesh.sizes.free[i]
 
 
 def workspace(system: Any, rows: int) -> Workspace:

@@ -12,7 +12,6 @@ size kept as a logarithm, so that groups of very different size do not meet.
 
 from __future__ import annotations
 
-import cmath
 import functools
 import math
 from typing import NamedTuple
@@ -22,7 +21,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
-from contin.linalg.dense import eigenvalues
+from contin.linalg.spectrum import fill_eigenvalues
 
 #: Groups whose sizes differ by less than this factor are one: iteration would take long to separate them, and the
 #: eigenvalues of a block with such a spread are accurate.
@@ -61,6 +60,16 @@ class Groups(NamedTuple):
     sizes: Vector
 
 
+class Product(NamedTuple):
+    """Where the eigenvalues of a product are computed: the ``basis`` (n, n) to start from, and room for those of one block."""
+
+    basis: Matrix
+    iterates: Iterates
+    groups: Groups
+    square: Vector
+    parts: Matrix
+
+
 def log_eigenvalues(factors: Array) -> ComplexArray:
     """Return the logarithms of the eigenvalues of F_N ... F_1, shape (n,), largest first; ``factors`` is (N, n, n), F_1 first.
 
@@ -72,25 +81,25 @@ def log_eigenvalues(factors: Array) -> ComplexArray:
     [ 921.034+0.j    -921.034+3.142j]
     """
     count, n, _ = factors.shape
-    if not np.isfinite(factors).all():
-        return np.full(n, np.nan, dtype=complex)
-    matrices = np.empty((5, n, n))
-    matrices[0] = _first_basis(n)
-    first, last, coupling, product, vectors = matrices
+    found = np.empty(n, dtype=complex)
+    parts = np.empty((2, n))
+    fill_logarithms(np.ascontiguousarray(factors), product_of(count, n), *parts)
+    found.real, found.imag = parts
+    return found
+
+
+def product_of(count: int, n: int) -> Product:
+    """Return the room for so many factors (n, n)."""
+    first, last, coupling, product, vectors = np.empty((5, n, n))
     iterates = Iterates(first, last, np.empty((count, n, n)), coupling, product, vectors, np.empty(n))
     groups = Groups(np.empty(n + 1, np.int64), np.empty((n, n)), np.empty(n))
-    found = separate(factors, iterates, groups)
-    ends = groups.starts[: found + 1].tolist()
-    values: list[complex] = []
-    for size, a, b in zip(groups.sizes.tolist(), ends, ends[1:]):
-        values += [_logarithm(value, size) for value in _eigenvalues(groups.blocks[a:b, a:b])]
-    return np.array(sorted(values, key=lambda value: -value.real))
+    return Product(_first_basis(n), iterates, groups, np.empty(n * n), np.empty((2, n)))
 
 
 @functools.lru_cache(maxsize=32)
 def _first_basis(n: int) -> Array:
     """Return an orthogonal matrix to start from, always the same."""
-    basis: Array = np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0].T
+    basis: Array = np.ascontiguousarray(np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0].T)
     return basis
 
 
@@ -128,33 +137,6 @@ def log_eigenvalues_along(factors: Array, vectors: Array) -> ComplexArray:
     rest = normal[1:].transpose(0, 2, 1) @ factors @ normal[:-1]
     values = np.concatenate([one, log_eigenvalues(rest)])
     return values[np.argsort(-values.real, kind="stable")]
-
-
-def _eigenvalues(block: Array) -> list[complex]:
-    """Return the eigenvalues of a matrix: NumPy takes 20 us, which counts at cycles of few states."""
-    if len(block) == 1:
-        return [complex(block[0, 0])]
-    if len(block) == 2:
-        return _of_two(*block.ravel().tolist())
-    found: list[complex] = eigenvalues(block).tolist()
-    return found
-
-
-def _of_two(a: float, b: float, c: float, d: float) -> list[complex]:
-    """Return the eigenvalues of [[a, b], [c, d]], without cancellation."""
-    half, product = (a - d) / 2, b * c
-    square = half * half + product
-    if square < 0:
-        return [complex((a + d) / 2, root) for root in (math.sqrt(-square), -math.sqrt(-square))]
-    larger = half + math.copysign(math.sqrt(square), half)
-    return [complex(d + larger), complex(d - product / larger if larger else d)]
-
-
-def _logarithm(value: complex, size: float) -> complex:
-    """Return the logarithm of an eigenvalue times the exponential of a size."""
-    if value == 0 or size == -math.inf:
-        return complex(-math.inf, 0.0)
-    return cmath.log(value) + size
 
 
 @kernel(reorder=False, last=True)
@@ -255,3 +237,70 @@ def _multiply(triangles, start, end, product):
                 product[a, b] /= largest
         size += math.log(largest)
     return size
+
+
+@helper
+def _fill_of_two(a, b, c, d, real, imaginary):
+    """Fill in the eigenvalues of [[a, b], [c, d]], without cancellation."""
+    half, product = (a - d) / 2, b * c
+    square = half * half + product
+    if square < 0:
+        real[0] = real[1] = (a + d) / 2
+        imaginary[0], imaginary[1] = math.sqrt(-square), -math.sqrt(-square)
+        return
+    larger = half + math.copysign(math.sqrt(square), half)
+    real[0], real[1] = d + larger, d - product / larger if larger != 0.0 else d
+    imaginary[0] = imaginary[1] = 0.0
+
+
+@helper
+def _fill_of_block(room, start, end, real, imaginary):
+    """Fill in the eigenvalues of a diagonal block."""
+    blocks, m = room.groups.blocks, end - start
+    if m == 1:
+        real[0], imaginary[0] = blocks[start, start], 0.0
+    elif m == 2:
+        a, b = blocks[start, start], blocks[start, start + 1]
+        _fill_of_two(a, b, blocks[start + 1, start], blocks[start + 1, start + 1], real, imaginary)
+    else:
+        for i in range(m):
+            for j in range(m):
+                room.square[i * m + j] = blocks[start + i, start + j]
+        found = room.square[: m * m].reshape((1, m, m))
+        fill_eigenvalues(found, room.parts[:1], room.parts[1:])
+        for i in range(m):
+            real[i], imaginary[i] = room.parts[0, i], room.parts[1, i]
+
+
+@kernel(reorder=False, last=True)
+def fill_logarithms(factors: Stack, room: Product, real: Vector, imaginary: Vector) -> None:
+    """Fill in the logarithms of the eigenvalues of F_N ... F_1, as `log_eigenvalues` returns them."""
+    n, total = real.size, 0.0
+    first, groups = room.iterates.first, room.groups
+    for j in range(factors.shape[0]):
+        for a in range(n):
+            for b in range(n):
+                total += abs(factors[j, a, b])
+    for a in range(n):
+        real[a] = imaginary[a] = math.nan
+        for b in range(n):
+            first[a, b] = room.basis[a, b]
+    if not total < math.inf:
+        return
+    count = separate(factors, room.iterates, groups)
+    done = 0
+    for g in range(count):
+        start, end = groups.starts[g], groups.starts[g + 1]
+        _fill_of_block(room, start, end, real[start:end], imaginary[start:end])
+        for i in range(start, end):
+            x, y = real[i], imaginary[i]
+            if (x == 0.0 and y == 0.0) or groups.sizes[g] == -math.inf:
+                x, y = -math.inf, 0.0
+            else:
+                x, y = math.log(math.hypot(x, y)) + groups.sizes[g], math.atan2(y, x)
+            at = done
+            while at > 0 and real[at - 1] < x:
+                real[at], imaginary[at] = real[at - 1], imaginary[at - 1]
+                at -= 1
+            real[at], imaginary[at] = x, y
+            done += 1

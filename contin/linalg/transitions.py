@@ -38,14 +38,6 @@ def interval_matrices(value: Array, slope: Array, h: Array, jacobian: Array) -> 
     return matrices
 
 
-def transitions(value: Array, slope: Array, h: Array, jacobian: Array) -> Array:
-    """Return the transition matrix of each interval, shape (N, n, n); not finite where there is none."""
-    d, n = len(value), jacobian.shape[1]
-    result, block = np.empty((len(h), n, n)), np.empty((d * n, (d + 1) * n))
-    condense(value, slope, h, jacobian, block, np.empty((d + 1) * n, np.int64), result)
-    return result
-
-
 @kernel(reorder=False, last=True)
 def fill(value: Matrix, slope: Matrix, h: Vector, jacobian: Stack, matrices: Stack) -> None:
     """Fill the equations of the intervals."""

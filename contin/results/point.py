@@ -131,6 +131,14 @@ class Point:
     value: float | None = None
     discretization_error: float = np.nan
 
+    def __getattr__(self, name: str) -> Any:
+        """Return the functionals of a point of plain steps, which are computed when they are first asked for."""
+        if name != "functionals" or "system" not in vars(self):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        found: Any = Trial.without_tangent(self.system, self.x).functionals
+        vars(self)["functionals"] = found
+        return found
+
     def __getitem__(self, name: str) -> float:
         """Return a parameter, a functional, or a state of an equilibrium, by name.
 

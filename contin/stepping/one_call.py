@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from contin.discretization.assembly import Bordering, assemble, at_points, collocate
-from contin.discretization.workspace import Workspace
+from contin.discretization.workspace import Workspace, put_free, scale
 from contin.functions.interpreter import Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Vector, helper
@@ -33,7 +33,7 @@ ITERATIONS, ERROR, SIGN, UPDATES = range(4)
 
 
 class Control(NamedTuple):
-    """The tolerance, the most iterations, and what is wanted.
+    """The tolerance, the most iterations (0: x is a solution), and what is wanted.
 
     ``chords``: no more than chord steps with the factors at hand. ``linearize``: the matrix right at the corrected x, and the
     unit tangent.
@@ -43,14 +43,6 @@ class Control(NamedTuple):
     most: int
     chords: int
     linearize: int
-
-
-@helper
-def _scale(values, sizes):
-    """Divide rows by sizes."""
-    for i in range(values.shape[0]):
-        for a in range(values.shape[1]):
-            values[i, a] /= sizes[a]
 
 
 @helper
@@ -66,8 +58,7 @@ def _scale_slopes(slopes, sizes, inputs):
 def _evaluate(codes, mesh, room, x, slopes):
     """Fill values at x and, with ``slopes``, derivatives."""
     sizes, n = mesh.sizes, room.points.shape[1]
-    for i in range(mesh.free.size):
-        room.p[mesh.free[i]] = x[mesh.states + i] * sizes.free[i]
+    put_free(mesh, room, x)
     at_points(mesh.tables.value, x, room.points)
     for i in range(room.points.shape[0]):
         for a in range(n):
@@ -84,8 +75,8 @@ def _evaluate(codes, mesh, room, x, slopes):
     else:
         run_loaded(codes.field, room.p, inside, room.field, room.nothing)
         run_loaded(codes.ends, room.p, ends, room.boundary, room.nothing)
-    _scale(room.field, sizes.field)
-    _scale(room.boundary, sizes.ends)
+    scale(room.field, sizes.field)
+    scale(room.boundary, sizes.ends)
 
 
 @helper
@@ -198,9 +189,10 @@ def correct_on_mesh(
 ) -> int:
     """Correct x in place; return what it came to, with the numbers in the ``report``."""
     codes, mesh, room = work
+    done: int = CONVERGED
     if control.chords:
-        done: int = _chord_steps(codes, mesh, room, matrix, x, control.tolerance, report)
-    else:
+        done = _chord_steps(codes, mesh, room, matrix, x, control.tolerance, report)
+    elif control.most > 0:
         done = _iterate(codes, mesh, room, matrix, x, control, report)
     if done == CONVERGED and control.linearize:
         done = _linearize(codes, mesh, room, matrix, x, weights, tangent, report)

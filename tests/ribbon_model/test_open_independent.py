@@ -347,9 +347,10 @@ class Scene:
 QUICK = "open_tip"
 
 
-@pytest.fixture(
-    scope="module", params=[QUICK, *(pytest.param(name, marks=pytest.mark.full) for name in SCENES if name != QUICK)]
-)
+LONG = [pytest.param(name, marks=[pytest.mark.full, pytest.mark.hours]) for name in SCENES if name != QUICK]
+
+
+@pytest.fixture(scope="module", params=[QUICK, *LONG])
 def scene(request, tmp_path_factory):
     return Scene(request.param, tmp_path_factory.mktemp("scene"))
 

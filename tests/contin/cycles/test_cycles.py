@@ -7,7 +7,8 @@ import pytest
 
 import contin
 from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
-from contin.linalg.periodic import log_eigenvalues
+from contin.continuation import lane
+from contin.discretization import cycles
 
 
 def circle(u, p):
@@ -224,11 +225,15 @@ def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
     """
     calls = []
 
-    def counted(factors):
-        calls.append(factors)
-        return log_eigenvalues(factors)
+    def counted(kernel):
+        def counting(*given):
+            calls.append(kernel)
+            return kernel(*given)
 
-    monkeypatch.setattr("contin.discretization.cycles.log_eigenvalues", counted)
+        return counting
+
+    monkeypatch.setattr(cycles, "fill_multipliers", counted(cycles.fill_multipliers))
+    monkeypatch.setattr(lane, "multipliers_ask", counted(lane.multipliers_ask))
     rest = contin.solve(AlgebraicProblem(lorenz, ["x", "y", "z"], {"r": 20.0}), [math.sqrt(8 / 3 * 19)] * 2 + [19.0])
     (hopf,) = contin.trace(rest, free=["r"], limits={"r": (19, 26)}).labelled("HB")
     branch = contin.trace(hopf, branch=1, limits={"r": (16, 25)}, errors=False)

@@ -5,7 +5,7 @@ import pytest
 
 from contin.discretization.basis import basis
 from contin.linalg.periodic import log_eigenvalues
-from contin.linalg.transitions import interval_matrices, transitions
+from contin.linalg.transitions import condense, interval_matrices
 
 
 def chain(diagonals, seed=0):
@@ -50,4 +50,6 @@ def test_transition_matrices_solve_the_collocation_equations(n, degree):
     expected = tables.slope[1, node] * np.eye(n) - h[2] * tables.value[1, node] * jacobian[point]
     assert matrices[2, n : 2 * n, node * n : (node + 1) * n] == pytest.approx(expected, abs=1e-14)
     solved = np.linalg.solve(matrices[:, :, n:], -matrices[:, :, :n])[:, -n:]
-    assert transitions(tables.value, tables.slope, h, jacobian) == pytest.approx(solved, abs=1e-12)
+    found, block = np.empty((3, n, n)), np.empty((degree * n, (degree + 1) * n))
+    condense(tables.value, tables.slope, h, jacobian, block, np.empty((degree + 1) * n, np.int64), found)
+    assert found == pytest.approx(solved, abs=1e-12)

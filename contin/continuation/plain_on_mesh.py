@@ -1,0 +1,159 @@
+"""A plain step on a mesh: what kernels make and compare of it.
+
+It is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.detection.watch`. Each of these
+kernels is called once a step; `contin.continuation.lane` ends where one of them asks for a closer look.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from contin.arrays import Array
+from contin.continuation import rules
+from contin.continuation.plain import Quotient, calm
+from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
+from contin.detection.crossings import PIVOT, TURN
+from contin.detection.hopf_end import COLLAPSED
+from contin.detection.spectra import FIRST, LAST, Spectra, may_cross_between
+from contin.discretization.monodromy import KNOWN, Monodromy, fill_multipliers
+from contin.discretization.rounding import NEAR_CIRCLE
+from contin.discretization.workspace import Workspace
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
+from contin.linalg.condensation import Factored
+from contin.linalg.ends import Relations, divide_ends, relate_ends
+from contin.stepping import one_call
+from contin.stepping.newton import STAGNANT
+from contin.stepping.small import ASKS, BELIEVED, FAILED
+
+
+@helper
+def _product(row: Array, x: Array) -> float:
+    """Return the product of a row and the first unknowns."""
+    total = 0.0
+    for i in range(row.size):
+        total += row[i] * x[i]
+    return total
+
+
+class MeshRooms(NamedTuple):
+    """Where steps on a mesh are made.
+
+    ``amplitude`` (states,) takes a cycle to its size as a part of that of the reference; it is empty where solutions have none.
+    """
+
+    work: Workspace
+    factored: Factored
+    newton: one_call.Control
+    report: Vector
+    amplitude: Vector
+    frame: Frame
+    attempt: Attempt
+    control: Control
+    watch: Watch
+
+
+@kernel(reorder=False, last=True)
+def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int, bend: float) -> float:
+    """Predict, correct and judge a step into row ``number`` of a path, halving it until it can be believed; accept it.
+
+    Return its length; 0 where it is not decided here, or the watch list asks. ``bend`` is 0 at the first step, else half of
+    what divides the change of tangents.
+    """
+    work, factored, newton, report, amplitude, frame, attempt, control, watch = rooms
+    values, weights = work.values, frame.weights
+    x, new, tangent, last = path.x[number - 1], path.x[number], path.tangents[number], values.rows.shape[0] - 1
+    row, start, judged = values.rows[last], 0.0, attempt.judged
+    for i in range(x.size):
+        row[i] = weights[i] * path.tangents[number - 1, i]
+        start += row[i] * x[i]
+    step = rules.first_length(frame, control, watch, path, number, bend)
+    while True:
+        rules.predict(attempt, path, number, bend, step)
+        values.targets[last] = start + step
+        done, outcome = one_call.correct_on_mesh(work, factored, newton, new, weights, tangent, report), FAILED
+        judged[rules.SIGN], judged[rules.UPDATES] = report[one_call.SIGN], report[one_call.ITERATIONS]
+        judged[rules.ERROR] = report[one_call.ERROR]
+        if done == one_call.STAGNATES:
+            return 0.0
+        if done == one_call.FAILED and report[one_call.UPDATES + int(report[one_call.ITERATIONS]) - 1] <= STAGNANT:
+            return 0.0
+        if done == one_call.CONVERGED and not _has_collapsed(amplitude, x, new):
+            outcome = rules.judge(frame, attempt, control, path, number, bend, step)
+        if outcome == BELIEVED:
+            break
+        step /= 2
+        if outcome == ASKS or step < control.shortest:
+            return 0.0
+    if rules.asks(frame, attempt, control, watch, path, accepted, number, step):
+        return 0.0
+    if amplitude.size > 0 and not _product(amplitude, new) > 0:
+        return 0.0
+    rules.accept(frame, attempt, control, path, number, step, bend)
+    return 0.0 if control.primary >= 0 and path.numbers[number, rules.SENSE] == 0.0 else step
+
+
+@helper
+def _has_collapsed(amplitude: Array, x: Array, new: Array) -> bool:
+    """Return whether a cycle has become an equilibrium, as `contin.detection.hopf_end.collapsed`."""
+    return amplitude.size > 0 and abs(_product(amplitude, new)) < COLLAPSED * abs(_product(amplitude, x))
+
+
+@kernel(reorder=False, last=True)
+def rests(field: Matrix, n: int, still: float) -> int:
+    """Return 1 where the least speed of a cycle, with these rates of n states, is not above this part of the largest."""
+    least, largest = math.inf, 0.0
+    for q in range(field.shape[0]):
+        speed = 0.0
+        for a in range(n):
+            speed += field[q, a] * field[q, a]
+        least, largest = min(least, speed), max(largest, speed)
+    return 0 if math.sqrt(least) > still * math.sqrt(largest) else 1
+
+
+@kernel(reorder=False, last=True)
+def ends_are_calm(factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int) -> int:
+    """Fill in what a matrix says of both ends of the mesh; return 1 where no singular value comes near zero from ``before`` on.
+
+    It is decided by the condensed matrices, as in `contin.detection.crossings`. Where a step ``begins`` nothing is compared.
+    """
+    factors, _, first, last, carried, _ = factored
+    least = relate_ends(factors.chain, carried[0], first, last, after.relations, after.others)
+    if begins or not least > PIVOT:
+        return 1 if least > PIVOT else 0
+    turn = divide_ends(before, after, quotient.quotient, quotient.work)
+    return 1 if turn < TURN and calm(quotient) else 0
+
+
+@kernel(reorder=False, last=True)
+def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, begins: int) -> int:
+    """Return 1 where multipliers at a point that was linearized ask for a closer look at the step that ends there, 0 elsewhere.
+
+    The end of the step before is its beginning; where one ``begins``, nothing is compared. Round-off on the circle asks, too.
+    """
+    n, size = room.real.size, spectra.real.shape[1]
+    for a in range(size):
+        spectra.real[FIRST, a], spectra.imaginary[FIRST, a] = spectra.real[LAST, a], spectra.imaginary[LAST, a]
+    for q in range(jacobian.shape[0]):
+        for c in range(n):
+            b = room.order[c]
+            for a in range(n):
+                room.jacobian[q, a, b] = jacobian[q, a, c]
+    if fill_multipliers(room, 0) != KNOWN:
+        return 1
+    trivial, least = -1, math.inf
+    for a in range(n if room.autonomous else 0):
+        distance = math.hypot(room.real[a], room.imaginary[a])
+        if distance < least:
+            trivial, least = a, distance
+    at = 0
+    for a in range(n):
+        x, y = room.real[a], room.imaginary[a]
+        if a == trivial:
+            continue
+        if not abs(x) >= NEAR_CIRCLE or (room.autonomous and not math.hypot(x, y) > 2 * least):
+            return 1
+        spectra.real[LAST, at], spectra.imaginary[LAST, at] = x, y
+        at += 1
+    return 1 if not begins and may_cross_between(spectra) else 0
