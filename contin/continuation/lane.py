@@ -16,7 +16,18 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.continuation.plain import Quotient, Rooms, plain_steps
-from contin.continuation.plain_on_mesh import MeshRooms, ends_are_calm, multipliers_ask, rests, step_on_mesh
+from contin.continuation.plain_on_mesh import (
+    ASK,
+    AWAY,
+    CALM,
+    MAY_BRANCH,
+    UNSOUND,
+    MeshRooms,
+    ends_are_calm,
+    multipliers_ask,
+    rests,
+    step_on_mesh,
+)
 from contin.continuation.rules import (
     ARCLENGTH,
     CLOSES,
@@ -45,6 +56,7 @@ from contin.discretization.defect import estimate, estimate_of
 from contin.discretization.monodromy import monodromy_of
 from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
+from contin.linalg.condensation import Factorization
 from contin.linalg.ends import Relations
 from contin.results.point import Point
 from contin.stepping import one_call
@@ -144,12 +156,12 @@ class Lane:
         """Return the first point of the run, or the last of its unknowns, and by which weights distances to it are measured."""
         raise NotImplementedError
 
-    def _make(self, path: Path, accepted: int, bent: int) -> int:
-        """Make plain steps from row 1 of a path; return how many."""
+    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
+        """Make plain steps from row 1 of a path, the state's point ``here``; return how many."""
         raise NotImplementedError
 
-    def steps(self, state: State, most: int) -> Block:
-        """Make plain steps from a state, no more than ``most``."""
+    def steps(self, state: State, most: int, here: Trial) -> Block:
+        """Make plain steps from a state, no more than ``most``; ``here`` is its point."""
         size = state.x.size
         path = Path(np.empty((most + 2, size)), np.empty((most + 2, size)), np.zeros((most + 2, NUMBERS)))
         bent = state.previous_tangent is not None
@@ -158,7 +170,7 @@ class Lane:
         path.numbers[1, :MESH_ERROR] = (
             state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0,
         )  # fmt: skip
-        made = self._make(path, state.accepted, int(bent))
+        made = self._make(path, state.accepted, int(bent), here)
         return Block(self.system, state, path, *self._passed(path, made))
 
     def _passed(self, path: Path, made: int) -> tuple[int, list[int | None] | None]:
@@ -210,7 +222,7 @@ class SmallLane(Lane):
         circles = np.append(system.circles, np.zeros(system.size - system.state_size))
         return home.carrier(system)(x), np.where(circles > 0, 0.0, system.weights)
 
-    def _make(self, path: Path, accepted: int, bent: int) -> int:
+    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
         return int(plain_steps(self._rooms, path, accepted, bent))
 
 
@@ -228,7 +240,8 @@ class MeshLane(Lane):
             self._frame, self._attempt, self._control, self._watch,
         )  # fmt: skip
         self._still = STILL if autonomous and homoclinic() in given[2] else 0.0
-        self._poor = settings.mesh.tolerance if settings.mesh.every else np.inf
+        may_grow = settings.mesh.every and system.intervals < settings.mesh.max_intervals
+        self._poor = settings.mesh.tolerance if may_grow else np.inf  # an error above it wants a finer mesh
         self._monodromy = monodromy_of(system) if cycles else None
         width = 2 * n + len(system.free)
         shapes = (system.intervals - 1, n, width), (width - n, width)
@@ -255,7 +268,7 @@ class MeshLane(Lane):
             first[:] = np.nan
         return first, np.ones(first.size)
 
-    def _make(self, path: Path, accepted: int, bent: int) -> int:
+    def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
         work, factored, newton, report, amplitude, frame, *_ = self._rooms
         values = work.values
         conditions, targets = self.system.linear_conditions
@@ -263,14 +276,16 @@ class MeshLane(Lane):
         values.rows[-1] = frame.weights * path.tangents[1]
         if amplitude.size:
             amplitude[:] = self.system.amplitude_row
-        spare = path.tangents[2] if len(path.x) > 2 else np.empty(path.x.shape[1])
-        given = newton._replace(most=0), path.x[1], frame.weights, spare, report
-        if one_call.correct_on_mesh(work, factored, *given) != one_call.CONVERGED:
-            return 0
+        begins: Any = factored
+        if isinstance(here.factors, Factorization) and np.array_equal(values.at, here.x):
+            begins = here.factors.room
+        else:
+            given = newton._replace(most=0), path.x[1], frame.weights, np.empty(path.x.shape[1]), report
+            if one_call.correct_on_mesh(work, factored, *given) != one_call.CONVERGED:
+                return 0
         before, after = self._relations
-        if self._watched and not ends_are_calm(factored, before, after, self._quotient, 1):
-            return 0
-        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1):
+        clear = ends_are_calm(begins, before, after, self._quotient, 1) if self._watched else CALM
+        if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 1) == ASK:
             return 0
         for number in range(2, len(path.x)):
             before, after = after, before
@@ -279,9 +294,12 @@ class MeshLane(Lane):
                 return number - 2
             if self._still and rests(values.field, values.points.shape[1], self._still):
                 return number - 2
-            if self._watched and not ends_are_calm(factored, before, after, self._quotient, 0):
-                return number - 2
-            if self._monodromy is not None and multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0):
+            was, found = clear, MAY_BRANCH
+            if self._watched:
+                clear = ends_are_calm(factored, before, after, self._quotient, 0)
+            if self._monodromy is not None:
+                found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0)
+            if found == ASK or not (found == AWAY or (was != UNSOUND and clear == CALM)):
                 return number - 2
             error = estimate(work, factored, self._estimate, path.x[number])
             if not error <= self._poor:

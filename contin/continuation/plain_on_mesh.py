@@ -15,7 +15,7 @@ from contin.continuation.plain import Quotient, calm
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
 from contin.detection.crossings import PIVOT, TURN
 from contin.detection.hopf_end import COLLAPSED
-from contin.detection.spectra import FIRST, LAST, Spectra, may_cross_between
+from contin.detection.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
 from contin.discretization.monodromy import KNOWN, Monodromy, fill_multipliers
 from contin.discretization.rounding import NEAR_CIRCLE
 from contin.discretization.workspace import Workspace
@@ -35,6 +35,12 @@ def _product(row: Array, x: Array) -> float:
     for i in range(row.size):
         total += row[i] * x[i]
     return total
+
+
+#: What multipliers say of a step: look closer; nothing; that a branch point or a fold may lie in it.
+ASK, AWAY, MAY_BRANCH = range(3)
+#: What condensed matrices say.
+UNSOUND, SOUND, CALM = range(3)
 
 
 class MeshRooms(NamedTuple):
@@ -114,23 +120,25 @@ def rests(field: Matrix, n: int, still: float) -> int:
 
 @kernel(reorder=False, last=True)
 def ends_are_calm(factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int) -> int:
-    """Fill in what a matrix says of both ends of the mesh; return 1 where no singular value comes near zero from ``before`` on.
+    """Fill in what a matrix says of both ends of the mesh; return `CALM` where no singular value comes near zero in a step.
 
-    It is decided by the condensed matrices, as in `contin.detection.crossings`. Where a step ``begins`` nothing is compared.
+    That is from ``before`` on, by the condensed matrices, as in `contin.detection.crossings`. Else return whether the one here
+    is `SOUND`, and may be compared, or `UNSOUND`. Where a step ``begins``, nothing is compared.
     """
     factors, _, first, last, carried, _ = factored
     least = relate_ends(factors.chain, carried[0], first, last, after.relations, after.others)
     if begins or not least > PIVOT:
-        return 1 if least > PIVOT else 0
+        return SOUND if least > PIVOT else UNSOUND
     turn = divide_ends(before, after, quotient.quotient, quotient.work)
-    return 1 if turn < TURN and calm(quotient) else 0
+    return CALM if turn < TURN and calm(quotient) else SOUND
 
 
 @kernel(reorder=False, last=True)
 def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, begins: int) -> int:
-    """Return 1 where multipliers at a point that was linearized ask for a closer look at the step that ends there, 0 elsewhere.
+    """Return `ASK` where multipliers at a point that was linearized ask for a closer look at the step that ends there.
 
-    The end of the step before is its beginning; where one ``begins``, nothing is compared. Round-off on the circle asks, too.
+    `AWAY` where they do not, and none comes near 1. The end of the step before is its beginning; where one ``begins``, nothing
+    is compared. Round-off on the circle asks, too.
     """
     n, size = room.real.size, spectra.real.shape[1]
     for a in range(size):
@@ -141,7 +149,7 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, begins: 
             for a in range(n):
                 room.jacobian[q, a, b] = jacobian[q, a, c]
     if fill_multipliers(room, 0) != KNOWN:
-        return 1
+        return ASK
     trivial, least = -1, math.inf
     for a in range(n if room.autonomous else 0):
         distance = math.hypot(room.real[a], room.imaginary[a])
@@ -153,7 +161,11 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, begins: 
         if a == trivial:
             continue
         if not abs(x) >= NEAR_CIRCLE or (room.autonomous and not math.hypot(x, y) > 2 * least):
-            return 1
+            return ASK
         spectra.real[LAST, at], spectra.imaginary[LAST, at] = x, y
         at += 1
-    return 1 if not begins and may_cross_between(spectra) else 0
+    if begins:
+        return AWAY
+    if may_cross_between(spectra):
+        return ASK
+    return AWAY if keep_off_one(spectra) else MAY_BRANCH

@@ -217,7 +217,7 @@ class Continuation:
             if lane is None or state.singular:
                 return
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
-            block = lane.steps(state, max(most, 0))
+            block = lane.steps(state, max(most, 0), self._here())
             for self._state, point in block.points():
                 self._end, self._accuracy = None, Accuracy(point.discretization_error)
                 yield point

@@ -207,10 +207,11 @@ def doubling(order: int = 1) -> TestFunction:
 def _antiperiodic(trial: Trial) -> float:
     system: Any = trial.system
     values = system.eigenvalues(trial.x)
-    size = np.exp(-np.abs(values.real))
-    ahead = np.exp(1j * values.imag)
-    factors = np.where(values.real > 0, size + ahead, 1 + size * ahead) / (1 + size)
-    return float(np.prod(factors).real)
+    with np.errstate(invalid="ignore"):  # NaN where there are none
+        size = np.exp(-np.abs(values.real))
+        ahead = np.exp(1j * values.imag)
+        factors = np.where(values.real > 0, size + ahead, 1 + size * ahead) / (1 + size)
+        return float(np.prod(factors).real)
 
 
 def _of_doubling(trial: Trial) -> dict[str, float]:
@@ -255,7 +256,7 @@ def _comes_near(segment: Segment, distances: Callable[[Sequence[complex]], list[
 def _moves(segment: Segment) -> list[tuple[tuple[complex, ...], list[float]]]:
     """Return the logarithms at both ends of a step, and how far each is from the nearest at the other end."""
     first, last = _without_trivial(segment.before), _without_trivial(segment.trial)
-    gaps = [[abs(_difference(here, there)) for there in last] for here in first]
+    gaps = [[_apart_by(here, there) for there in last] for here in first]
     return [(first, list(map(min, gaps))), (last, list(map(min, zip(*gaps))))]
 
 
@@ -267,15 +268,31 @@ def _without_trivial(trial: Trial) -> tuple[complex, ...]:
     return tuple(value for place, value in enumerate(values) if place != trivial)
 
 
-def _difference(value: complex, other: complex) -> complex:
-    """Return the difference of two logarithms: angles are alike up to full turns."""
+def _apart_by(value: complex, other: complex) -> float:
+    """Return how far two logarithms are apart: angles are alike up to full turns; NaN where one is not known.
+
+    Python's abs may raise OverflowError for a NaN before version 3.12.
+    """
     gap = value - other
-    return complex(gap.real, math.remainder(gap.imag, 2 * math.pi)) if math.isfinite(gap.real) else gap
+    return math.hypot(gap.real, math.remainder(gap.imag, 2 * math.pi)) if math.isfinite(gap.real) else math.nan
+
+
+def keep_off_one(segment: Segment) -> bool:
+    """Return whether no multiplier but the one that is 1 comes near 1 in a step of a branch of cycles, by those at both ends.
+
+    That is where cycles branch.
+    """
+    return isinstance(segment.trial.system, PeriodicCollocation) and not _comes_near(segment, _from_one)
+
+
+def _from_one(values: Sequence[complex]) -> list[float]:
+    """Return how far each logarithm is from that of 1."""
+    return [math.hypot(value.real, value.imag) for value in values]
 
 
 def _from_doubling(values: Sequence[complex]) -> list[float]:
     """Return how far each logarithm is from that of -1."""
-    return [abs(complex(value.real, math.pi - abs(value.imag))) for value in values]
+    return [math.hypot(value.real, math.pi - abs(value.imag)) for value in values]
 
 
 def _from_torus(values: Sequence[complex]) -> list[float]:

@@ -27,6 +27,10 @@ FIRST, LAST, _COUNT = 0, len(LOOKS) + 1, len(LOOKS) + 2
 _QUARTERS = tuple(place for place, part in enumerate([0.0, *LOOKS, 1.0]) if (4 * part) % 1 == 0)
 
 
+#: What multipliers pass.
+ONE, MINUS_ONE, CIRCLE = range(3)
+
+
 class Spectra(NamedTuple):
     """Eigenvalues, or logarithms of multipliers, at places of a step: sorted rows of ``real`` and ``imaginary``.
 
@@ -125,7 +129,13 @@ def may_pass_axis(equations: Equations, spectra: Spectra) -> bool:
 @helper
 def may_cross_between(spectra: Spectra) -> bool:
     """Return whether multipliers may pass -1, or the unit circle as a pair, by both ends of a step alone."""
-    return _crosses(spectra) or _comes_near(spectra, False) or _comes_near(spectra, True)
+    return _crosses(spectra) or _comes_near(spectra, MINUS_ONE) or _comes_near(spectra, CIRCLE)
+
+
+@helper
+def keep_off_one(spectra: Spectra) -> bool:
+    """Return whether no multiplier comes near 1, by both ends of a step alone."""
+    return not _comes_near(spectra, ONE)
 
 
 @helper
@@ -133,7 +143,7 @@ def may_double_or_twist(equations: Equations, spectra: Spectra) -> bool:
     """Return whether multipliers may pass -1, or the unit circle as a pair; inside the step where they come near either."""
     if _crosses(spectra):
         return True
-    doubles, twists = _comes_near(spectra, False), _comes_near(spectra, True)
+    doubles, twists = _comes_near(spectra, MINUS_ONE), _comes_near(spectra, CIRCLE)
     if not (doubles or twists):
         return False
     for number in range(1, LAST):
@@ -195,8 +205,8 @@ def _outside(spectra: Spectra, number: int) -> int:
 
 
 @helper
-def _comes_near(spectra: Spectra, twists: bool) -> bool:
-    """Return whether a multiplier may have passed -1, or as one of a pair the circle, and back."""
+def _comes_near(spectra: Spectra, what: int) -> bool:
+    """Return whether a multiplier may have passed 1 or -1, or as one of a pair the circle, and back."""
     n = spectra.real.shape[1]
     for side in range(2):
         here, there = (FIRST, LAST) if side == 0 else (LAST, FIRST)
@@ -209,7 +219,11 @@ def _comes_near(spectra: Spectra, twists: bool) -> bool:
                 move = min(move, math.hypot(x - spectra.real[there, j], turn))
                 if j != i and abs(spectra.imaginary[here, j]) == abs(y):
                     partner = min(partner, abs(spectra.real[here, j]))
-            distance = max(abs(x), partner) if twists else math.hypot(x, math.pi - abs(y))
+            distance = math.hypot(x, y)
+            if what == CIRCLE:
+                distance = max(abs(x), partner)
+            elif what == MINUS_ONE:
+                distance = math.hypot(x, math.pi - abs(y))
             if not (distance > NEAR and CHANGES * move < distance):
                 return True
     return False

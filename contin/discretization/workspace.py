@@ -57,11 +57,13 @@ class Mesh(NamedTuple):
 class Values(NamedTuple):
     """What is computed at one x: parameters p, states at Gauss points and at both ends, values and derivatives of functions.
 
-    ``rows`` (r, size) are linear conditions with the values ``targets`` (r,), the last one that of a step. ``none``,
-    ``nothing`` and ``zero`` are absent second states, absent derivatives, and the t of boundary conditions.
+    ``at`` (size,) is where derivatives were taken last. ``rows`` (r, size) are linear conditions with the values ``targets``
+    (r,), the last one that of a step. ``none``, ``nothing`` and ``zero`` are absent second states, absent derivatives, and
+    the t of boundary conditions.
     """
 
     p: Vector
+    at: Vector
     points: Matrix
     start: Matrix
     end: Matrix
@@ -124,7 +126,8 @@ def workspace(system: Any, rows: int) -> Workspace:
     )
     points, empty = system._times.size, np.empty
     values = Values(
-        system.parameters.copy(), empty((points, n)), empty((1, n)), empty((1, n)), empty((points, field.count)),
+        system.parameters.copy(), np.full(system.size, np.nan), empty((points, n)), empty((1, n)), empty((1, n)),
+        empty((points, field.count)),
         np.zeros((points, field.count, of_field.width)), empty((1, ends.count)), np.zeros((1, ends.count, of_ends.width)),
         empty((rows, system.size)), empty(rows), empty((0, system._conditions + rows - 1)), empty((1, system.size)),
         empty((1, system.size)),

@@ -118,7 +118,7 @@ def log_eigenvalues_along(factors: Array, vectors: Array) -> ComplexArray:
     ----------
     factors : ndarray, shape (N, n, n)
     vectors : ndarray, shape (N + 1, n)
-        v_0 ... v_N, of any length; the last is a positive multiple of the first.
+        v_0 ... v_N, of any length; the last is a positive multiple of the first. Where one is zero, all eigenvalues are NaN.
 
     Examples
     --------
@@ -127,7 +127,8 @@ def log_eigenvalues_along(factors: Array, vectors: Array) -> ComplexArray:
     [16.  1.]
     """
     n = factors.shape[-1]
-    units = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    with np.errstate(invalid="ignore"):
+        units = vectors / np.linalg.norm(vectors, axis=1)[:, None]
     mirrors = units + np.where(units[:, :1] < 0, -1.0, 1.0) * np.eye(n)[0]
     reflections = np.eye(n) - 2 * mirrors[:, :, None] * mirrors[:, None] / np.sum(mirrors**2, axis=1)[:, None, None]
     normal = reflections[:, :, 1:]
@@ -282,7 +283,7 @@ def fill_logarithms(factors: Stack, room: Product, real: Vector, imaginary: Vect
             for b in range(n):
                 total += abs(factors[j, a, b])
     for a in range(n):
-        real[a] = imaginary[a] = math.nan
+        real[a], imaginary[a] = math.nan, 0.0
         for b in range(n):
             first[a, b] = room.basis[a, b]
     if not total < math.inf:

@@ -26,8 +26,12 @@ CLOSE = 0.03
 #: An update of a few units in the last place: with it x solves the equations as well as any number can.
 EXACT = 1e-15
 
-#: What a call comes to: converged; updates no longer shrink; no convergence; the equations are not finite at x.
-CONVERGED, STAGNATES, FAILED, NOT_FINITE = range(4)
+#: An update with a new Jacobian below this leaves that one right at the solution, but for so much: tangents are as exact.
+RIGHT_THERE = 1e-13
+
+#: What a call comes to: converged; updates no longer shrink; no convergence; the equations are not finite at x. Inside it,
+#: converged with factors that are right at x.
+CONVERGED, STAGNATES, FAILED, NOT_FINITE, RIGHT = range(5)
 #: Places in the report: iterations, the error left, the sign of the determinant; then the updates' sizes.
 ITERATIONS, ERROR, SIGN, UPDATES = range(4)
 
@@ -68,6 +72,8 @@ def _evaluate(codes, mesh, room, x, slopes):
         room.end[0, a] = x[mesh.states - n + a] * sizes.states[a]
     inside, ends = Points(mesh.times, room.points, room.none), Points(room.zero, room.start, room.end)
     if slopes:
+        for i in range(x.size):
+            room.at[i] = x[i]
         run_loaded(codes.field_slopes, room.p, inside, room.field, room.jacobian)
         run_loaded(codes.ends_slopes, room.p, ends, room.boundary, room.at_ends)
         _scale_slopes(room.jacobian, sizes.field, sizes.field_inputs)
@@ -151,7 +157,7 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
         rate = estimated_rate(size, before, moved, fresh)
         report[ERROR] = size * rate
         if has_converged(size, rate, number + 1, tolerance):
-            return CONVERGED
+            return RIGHT if fresh and size <= RIGHT_THERE else CONVERGED
         if stagnates(size, rate, number + 1):
             return STAGNATES
         if number > 1 and diverges(size, before):
@@ -165,13 +171,20 @@ def _linearize(codes, mesh, room, matrix, x, weights, tangent, report):
     """Factor the matrix right at x, and fill the unit tangent."""
     _evaluate(codes, mesh, room, x, True)
     _fill_residual(mesh, room, x)
+    for i in range(room.right.shape[1] - 1):
+        if not abs(room.right[0, i]) < math.inf:
+            return NOT_FINITE
+    report[SIGN] = _factor(mesh, room, matrix)
+    return _fill_tangent(mesh, room, matrix, x, weights, tangent)
+
+
+@helper
+def _fill_tangent(mesh, room, matrix, x, weights, tangent):
+    """Fill the unit tangent from the factors at hand."""
     right, last = room.right[0], room.right.shape[1] - 1
     for i in range(last):
-        if not abs(right[i]) < math.inf:
-            return NOT_FINITE
         right[i] = 0.0
     right[last] = 1.0
-    report[SIGN] = _factor(mesh, room, matrix)
     _solve(mesh, room, matrix)
     total = 0.0
     for i in range(x.size):
@@ -196,4 +209,10 @@ def correct_on_mesh(
         done = _iterate(codes, mesh, room, matrix, x, control, report)
     if done == CONVERGED and control.linearize:
         done = _linearize(codes, mesh, room, matrix, x, weights, tangent, report)
+    elif done == RIGHT:
+        done = CONVERGED
+        for i in range(x.size if control.linearize else 0):
+            room.at[i] = x[i]
+        if control.linearize:
+            done = _fill_tangent(mesh, room, matrix, x, weights, tangent)
     return done
