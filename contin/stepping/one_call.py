@@ -72,8 +72,7 @@ def _evaluate(codes, mesh, room, x, slopes):
         room.end[0, a] = x[mesh.states - n + a] * sizes.states[a]
     inside, ends = Points(mesh.times, room.points, room.none), Points(room.zero, room.start, room.end)
     if slopes:
-        for i in range(x.size):
-            room.at[i] = x[i]
+        room.at[0] = math.nan
         run_loaded(codes.field_slopes, room.p, inside, room.field, room.jacobian)
         run_loaded(codes.ends_slopes, room.p, ends, room.boundary, room.at_ends)
         _scale_slopes(room.jacobian, sizes.field, sizes.field_inputs)
@@ -167,20 +166,17 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
 
 
 @helper
-def _linearize(codes, mesh, room, matrix, x, weights, tangent, report):
-    """Factor the matrix right at x, and fill the unit tangent."""
-    _evaluate(codes, mesh, room, x, True)
+def _linearize(codes, mesh, room, matrix, x, weights, tangent, report, known):
+    """Factor the matrix right at x, unless the factors at hand are ``known`` to be those, and fill the unit tangent."""
+    _evaluate(codes, mesh, room, x, not known)
     _fill_residual(mesh, room, x)
     for i in range(room.right.shape[1] - 1):
         if not abs(room.right[0, i]) < math.inf:
             return NOT_FINITE
-    report[SIGN] = _factor(mesh, room, matrix)
-    return _fill_tangent(mesh, room, matrix, x, weights, tangent)
-
-
-@helper
-def _fill_tangent(mesh, room, matrix, x, weights, tangent):
-    """Fill the unit tangent from the factors at hand."""
+    for i in range(x.size):
+        room.at[i] = x[i]
+    if not known:
+        report[SIGN] = _factor(mesh, room, matrix)
     right, last = room.right[0], room.right.shape[1] - 1
     for i in range(last):
         right[i] = 0.0
@@ -207,12 +203,6 @@ def correct_on_mesh(
         done = _chord_steps(codes, mesh, room, matrix, x, control.tolerance, report)
     elif control.most > 0:
         done = _iterate(codes, mesh, room, matrix, x, control, report)
-    if done == CONVERGED and control.linearize:
-        done = _linearize(codes, mesh, room, matrix, x, weights, tangent, report)
-    elif done == RIGHT:
-        done = CONVERGED
-        for i in range(x.size if control.linearize else 0):
-            room.at[i] = x[i]
-        if control.linearize:
-            done = _fill_tangent(mesh, room, matrix, x, weights, tangent)
-    return done
+    if (done == CONVERGED or done == RIGHT) and control.linearize:
+        done = _linearize(codes, mesh, room, matrix, x, weights, tangent, report, done == RIGHT)
+    return CONVERGED if done == RIGHT else done
