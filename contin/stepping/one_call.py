@@ -203,6 +203,6 @@ def correct_on_mesh(
         done = _chord_steps(codes, mesh, room, matrix, x, control.tolerance, report)
     elif control.most > 0:
         done = _iterate(codes, mesh, room, matrix, x, control, report)
-    if (done == CONVERGED or done == RIGHT) and control.linearize:
+    if done in (CONVERGED, RIGHT) and control.linearize:
         done = _linearize(codes, mesh, room, matrix, x, weights, tangent, report, done == RIGHT)
     return CONVERGED if done == RIGHT else done
