@@ -203,6 +203,8 @@ class Inspection:
 
     def _zeros(self, test: TestFunction, crossings: list[SpecialPoint]) -> list[SpecialPoint]:
         """Return the zeros of a test function, looked for between the folds. At a fold or branch point they lie right there."""
+        if test.asks is not None and not test.asks(self.segment):
+            return []
         if test.search is not None:
             points: list[SpecialPoint] | None = test.search(self.segment, self._knots)
             if points is not None:
