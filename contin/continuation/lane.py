@@ -31,13 +31,16 @@ from contin.continuation.plain_on_mesh import (
 from contin.continuation.rules import (
     ARCLENGTH,
     CLOSES,
+    ERROR,
     ERROR_LEFT,
     ITERATIONS,
     JUDGED,
     MESH_ERROR,
     NUMBERS,
+    SIGN,
     SIGN_OF,
     STEP,
+    UPDATES,
     Attempt,
     Control,
     Frame,
@@ -117,7 +120,14 @@ class Lane:
     tests, others : sequence of TestFunction
         All, and those that the kernel does not know.
     noisy : bool
+
+    Attributes
+    ----------
+    handed : tuple (int, float, Trial) or None
+        The step that the last call ended at, where it was made: the number of steps before, its length, its end.
     """
+
+    handed: tuple[int, float, Trial] | None = None
 
     def __init__(
         self, system: Any, settings: Settings, start: Start, tests: Sequence[TestFunction], others: Sequence[TestFunction],
@@ -170,6 +180,7 @@ class Lane:
         path.numbers[1, :MESH_ERROR] = (
             state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0,
         )  # fmt: skip
+        self.handed = None
         made = self._make(path, state.accepted, int(bent), here)
         return Block(self.system, state, path, *self._passed(path, made))
 
@@ -290,22 +301,33 @@ class MeshLane(Lane):
         for number in range(2, len(path.x)):
             before, after = after, before
             bend = 0.5 / path.numbers[number - 1, STEP] if number > 2 or bent else 0.0
-            if not step_on_mesh(self._rooms, path, accepted, number, bend):
+            step = step_on_mesh(self._rooms, path, accepted, number, bend)
+            asks = step <= 0 or (self._still and rests(values.field, values.points.shape[1], self._still))
+            if not asks:
+                was, found = clear, MAY_BRANCH
+                if self._watched:
+                    clear = ends_are_calm(factored, before, after, self._quotient, 0)
+                if self._monodromy is not None:
+                    found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0)
+                asks = found == ASK or not (found == AWAY or (was != UNSOUND and clear == CALM))
+            if not asks:
+                error = estimate(work, factored, self._estimate, path.x[number])
+                path.numbers[number, MESH_ERROR] = error
+                asks = not error <= self._poor
+            if asks:
+                if step:
+                    self._hand_over(path, number, abs(step))
                 return number - 2
-            if self._still and rests(values.field, values.points.shape[1], self._still):
-                return number - 2
-            was, found = clear, MAY_BRANCH
-            if self._watched:
-                clear = ends_are_calm(factored, before, after, self._quotient, 0)
-            if self._monodromy is not None:
-                found = multipliers_ask(self._monodromy, self._spectra, values.jacobian, 0)
-            if found == ASK or not (found == AWAY or (was != UNSOUND and clear == CALM)):
-                return number - 2
-            error = estimate(work, factored, self._estimate, path.x[number])
-            if not error <= self._poor:
-                return number - 2
-            path.numbers[number, MESH_ERROR] = error
         return len(path.x) - 2
+
+    def _hand_over(self, path: Path, number: int, step: float) -> None:
+        """Keep a step that was made and asks for a closer look, with its factors."""
+        sign, iterations, error = self._attempt.judged[[SIGN, UPDATES, ERROR]].tolist()
+        factors, self._factors = self._factors, self.system.unfilled_factors()
+        self._rooms = self._rooms._replace(factored=self._factors.room)
+        factors.sign = sign
+        linear = Linearization(path.tangents[number], sign, factors)
+        self.handed = number - 2, step, Trial(self.system, path.x[number], linear, int(iterations), error)
 
 
 class Block:

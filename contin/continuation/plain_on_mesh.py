@@ -64,8 +64,8 @@ class MeshRooms(NamedTuple):
 def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int, bend: float) -> float:
     """Predict, correct and judge a step into row ``number`` of a path, halving it until it can be believed; accept it.
 
-    Return its length; 0 where it is not decided here, or the watch list asks. ``bend`` is 0 at the first step, else half of
-    what divides the change of tangents.
+    Return its length, negative where the watch list asks; 0 where it is not decided here. ``bend`` is 0 at the first step, else
+    half of what divides the change of tangents.
     """
     work, factored, newton, report, amplitude, frame, attempt, control, watch = rooms
     values, weights = work.values, frame.weights
@@ -93,11 +93,11 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int, bend:
         if outcome == ASKS or step < control.shortest:
             return 0.0
     if rules.asks(frame, attempt, control, watch, path, accepted, number, step):
-        return 0.0
+        return -step
     if amplitude.size > 0 and not _product(amplitude, new) > 0:
-        return 0.0
+        return -step
     rules.accept(frame, attempt, control, path, number, step, bend)
-    return 0.0 if control.primary >= 0 and path.numbers[number, rules.SENSE] == 0.0 else step
+    return -step if control.primary >= 0 and path.numbers[number, rules.SENSE] == 0.0 else step
 
 
 @helper

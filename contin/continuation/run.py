@@ -156,6 +156,7 @@ class Continuation:
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
+        self._handed: tuple[float, Trial] | None = None  # the next step, where a kernel has made it
         self._adapted = -1  # regular points at which the mesh was looked at last
         self._lane_for: object = None
         self._known_lane: Lane | None = None
@@ -222,6 +223,8 @@ class Continuation:
                 self._end, self._accuracy = None, Accuracy(point.discretization_error)
                 yield point
             if block.made < most or most <= 0:
+                handed = lane.handed
+                self._handed = handed[1:] if handed is not None and handed[0] == block.made else None
                 return
             most = min(2 * most, MOST)
 
@@ -366,11 +369,13 @@ class Continuation:
 
     def _step(self, state: State) -> Step:
         """Predict and correct, halving the step until the corrected point can be believed."""
-        step, settings = up_to_limits(state, self.settings.limits, self.settings.min_step), self.settings
+        settings, (step, made), self._handed = self.settings, self._handed or (0.0, None), None
+        if made is None or made.system is not state.system:  # the mesh may have changed meanwhile
+            step, made = up_to_limits(state, settings.limits, settings.min_step), None
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
-                segment, judgement = self._steps.attempt(state, self._here(), step)
+                segment, judgement = self._steps.attempt(state, self._here(), step, made)
                 inspection = Inspection(segment, settings, self.start, self._steps.fold)
                 if not (state.singular or segment.is_moved or any(asks(inspection) for asks in self._watch)):
                     return Step(segment, judgement)
@@ -382,7 +387,7 @@ class Continuation:
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error
-            step /= 2
+            step, made = step / 2, None
             if step < settings.min_step:
                 raise problem
 

@@ -49,8 +49,10 @@ class Steps:
     primary: str
     fold: TestFunction | None
 
-    def attempt(self, state: State, here: Trial, step: float) -> tuple[Segment, Judgement]:
+    def attempt(self, state: State, here: Trial, step: float, made: Trial | None = None) -> tuple[Segment, Judgement]:
         """Make one step of a given length from the state's point, as far as it can be believed by itself.
+
+        ``made`` is its end, where a kernel has it.
 
         Raises
         ------
@@ -58,7 +60,7 @@ class Steps:
         """
         settings = self.settings
         guess = predict(state, step)
-        trial = corrected(state, guess, step, settings.newton)
+        trial = made or corrected(state, guess, step, settings.newton)
         if collapsed(state.system, state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         judgement = judged(state, guess, trial)
