@@ -103,7 +103,8 @@ def main(argv=None) -> int:
             continue
         if options.auto_demos:
             recorded[demo.name] = auto_of(Path(options.auto_demos), demo, options.repeats)
-            RECORDED.write_text(json.dumps(recorded, indent=1, sort_keys=True) + "\n")
+            lines = [f"{json.dumps(name)}: {json.dumps(recorded[name], sort_keys=True)}" for name in sorted(recorded)]
+            RECORDED.write_text("{\n" + ",\n".join(lines) + "\n}\n")
         if options.only_auto:
             continue
         kept[demo.name] = contin_of(demo.name, 0 if demo.slow else options.repeats)

@@ -166,8 +166,9 @@ def _iterate(codes, mesh, room, matrix, x, control, report):
 
 
 @helper
-def _linearize(codes, mesh, room, matrix, x, weights, tangent, report, known):
+def _linearize(work, matrix, x, weights, tangent, report, known):
     """Factor the matrix right at x, unless the factors at hand are ``known`` to be those, and fill the unit tangent."""
+    codes, mesh, room = work
     _evaluate(codes, mesh, room, x, not known)
     _fill_residual(mesh, room, x)
     for i in range(room.right.shape[1] - 1):
@@ -204,5 +205,5 @@ def correct_on_mesh(
     elif control.most > 0:
         done = _iterate(codes, mesh, room, matrix, x, control, report)
     if done in (CONVERGED, RIGHT) and control.linearize:
-        done = _linearize(codes, mesh, room, matrix, x, weights, tangent, report, done == RIGHT)
+        done = _linearize(work, matrix, x, weights, tangent, report, done == RIGHT)
     return CONVERGED if done == RIGHT else done
