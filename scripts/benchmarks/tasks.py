@@ -93,7 +93,6 @@ def scipy_fold(tolerance=1e-8) -> dict:
 
 def _until(run, label):
     """Return the points of a run up to the first with a label, after the start."""
-    COUNTER.update(linearizations=0, linearize_seconds=0.0)
     points = []
     for point in run:
         points.append(point)
@@ -112,32 +111,7 @@ def _summary(points) -> dict:
     }  # fmt: skip
 
 
-def counted(which="half_loop", **arguments) -> dict:
-    """Return a task with the factorizations on its branch counted, and the time in them."""
-    import contin
-
-    linearize = contin.Collocation.linearize
-
-    def watched(self, *given):
-        began = time.perf_counter()
-        result = linearize(self, *given)
-        COUNTER["linearizations"] += 1
-        COUNTER["linearize_seconds"] += time.perf_counter() - began
-        return result
-
-    contin.Collocation.linearize = watched
-    try:
-        result = TASKS[which](**arguments)
-    finally:
-        contin.Collocation.linearize = linearize
-    return result | COUNTER
-
-
-#: The counters of `counted`; a task sets them to zero at the first point of its branch.
-COUNTER = {"linearizations": 0, "linearize_seconds": 0.0}
-
-
-TASKS = {function.__name__: function for function in (half_loop, cell, scipy_fold, counted)}
+TASKS = {function.__name__: function for function in (half_loop, cell, scipy_fold)}
 
 
 def main(name: str, arguments: str, repeats: str) -> None:
