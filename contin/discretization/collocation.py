@@ -8,6 +8,7 @@ satisfies the equation at the d Gauss points: error O(h^(2 d)) at the mesh point
 from __future__ import annotations
 
 import functools
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -281,9 +282,19 @@ class Collocation(System):
         """Rows (q, size) and values (q,) of conditions beyond those of the problem; None where these are not linear."""
         return np.empty((0, self.size)), np.empty(0)
 
-    @functools.cached_property
+    @property
     def workspace(self) -> Workspace | None:
         """The arrays in which a kernel corrects points; None where Python evaluates functions, and on very long meshes."""
+        thread = threading.get_ident()
+        if thread not in self._workspaces:  # kernels of two threads run side by side
+            self._workspaces[thread] = self._made_workspace()
+        return self._workspaces[thread]
+
+    @functools.cached_property
+    def _workspaces(self) -> dict[int, Workspace | None]:
+        return {}
+
+    def _made_workspace(self) -> Workspace | None:
         own, recorded = self.linear_conditions, all(batch.interpreted is None for batch in self._evaluated)
         if own is None or not recorded or not 0 <= self.size - self.equations <= 1:
             return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import threading
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -265,12 +266,16 @@ class PeriodicCollocation(Collocation):
         return self._known[key]
 
     @functools.cached_property
-    def _monodromy(self) -> Monodromy:
-        return monodromy_of(self)
+    def _monodromies(self) -> dict[int, Monodromy]:
+        """Where multipliers are computed, by thread."""
+        return {}
 
     def _computed(self, x: Array) -> ComplexArray:
         """Return the logarithms of the multipliers as they are computed."""
-        room = self._monodromy
+        thread = threading.get_ident()
+        if thread not in self._monodromies:
+            self._monodromies[thread] = monodromy_of(self)
+        room = self._monodromies[thread]
         room.jacobian[:] = self._jacobian_of_field(x)
         if fill_multipliers(room, 0) == DRIFTED:
             values = self._along_the_flow(x, room.matrices)
