@@ -326,8 +326,8 @@ class MeshLane(Lane):
         factors, self._factors = self._factors, self.system.unfilled_factors()
         self._rooms = self._rooms._replace(factored=self._factors.room)
         factors.sign = sign
-        linear = Linearization(path.tangents[number], sign, factors)
-        self.handed = number - 2, step, Trial(self.system, path.x[number], linear, int(iterations), error)
+        linear = Linearization(path.tangents[number].copy(), sign, factors)
+        self.handed = number - 2, step, Trial(self.system, path.x[number].copy(), linear, int(iterations), error)
 
 
 class Block:
@@ -347,9 +347,11 @@ class Block:
         base, (x, tangents, numbers) = self._base, self._path
         step, following, sign, arclength, _, _, sense, told, error, _ = numbers[row].tolist()
         sensed = self._free(x[int(told)]) if told else base.sensed
+        # copies begin where all arrays do: some of OpenBLAS's kernels add up in an order that hangs on that
+        there, tangent, earlier = (each.copy() for each in (x[row], tangents[row], tangents[row - 1]))
         return State(
-            base.system, x[row], tangents[row], tangents[row - 1], step, following, sign, arclength, base.accepted + row - 1,
-            False, sense, sensed, error,
+            base.system, there, tangent, earlier, step, following, sign, arclength, base.accepted + row - 1, False, sense,
+            sensed, error,
         )  # fmt: skip
 
     def _free(self, x: Array) -> Array:

@@ -23,7 +23,7 @@ from contin.detection.segment import Segment
 from contin.discretization.basis import interpolation
 from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
-from contin.stepping.newton import Newton
+from contin.stepping.newton import Newton, rounded_off
 from contin.stepping.state import State, standing_at
 from contin.stepping.step import located
 from contin.stepping.trial import Linearization, Trial
@@ -88,6 +88,12 @@ class InterpolatedZero:
     points: Array
     functions: Functions
     newton_error: float
+
+    @property
+    def noise(self) -> Array:
+        """By how much the unknowns of the nearest of the points change by round-off, shape (size,)."""
+        nearest, system = int(np.abs(self.window.places - self.at).argmin()), self.trial.system
+        return rounded_off(system, self.points[nearest], (system.weights * self.window.state.tangent,))
 
     def again(self, system: Discretization, carry: Carrier, newton: Newton) -> InterpolatedZero:
         """Return the same zero on another mesh, with another number of nodes: the change is the error of both.

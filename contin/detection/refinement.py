@@ -193,10 +193,11 @@ def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Tr
 def _split(details: Any, system: Discretization) -> Any:
     """Return by how much free parameters differ between a multiple point and the simple ones that it may consist of.
 
-    Of a zero that was interpolated: the error that Newton's method has left of the points around it.
+    Of a zero that was interpolated: the error that Newton's method, or round-off, has left of the points around it.
     """
     if isinstance(details, InterpolatedZero):
-        return details.newton_error * (1 + np.abs(details.trial.x[system.state_size :]))
+        left = details.newton_error * (1 + np.abs(details.trial.x[system.state_size :]))
+        return np.maximum(left, details.noise[system.state_size :])
     if not isinstance(details, MultiplePoint):
         return 0.0
     return details.spread * np.abs(details.tangents[0][system.state_size :])
