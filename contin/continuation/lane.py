@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -71,6 +72,8 @@ from contin.stepping.trial import Linearization, TestFunction, Trial
 
 #: Steps of the first call after a step that was looked at, and at most: each call makes twice as many as the one before.
 FEWEST, MOST = 8, 128
+#: The length of a step, and its end.
+Handed = tuple[float, Trial]
 
 
 def lane_of(
@@ -108,7 +111,7 @@ def _quotient(size: int) -> Quotient:
     return Quotient(before, quotient, work, np.empty((1, size, size)), real, imaginary)
 
 
-class Lane:
+class Lane(ABC):
     """Plain steps of one system, with what a kernel works in.
 
     Parameters
@@ -120,20 +123,14 @@ class Lane:
     tests, others : sequence of TestFunction
         All, and those that the kernel does not know.
     noisy : bool
-
-    Attributes
-    ----------
-    handed : tuple (int, float, Trial) or None
-        The step that the last call ended at, where it was made: the number of steps before, its length, its end.
     """
-
-    handed: tuple[int, float, Trial] | None = None
 
     def __init__(
         self, system: Any, settings: Settings, start: Start, tests: Sequence[TestFunction], others: Sequence[TestFunction],
         noisy: bool,
     ) -> None:  # fmt: skip
         self.system, self.settings, self.noisy, self._start = system, settings, noisy, start
+        self._handed: Handed | None = None
         self._others, self._index = others, index_of(system)
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         newton, (angle, accuracy) = settings.newton, aims(settings, system)
@@ -162,13 +159,13 @@ class Lane:
         """Return whether the lane is that of a system of the same run, with these settings."""
         return self.settings is settings and self.noisy == noisy and self.system is system
 
+    @abstractmethod
     def _home(self) -> tuple[Array, Array]:
         """Return the first point of the run, or the last of its unknowns, and by which weights distances to it are measured."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _make(self, path: Path, accepted: int, bent: int, here: Trial) -> int:
         """Make plain steps from row 1 of a path, the state's point ``here``; return how many."""
-        raise NotImplementedError
 
     def steps(self, state: State, most: int, here: Trial) -> Block:
         """Make plain steps from a state, no more than ``most``; ``here`` is its point."""
@@ -180,9 +177,10 @@ class Lane:
         path.numbers[1, :MESH_ERROR] = (
             state.previous_step, state.step, state.sign, state.arclength, 0, 0, state.sense, 0,
         )  # fmt: skip
-        self.handed = None
+        self._handed = None
         made = self._make(path, state.accepted, int(bent), here)
-        return Block(self.system, state, path, *self._passed(path, made))
+        passed, indices = self._passed(path, made)
+        return Block(self.system, state, path, passed, indices, self._handed if passed == made else None)
 
     def _passed(self, path: Path, made: int) -> tuple[int, list[int | None] | None]:
         """Return how many of the steps pass nothing that the kernel does not know, and the index at their ends, if any."""
@@ -192,22 +190,21 @@ class Lane:
         signs = path.numbers[1:, SIGN_OF].tolist()
         rows = zip(path.x[1 : made + 2], path.tangents[1:], signs)
         trials = [Trial(self.system, x, Linearization(tangent, sign)) for x, tangent, sign in rows]
-        passed = made
-        for number, (before, trial) in enumerate(itertools.pairwise(trials)):
-            step, closes = path.numbers[number + 2, (STEP, CLOSES)].tolist()
-            try:
-                if (closes and not is_elsewhere(self._start, before, trial, step)) or self._asks(before, trial):
-                    passed = number
-                    break
-            except ConvergenceError:
-                passed = number
-                break
+        steps = zip(itertools.pairwise(trials), path.numbers[2:, (STEP, CLOSES)].tolist())
+        passed = next((number for number, (ends, told) in enumerate(steps) if self._asks(*ends, *told)), made)
         if self._index is None:
             return passed, None
         return passed, [stability_of(SpecialPoint(0.0, "", "", trial)).index for trial in trials[1 : passed + 1]]
 
-    def _asks(self, before: Trial, trial: Trial) -> bool:
-        """Return whether a step asks for a closer look by what the kernel does not know."""
+    def _asks(self, before: Trial, trial: Trial, step: float, closes: float) -> bool:
+        """Return whether a step asks for a closer look by what the kernel does not know, be it that this is not found."""
+        try:
+            return bool(closes and not is_elsewhere(self._start, before, trial, step)) or self._passes(before, trial)
+        except ConvergenceError:
+            return True
+
+    def _passes(self, before: Trial, trial: Trial) -> bool:
+        """Return whether a step passes a zero of other test functions, a change of the index, or the trivial branch."""
         if any(test.passed(before.value(test), trial.value(test)) for test in self._others):
             return True
         if self._index is not None and abs(before.value(self._index) - trial.value(self._index)) > 0:
@@ -327,7 +324,7 @@ class MeshLane(Lane):
         self._rooms = self._rooms._replace(factored=self._factors.room)
         factors.sign = sign
         linear = Linearization(path.tangents[number].copy(), sign, factors)
-        self.handed = number - 2, step, Trial(self.system, path.x[number].copy(), linear, int(iterations), error)
+        self._handed = step, Trial(self.system, path.x[number].copy(), linear, int(iterations), error)
 
 
 class Block:
@@ -337,10 +334,15 @@ class Block:
     ----------
     made : int
         How many.
+    handed : tuple (float, Trial) or None
+        The step behind them, where a kernel has made it and it asks for a closer look: its length, and its end.
     """
 
-    def __init__(self, system: Any, base: State, path: Path, made: int, indices: list[int | None] | None) -> None:
+    def __init__(
+        self, system: Any, base: State, path: Path, made: int, indices: list[int | None] | None, handed: Handed | None
+    ) -> None:
         self._system, self._base, self._path, self.made, self._indices = system, base, path, made, indices
+        self.handed = handed
 
     def state(self, row: int) -> State:
         """Return the state behind a step, by its row of the path."""
@@ -348,9 +350,9 @@ class Block:
         step, following, sign, arclength, _, _, sense, told, error, _ = numbers[row].tolist()
         sensed = self._free(x[int(told)]) if told else base.sensed
         # copies begin where all arrays do: some of OpenBLAS's kernels add up in an order that hangs on that
-        there, tangent, earlier = (each.copy() for each in (x[row], tangents[row], tangents[row - 1]))
+        there = x[row].copy(), tangents[row].copy(), tangents[row - 1].copy()
         return State(
-            base.system, there, tangent, earlier, step, following, sign, arclength, base.accepted + row - 1, False, sense,
+            base.system, *there, step, following, sign, arclength, base.accepted + row - 1, False, sense,
             sensed, error,
         )  # fmt: skip
 

@@ -19,7 +19,6 @@ from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
 from contin.stepping.newton import correct
-from contin.stepping.settings import Settings
 from contin.stepping.state import State
 from contin.stepping.step import trial_of
 from contin.stepping.trial import TestFunction, Trial
@@ -83,14 +82,9 @@ class MeshPolicy:
     steps: Steps
     tests: Sequence[TestFunction]
 
-    @property
-    def settings(self) -> Settings:
-        """The settings of the run."""
-        return self.steps.settings
-
     def adapted(self, state: State, here: Callable[[], Trial]) -> Moved | None:
         """Return the state on a mesh that is adapted to it, if one serves; ``here`` returns the state's point."""
-        control = self.settings.mesh
+        control = self.steps.settings.mesh
         if state.singular:
             return None
         fewest = self._fewest_intervals(state)
@@ -109,13 +103,13 @@ class MeshPolicy:
         It does not where the point is not found there, where a special point would fall between the meshes, or where a mesh of
         fewer intervals is not good enough.
         """
-        newton, (system, carry) = self.settings.newton, other
+        newton, (system, carry) = self.steps.settings.newton, other
         tangent = carry(state.tangent)
         length = float(np.sqrt(inner(system, tangent, tangent)))
         tangent /= length
         previous, step = None if state.previous_tangent is None else carry(state.previous_tangent), state.step
         if system.scales is not state.system.scales:
-            previous, step = None, float(np.clip(step * length, self.settings.min_step, self.settings.max_step))
+            previous, step = None, float(np.clip(step * length, self.steps.settings.min_step, self.steps.settings.max_step))
         x, row = carry(state.x), system.weights * tangent
         if state.singular:  # a corrected point has a tangent of any of the branches; the first step corrects what is carried
             return dataclasses.replace(state, system=system, x=x, tangent=tangent, step=step), None
@@ -129,7 +123,7 @@ class MeshPolicy:
             return None
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self.tests):
             return None  # the next point will do as well
-        if self.settings.trivial is not None and jumped(before, end, self.settings.trivial, newton):
+        if self.steps.settings.trivial is not None and jumped(before, end, self.steps.settings.trivial, newton):
             return None
         if system.intervals < state.system.intervals and not self._serves(state, end):
             return None
@@ -142,7 +136,7 @@ class MeshPolicy:
 
         An error far below the tolerance may be round-off, which does not grow on coarser meshes: half of the intervals may do.
         """
-        control, now, error = self.settings.mesh, state.system.intervals, state.discretization_error
+        control, now, error = self.steps.settings.mesh, state.system.intervals, state.discretization_error
         if math.isnan(error) or not now:
             return control.min_intervals
         far_below = error < _FAR_BELOW * control.tolerance
@@ -154,7 +148,7 @@ class MeshPolicy:
 
         Round-off does not grow there. Where canards amplify it, they amplify errors of the mesh, too, and these do.
         """
-        accuracy, before, control = accuracy_of(end), state.discretization_error, self.settings.mesh
+        accuracy, before, control = accuracy_of(end), state.discretization_error, self.steps.settings.mesh
         return not is_poor(accuracy, control) and not (before > control.tolerance and accuracy.error > before)
 
     def _is_too_fine(self, state: State, here: Callable[[], Trial]) -> bool:
@@ -163,7 +157,7 @@ class MeshPolicy:
         Half of them may do then: short intervals make it larger, as where cycles shrink after canards. Where the parameter
         stands still, in an explosion, errors of the mesh are taken for round-off.
         """
-        control = self.settings.mesh
+        control = self.steps.settings.mesh
         if not state.discretization_error > control.tolerance or not accuracy_of(here()).is_round_off:
             return False
         wanted = state.system.adapted(state.x, control)

@@ -14,9 +14,10 @@ from contin.continuation import rules
 from contin.continuation.plain import Quotient, calm
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
 from contin.detection.crossings import PIVOT, TURN
+from contin.detection.floquet import AS_FAR
 from contin.detection.hopf_end import COLLAPSED
 from contin.detection.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
-from contin.discretization.monodromy import KNOWN, Monodromy, fill_multipliers
+from contin.discretization.monodromy import KNOWN, Monodromy, fill_multipliers, nearest_to_one
 from contin.discretization.rounding import NEAR_CIRCLE
 from contin.discretization.workspace import Workspace
 from contin.functions.kernel import kernel
@@ -150,17 +151,13 @@ def multipliers_ask(room: Monodromy, spectra: Spectra, jacobian: Stack, begins: 
                 room.jacobian[q, a, b] = jacobian[q, a, c]
     if fill_multipliers(room, 0) != KNOWN:
         return ASK
-    trivial, least = -1, math.inf
-    for a in range(n if room.autonomous else 0):
-        distance = math.hypot(room.real[a], room.imaginary[a])
-        if distance < least:
-            trivial, least = a, distance
+    trivial, least = nearest_to_one(room) if room.autonomous else (-1, 0.0)
     at = 0
     for a in range(n):
         x, y = room.real[a], room.imaginary[a]
         if a == trivial:
             continue
-        if not abs(x) >= NEAR_CIRCLE or (room.autonomous and not math.hypot(x, y) > 2 * least):
+        if not abs(x) >= NEAR_CIRCLE or not math.hypot(x, y) > AS_FAR * least:
             return ASK
         spectra.real[LAST, at], spectra.imaginary[LAST, at] = x, y
         at += 1

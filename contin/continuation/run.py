@@ -22,7 +22,7 @@ from contin.arrays import Array
 from contin.continuation.failure import met, no_convergence, shorter_steps
 from contin.continuation.findings import IndexChange, index_changes, is_confirmed, located_again
 from contin.continuation.first import begins_outside, corrected_first, on_branch
-from contin.continuation.lane import FEWEST, MOST, Lane, lane_of
+from contin.continuation.lane import FEWEST, MOST, Handed, Lane, lane_of
 from contin.continuation.meshes import MeshPolicy, Moved, finer, is_poor
 from contin.continuation.notes import Notes, unsettled
 from contin.continuation.rules import NOISY
@@ -156,7 +156,7 @@ class Continuation:
         self._resumed = state is not None
         self._accuracy = Accuracy(np.nan)  # of the end of the last step
         self.start = start or (self.state.system, self.state.x, self.state.tangent)
-        self._handed: tuple[float, Trial] | None = None  # the next step, where a kernel has made it
+        self._handed: Handed | None = None  # the next step, where a kernel has made it
         self._adapted = -1  # regular points at which the mesh was looked at last
         self._lane_for: object = None
         self._known_lane: Lane | None = None
@@ -223,8 +223,7 @@ class Continuation:
                 self._end, self._accuracy = None, Accuracy(point.discretization_error)
                 yield point
             if block.made < most or most <= 0:
-                handed = lane.handed
-                self._handed = handed[1:] if handed is not None and handed[0] == block.made else None
+                self._handed = block.handed
                 return
             most = min(2 * most, MOST)
 

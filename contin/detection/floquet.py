@@ -51,7 +51,7 @@ _ONE = 1e-5
 _NEARLY_ONE = 1e-9
 #: A multiplier is told from 1 where its logarithm is larger than so many times that of the one that is 1. The two of a double
 #: one differ by 1e-7 of it. Ten times larger, a cycle beside a fold may count as stable.
-_AS_FAR = 2.0
+AS_FAR = 2.0
 #: Step along the tangent over which multipliers are compared: their errors need one digit. In a canard explosion they change by
 #: a tenth of their value where the step is a thousand times longer.
 _ASIDE = 1e-5
@@ -178,7 +178,7 @@ def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = _
     values, trivial = system.eigenvalues(x), _trivial(system, x)
     outside = (values.real > 0) & ~system.neutral(x) & (np.abs(values) >= least)
     if trivial is not None:
-        outside &= np.abs(values) > _AS_FAR * abs(values[trivial])
+        outside &= np.abs(values) > AS_FAR * abs(values[trivial])
     return int(np.count_nonzero(outside))
 
 

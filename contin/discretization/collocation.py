@@ -304,8 +304,9 @@ class Collocation(System):
 
     def unfilled_factors(self) -> Factorization:
         """Return factors of the matrix of `workspace`, to be filled by a kernel."""
-        assert self.workspace is not None
-        return Factorization.unfilled(self._layout, self._empty_blocks(len(self.workspace.values.rows), 0))
+        work = self.workspace
+        assert work is not None
+        return Factorization.unfilled(self._layout, self._empty_blocks(len(work.values.rows), 0))
 
     def linearize(
         self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()

@@ -270,22 +270,19 @@ class PeriodicCollocation(Collocation):
         """Where multipliers are computed, by thread."""
         return {}
 
-    def _computed(self, x: Array) -> ComplexArray:
-        """Return the logarithms of the multipliers as they are computed."""
+    def _filled(self, x: Array) -> tuple[Monodromy, int]:
+        """Return where a kernel has computed the logarithms of the multipliers, and what came of it."""
         thread = threading.get_ident()
         if thread not in self._monodromies:
             self._monodromies[thread] = monodromy_of(self)
         room = self._monodromies[thread]
         room.jacobian[:] = self._jacobian_of_field(x)
-        if fill_multipliers(room, 0) == DRIFTED:
-            values = self._along_the_flow(x, room.matrices)
-            room.real[:], room.imaginary[:] = values.real, values.imag
-            fill_multipliers(room, 1)
-        return room.real + 1j * room.imaginary
+        return room, fill_multipliers(room, 0)
 
-    def _along_the_flow(self, x: Array, transitions: Array) -> ComplexArray:
-        """Return the logarithms of the multipliers where the one that is 1 has drifted: the flow's direction is split off."""
-        raise NotImplementedError
+    def _computed(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers as they are computed."""
+        room, _ = self._filled(x)
+        return room.real + 1j * room.imaginary
 
     def is_drifted(self, x: Array) -> bool:
         """Return whether round-off has moved a multiplier that is known, so that those on this mesh are in doubt."""
@@ -413,14 +410,19 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
             first /= self.scales.states
         return np.asarray(first / np.linalg.norm(first), dtype=float)
 
-    def _along_the_flow(self, x: Array, transitions: Array) -> ComplexArray:
-        """Return the logarithms of all multipliers, with the direction of the flow split off.
+    def _computed(self, x: Array) -> ComplexArray:
+        """Return the logarithms of the multipliers; where the one that is 1 has drifted, the flow's direction is split off.
 
         After a repelling stretch, as of a canard, round-off in that direction hides all other multipliers.
         """
-        self._drifted.add(x.tobytes())
-        flow = self.rates(x, np.ascontiguousarray(self._scaled_states(x)[:: self._d]))
-        return log_eigenvalues_along(transitions, np.concatenate([flow[: len(transitions)], flow[:1]]))
+        room, outcome = self._filled(x)
+        if outcome == DRIFTED:
+            self._drifted.add(x.tobytes())
+            flow, count = self.rates(x, np.ascontiguousarray(self._scaled_states(x)[:: self._d])), len(room.matrices)
+            values = log_eigenvalues_along(room.matrices, np.concatenate([flow[:count], flow[:1]]))
+            room.real[:], room.imaginary[:] = values.real, values.imag
+            fill_multipliers(room, 1)
+        return room.real + 1j * room.imaginary
 
     def is_drifted(self, x: Array) -> bool:
         """Return whether the multiplier that is 1 is off before the direction of the flow is split off."""
@@ -454,12 +456,18 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         """
         return float(self.amplitude_row @ x[: self.state_size])
 
+    @functools.cached_property
+    def _mean_turn(self) -> Array:
+        """The mean of the powers of the symmetry."""
+        found: Array = np.mean([np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)], axis=0)
+        return found
+
     @property
     def amplitude_row(self) -> Array:
         """The row that takes the states in x to `amplitude`, shape (state_size,)."""
         if self._amplitude is None:
             weights = self.weights[: self.state_size : self._n]
-            group = sum(np.linalg.matrix_power(self.problem.symmetry, k) for k in range(self.order)) / self.order
+            group = self._mean_turn
             reference = self.reference - group @ (weights @ self.reference)
             row = weights[:, None] * (reference - (weights @ reference) @ group) / (weights @ np.sum(reference**2, axis=1))
             self._amplitude = (row if self.scales is None else row * self.scales.states).ravel()

@@ -69,7 +69,7 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
         fill_logarithms(room.matrices, room.product, real, imaginary)
         if real[0] != real[0]:  # noqa: PLR0124
             return NOT_FINITE
-        if room.autonomous and not _nearest_to_one(room)[1] <= _DRIFTED:
+        if room.autonomous and not nearest_to_one(room)[1] <= _DRIFTED:
             return DRIFTED
     total, sum_, least = 0.0, 0.0, math.inf
     for q in range(room.quadrature.size):
@@ -79,7 +79,7 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
         total += room.quadrature[q] * trace
     for a in range(n):
         sum_, least = sum_ + real[a], min(least, real[a])
-    nearest, count = _nearest_to_one(room)[0], 0
+    nearest, count = nearest_to_one(room)[0], 0
     for a in range(n):
         count += 1 if real[a] <= least + _EQUAL else 0
     if not room.autonomous or not real[nearest] <= least + _EQUAL:  # the error of the one that is 1 shall show
@@ -87,7 +87,7 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
             if real[a] <= least + _EQUAL:
                 real[a] += (total - sum_) / count
     if room.planar:
-        nearest = _nearest_to_one(room)[0]
+        nearest = nearest_to_one(room)[0]
         one = real[nearest] if imaginary[nearest] == 0.0 else math.hypot(real[nearest], imaginary[nearest])
         real[0], real[1] = max(one, total), min(one, total)
         imaginary[0] = imaginary[1] = 0.0
@@ -95,7 +95,7 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
 
 
 @helper
-def _nearest_to_one(room: Monodromy) -> tuple[int, float]:
+def nearest_to_one(room: Monodromy) -> tuple[int, float]:
     """Return the place of the logarithm nearest to zero, and its size."""
     place, least = 0, math.inf
     for a in range(room.real.size):

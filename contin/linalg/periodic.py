@@ -276,20 +276,17 @@ def _fill_of_block(room, start, end, real, imaginary):
 @kernel(reorder=False, last=True)
 def fill_logarithms(factors: Stack, room: Product, real: Vector, imaginary: Vector) -> None:
     """Fill in the logarithms of the eigenvalues of F_N ... F_1, as `log_eigenvalues` returns them."""
-    n, total = real.size, 0.0
-    first, groups = room.iterates.first, room.groups
-    for j in range(factors.shape[0]):
-        for a in range(n):
-            for b in range(n):
-                total += abs(factors[j, a, b])
+    n, first, groups = real.size, room.iterates.first, room.groups
     for a in range(n):
         real[a], imaginary[a] = math.nan, 0.0
         for b in range(n):
             first[a, b] = room.basis[a, b]
-    if not total < math.inf:
-        return
+    for j in range(factors.shape[0]):
+        for a in range(n):
+            for b in range(n):
+                if not abs(factors[j, a, b]) < math.inf:
+                    return
     count = separate(factors, room.iterates, groups)
-    done = 0
     for g in range(count):
         start, end = groups.starts[g], groups.starts[g + 1]
         _fill_of_block(room, start, end, real[start:end], imaginary[start:end])
@@ -299,9 +296,8 @@ def fill_logarithms(factors: Stack, room: Product, real: Vector, imaginary: Vect
                 x, y = -math.inf, 0.0
             else:
                 x, y = math.log(math.hypot(x, y)) + groups.sizes[g], math.atan2(y, x)
-            at = done
+            at = i
             while at > 0 and real[at - 1] < x:
                 real[at], imaginary[at] = real[at - 1], imaginary[at - 1]
                 at -= 1
             real[at], imaginary[at] = x, y
-            done += 1

@@ -17,6 +17,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array
 from contin.discretization.protocol import Equations
+from contin.discretization.workspace import Workspace
 from contin.errors import ConvergenceError
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
@@ -139,26 +140,27 @@ def correct(
     >>> print(round(correct(Algebraic(circle, []), [1.0]).x[0], 12))
     0.8
     """
-    in_one_call = sizes is None and getattr(system, "workspace", None) is not None
+    work = getattr(system, "workspace", None) if sizes is None else None
     if factors is not None:
         with contextlib.suppress(ConvergenceError):
-            if in_one_call and isinstance(factors, Factorization) and factors.unknowns == len(guess):
-                done = _in_one_call(system, guess, row, target, newton, False, factors)
+            if work is not None and isinstance(factors, Factorization) and factors.unknowns == len(guess):
+                done = _in_one_call(system, work, guess, row, target, newton, near=factors)
             else:
                 done = _chords(system, guess, row, target, newton, factors)
             if done is not None:
                 return done
-    done = _in_one_call(system, guess, row, target, newton, linearize) if in_one_call else None
+    done = None if work is None else _in_one_call(system, work, guess, row, target, newton, linearize)
     return _newton(system, guess, row, target, newton, sizes) if done is None else done
 
 
 def _in_one_call(
     system: Any,
+    work: Workspace,
     guess: Sequence[float] | Array,
     row: Array | None,
     target: float,
     newton: Newton,
-    linearize: bool,
+    linearize: bool = False,
     near: Factorization | None = None,
 ) -> Corrected | None:
     """Return what a kernel comes to, by chord steps with factors from ``near`` by if these are given.
@@ -169,7 +171,6 @@ def _in_one_call(
     ------
     ConvergenceError
     """
-    work = system.workspace
     values = work.values
     if (row is None) != (system.size == system.equations):
         return None
