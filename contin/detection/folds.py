@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.detection.segment import Place, Segment, SpecialPoint
-from contin.detection.significance import on_plateau, passed_before, senses
+from contin.detection.significance import passed_before, senses
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
 from contin.functions.kernel_parts import helper
@@ -119,7 +119,7 @@ class FoldSearch:
         segment = self.segment
         left, right = (segment.low, segment.before), (segment.step, segment.trial)
         if not all(senses(segment, self.fold)):
-            return on_plateau(segment, self.fold)
+            return passed_before(segment, self.fold)
         found = self.between(left, right)
         while segment.state.singular and found and not self._differs(left[1], found[0].trial):
             del found[0]  # the first point itself: beside it tangents are blurred

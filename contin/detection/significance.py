@@ -120,21 +120,12 @@ def senses(segment: Segment, fold: TestFunction) -> tuple[float, float]:
     return (0.0 if gone * first < -STANDS * (1 + abs(before.x[at])) else first), last
 
 
-def on_plateau(segment: Segment, fold: TestFunction) -> list[SpecialPoint]:
-    """Return the fold of a step with an end where the parameter stands still: none, unless the step leaves a plateau.
-
-    The errors of such a fold are the length of the plateau, in all free parameters.
-    """
-    state, (before, behind) = segment.state, senses(segment, fold)
-    if before or not state.sense * behind < 0 or state.sensed is None:
-        return []
-    return [_behind_plateau(segment, fold)]
-
-
 def passed_before(segment: Segment, fold: TestFunction) -> list[SpecialPoint]:
     """Return the fold that a step has behind it, where the parameter goes by more than round-off against its last sense.
 
-    A fold on which the parameter changes by less than round-off over a whole step is not seen in that step.
+    A fold on which the parameter changes by less than round-off over a whole step is not seen in that step: it lies on a
+    plateau, on which a rate may seem significant by chance. The errors of such a fold are the length of the plateau, in all
+    free parameters.
     """
     state, behind = segment.state, sense(segment.trial, fold, segment.newton)
     at = state.system.parameter_index(fold.name)
