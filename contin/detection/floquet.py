@@ -12,7 +12,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.detection.hopf import hopf, hopf_points, passes
+from contin.detection.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.detection.significance import on_finer_mesh
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
@@ -33,13 +34,6 @@ from contin.stepping.trial import TestFunction, Trial, sign_changed
 #: Where a step is looked at inside, on the cubic, as parts of it: also beside its ends, where a dip towards zero would show at
 #: no other place. Without those two of Mathieu's doublings, a part of .03 and .04 behind the beginning of a step, are passed.
 LOOKS = (1 / 64, 1 / 4, 1 / 2, 3 / 4, 63 / 64)
-#: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens: a
-#: little less than the distance pi of 1 from -1. A pair can reach -1 and come back, and be at the ends where it was nearly:
-#: with 0.5, and 1.5 changes, two period doublings of Mathieu's equation in one step are passed. With both ten times larger
-#: nearly all steps are looked at inside, and multipliers are computed up to three times as often.
-NEAR = 3.0
-#: It is looked at inside, too, where a logarithm is nearer than so many times its change over the step.
-CHANGES = 3.0
 #: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
 #: to this part. Ten times smaller, two period doublings that nearly meet are passed.
 DEEPER = 0.5
@@ -221,14 +215,14 @@ def _of_doubling(trial: Trial) -> dict[str, float]:
 def _may_double(segment: Segment) -> bool:
     """Return whether there may be period doublings inside a step."""
     test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
-    return not segment.before.value(test) * segment.trial.value(test) > 0 or _comes_near(segment, _from_doubling)
+    return not segment.before.value(test) * segment.trial.value(test) > 0 or _comes_near(segment, MINUS_ONE)
 
 
 def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the period doublings between places of a step, in order."""
     test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
     known = [trial.value(test) for _, trial in knots]
-    if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, _from_doubling):
+    if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, MINUS_ONE):
         return []
     inside = [segment.step * part for part in LOOKS]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
@@ -243,38 +237,20 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
 
 
-def _comes_near(segment: Segment, distances: Callable[[Sequence[complex]], list[float]]) -> bool:
+def _comes_near(segment: Segment, what: int) -> bool:
     """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
-    for values, moves in _moves(segment):
-        for distance, move in zip(distances(values), moves):
-            if not (distance > NEAR and CHANGES * move < distance):
-                return True
-    return False
-
-
-@functools.lru_cache(maxsize=1)
-def _moves(segment: Segment) -> list[tuple[tuple[complex, ...], list[float]]]:
-    """Return the logarithms at both ends of a step, and how far each is from the nearest at the other end."""
-    first, last = _without_trivial(segment.before), _without_trivial(segment.trial)
-    gaps = [[_apart_by(here, there) for there in last] for here in first]
-    return [(first, list(map(min, gaps))), (last, list(map(min, zip(*gaps))))]
+    ends = np.array([_without_trivial(segment.before), _without_trivial(segment.trial)])
+    real, imaginary = np.ascontiguousarray(ends.real), np.ascontiguousarray(ends.imag)
+    return bool(comes_near(real, imaginary, what, int(isinstance(segment.trial.system, MapSystem))))
 
 
 @functools.lru_cache(maxsize=4)
-def _without_trivial(trial: Trial) -> tuple[complex, ...]:
+def _without_trivial(trial: Trial) -> ComplexArray:
     """Return the logarithms of the multipliers of a cycle but for the one that is 1."""
     system: Any = trial.system
-    values, trivial = system.eigenvalues(trial.x).tolist(), _trivial(system, trial.x)
-    return tuple(value for place, value in enumerate(values) if place != trivial)
-
-
-def _apart_by(value: complex, other: complex) -> float:
-    """Return how far two logarithms are apart: angles are alike up to full turns; NaN where one is not known.
-
-    Python's abs may raise OverflowError for a NaN before version 3.12.
-    """
-    gap = value - other
-    return math.hypot(gap.real, math.remainder(gap.imag, 2 * math.pi)) if math.isfinite(gap.real) else math.nan
+    values, trivial = system.eigenvalues(trial.x), _trivial(system, trial.x)
+    found: ComplexArray = values if trivial is None else np.delete(values, trivial)
+    return found
 
 
 def keep_off_one(segment: Segment) -> bool:
@@ -282,28 +258,7 @@ def keep_off_one(segment: Segment) -> bool:
 
     That is where cycles branch.
     """
-    return isinstance(segment.trial.system, PeriodicCollocation) and not _comes_near(segment, _from_one)
-
-
-def _from_one(values: Sequence[complex]) -> list[float]:
-    """Return how far each logarithm is from that of 1."""
-    return [math.hypot(value.real, value.imag) for value in values]
-
-
-def _from_doubling(values: Sequence[complex]) -> list[float]:
-    """Return how far each logarithm is from that of -1."""
-    return [math.hypot(value.real, math.pi - abs(value.imag)) for value in values]
-
-
-def _from_torus(values: Sequence[complex]) -> list[float]:
-    """Return how far each logarithm is from that of a complex pair on the unit circle; real ones can meet, and form a pair."""
-    angles = [abs(value.imag) for value in values]
-    sizes = [abs(value.real) for value in values]
-    found = []
-    for place, (size, angle) in enumerate(zip(sizes, angles)):
-        partners = [sizes[other] for other in range(len(values)) if other != place and angles[other] == angle]
-        found.append(max(size, min(partners, default=math.inf)))
-    return found
+    return isinstance(segment.trial.system, PeriodicCollocation) and not _comes_near(segment, ONE)
 
 
 def _changes_on_finer_mesh(left: Trial, right: Trial, test: TestFunction, newton: Newton) -> bool:
@@ -385,7 +340,7 @@ def torus() -> TestFunction:
 
 def _may_twist(segment: Segment) -> bool:
     """Return whether there may be torus bifurcations inside a step."""
-    return _unstable(segment.before) != _unstable(segment.trial) or _comes_near(segment, _from_torus)
+    return _unstable(segment.before) != _unstable(segment.trial) or _comes_near(segment, CIRCLE)
 
 
 def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array
-from contin.detection.floquet import CHANGES, DEEPER, LOOKS, NEAR
+from contin.detection.floquet import DEEPER, LOOKS
+from contin.detection.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
 from contin.discretization.maps import NO_MULTIPLIER
 from contin.discretization.rounding import NEAR_AXIS, NEAR_CIRCLE
 from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
@@ -25,10 +26,6 @@ _PLACES = np.array([0.0, *LOOKS, 1.0])
 FIRST, LAST, _COUNT = 0, len(LOOKS) + 1, len(LOOKS) + 2
 #: Those among them at which pairs of multipliers are followed: a quarter of the step apart.
 _QUARTERS = tuple(place for place, part in enumerate([0.0, *LOOKS, 1.0]) if (4 * part) % 1 == 0)
-
-
-#: What multipliers pass.
-ONE, MINUS_ONE, CIRCLE = range(3)
 
 
 class Spectra(NamedTuple):
@@ -129,13 +126,14 @@ def may_pass_axis(equations: Equations, spectra: Spectra) -> bool:
 @helper
 def may_cross_between(spectra: Spectra) -> bool:
     """Return whether multipliers may pass -1, or the unit circle as a pair, by both ends of a step alone."""
-    return _crosses(spectra) or _comes_near(spectra, MINUS_ONE) or _comes_near(spectra, CIRCLE)
+    real, imaginary = spectra.real, spectra.imaginary
+    return _crosses(spectra) or bool(comes_near(real, imaginary, MINUS_ONE, 0) or comes_near(real, imaginary, CIRCLE, 0))
 
 
 @helper
 def keep_off_one(spectra: Spectra) -> bool:
     """Return whether no multiplier comes near 1, by both ends of a step alone."""
-    return not _comes_near(spectra, ONE)
+    return not comes_near(spectra.real, spectra.imaginary, ONE, 0)
 
 
 @helper
@@ -143,7 +141,8 @@ def may_double_or_twist(equations: Equations, spectra: Spectra) -> bool:
     """Return whether multipliers may pass -1, or the unit circle as a pair; inside the step where they come near either."""
     if _crosses(spectra):
         return True
-    doubles, twists = _comes_near(spectra, MINUS_ONE), _comes_near(spectra, CIRCLE)
+    real, imaginary, map_ = spectra.real, spectra.imaginary, equations.is_map
+    doubles, twists = comes_near(real, imaginary, MINUS_ONE, map_) > 0, comes_near(real, imaginary, CIRCLE, map_) > 0
     if not (doubles or twists):
         return False
     for number in range(1, LAST):
@@ -202,31 +201,6 @@ def _outside(spectra: Spectra, number: int) -> int:
         if spectra.real[number, i] > 0:
             count += 1
     return count
-
-
-@helper
-def _comes_near(spectra: Spectra, what: int) -> bool:
-    """Return whether a multiplier may have passed 1 or -1, or as one of a pair the circle, and back."""
-    n = spectra.real.shape[1]
-    for side in range(2):
-        here, there = (FIRST, LAST) if side == 0 else (LAST, FIRST)
-        for i in range(n):
-            x, y = spectra.real[here, i], spectra.imaginary[here, i]
-            move, partner = math.inf, math.inf
-            for j in range(n):
-                turn = y - spectra.imaginary[there, j]
-                turn -= 2 * math.pi * math.floor(turn / (2 * math.pi) + 0.5)
-                move = min(move, math.hypot(x - spectra.real[there, j], turn))
-                if j != i and abs(spectra.imaginary[here, j]) == abs(y):
-                    partner = min(partner, abs(spectra.real[here, j]))
-            distance = math.hypot(x, y)
-            if what == CIRCLE:
-                distance = max(abs(x), partner)
-            elif what == MINUS_ONE:
-                distance = math.hypot(x, math.pi - abs(y))
-            if not (distance > NEAR and CHANGES * move < distance):
-                return True
-    return False
 
 
 @helper

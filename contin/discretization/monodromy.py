@@ -67,9 +67,9 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
     if not known:
         condense(room.value, room.slope, room.h, room.jacobian, room.block, room.pivots, room.matrices[: room.h.size])
         fill_logarithms(room.matrices, room.product, real, imaginary)
-        if real[0] != real[0]:  # noqa: PLR0124
+        if real[0] != real[0] and not room.planar:  # noqa: PLR0124
             return NOT_FINITE
-        if room.autonomous and not nearest_to_one(room)[1] <= _DRIFTED:
+        if room.autonomous and not room.planar and not nearest_to_one(room)[1] <= _DRIFTED:
             return DRIFTED
     total, sum_, least = 0.0, 0.0, math.inf
     for q in range(room.quadrature.size):
@@ -86,9 +86,9 @@ def fill_multipliers(room: Monodromy, known: int) -> int:
         for a in range(n):  # over one interval a Gauss method takes e^-1000 for a number near one
             if real[a] <= least + _EQUAL:
                 real[a] += (total - sum_) / count
-    if room.planar:
-        nearest = nearest_to_one(room)[0]
-        one = real[nearest] if imaginary[nearest] == 0.0 else math.hypot(real[nearest], imaginary[nearest])
+    if room.planar:  # the other one is known whatever round-off has made of the one that is 1
+        nearest, error = nearest_to_one(room)
+        one = 0.0 if not error <= _DRIFTED else real[nearest] if imaginary[nearest] == 0.0 else error
         real[0], real[1] = max(one, total), min(one, total)
         imaginary[0] = imaginary[1] = 0.0
     return KNOWN

@@ -3,11 +3,11 @@
 import contextlib
 import itertools
 import json
+import multiprocessing.connection
 import os
 import runpy
 import signal
 import sys
-import threading
 import time
 from concurrent.futures import Future
 
@@ -227,7 +227,12 @@ def test_a_branch_that_dies_or_hangs_takes_no_other_with_it(tmp_path, monkeypatc
 def _die_while_sending(size):
     """A job whose process is killed when it has sent a part of its result."""
     if size > 100:
-        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGKILL)).start()
+
+        def half(connection, data):
+            os.write(connection.fileno(), data[: len(data) // 2])
+            os.kill(os.getpid(), signal.SIGKILL)
+
+        multiprocessing.connection.Connection._send = half
     return bytes(size)
 
 
@@ -244,7 +249,7 @@ def _raise(job):
 def test_a_process_killed_while_it_sends_its_result():
     """A part of a result in the pipe must not keep anybody waiting; nor may an error that cannot be sent."""
     with executor(workers=2) as (submit, wait, _):
-        jobs = [submit(_die_while_sending, size) for size in (100_000_000, 10, 100_000_000, 20)]
+        jobs = [submit(_die_while_sending, size) for size in (100_000, 10, 100_000, 20)]
         time.sleep(0.5)
         while not all(job.done() for job in jobs):
             wait([job for job in jobs if not job.done()])

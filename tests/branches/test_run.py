@@ -338,9 +338,11 @@ def test_killed_again_and_again(command, scene, undisturbed, tables):
 def test_a_second_run_on_the_same_file_is_refused(command, call, scene, undisturbed, tables, option):
     """With every option; the first run loses nothing."""
     path = command.folder / "x.h5"
-    first = command.start(scene, "--out", path, "--quiet", *LONG_SETTINGS)
-    while not path.exists() and first.poll() is None:
-        time.sleep(0.01)
+    assert call(main, scene, "--out", path, "--quiet").returncode == 0
+    first = command.start(scene, "--out", path, "--quiet", "--overwrite", *LONG_SETTINGS)
+    lock = path.with_name(".x.h5.lock")
+    while not (lock.exists() and lock.stat().st_size > 1) and first.poll() is None:  # that is right at the beginning
+        time.sleep(0.002)
     first.send_signal(signal.SIGSTOP)  # it must not end while the second one starts
     second = call(main, scene, "--out", path, *LONG_SETTINGS, option)
     first.send_signal(signal.SIGCONT)

@@ -141,7 +141,7 @@ def test_round_off_above_the_tolerance():
     start = contin.solve(layer, lambda t: (-1 + 2.5 * t, 2.5))
     branch = contin.trace(start, free=["k"], limits={"k": (0, 8)}, mesh=MeshControl(max_intervals=400), branch_points=False)
     assert branch.points[-1].label == "MX" and branch.points[-1]["k"] > 5.4
-    assert "tried in vain" in branch.stop.advice
+    assert "tried in vain" in branch.stop.advice or "round-off here" in branch.stop.advice  # which of them, round-off decides
     errors = [point.newton_error for point in branch if not point.label]
     assert 1e-10 < max(errors) < 1e-4
     assert any("round-off above its tolerance" in note for note in branch.notes)

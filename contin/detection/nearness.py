@@ -1,0 +1,51 @@
+"""Whether multipliers can have passed 1, -1 or the unit circle inside a step, and back, by those at both ends of it."""
+
+from __future__ import annotations
+
+import math
+
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix
+
+#: A step is looked at inside where the logarithm of a multiplier comes nearer than this to one at which something happens: a
+#: little less than the distance pi of 1 from -1. A pair can reach -1 and come back, and be at the ends where it was nearly:
+#: with 0.5, and 1.5 changes, two period doublings of Mathieu's equation in one step are passed. With both ten times larger
+#: nearly all steps are looked at inside, and multipliers are computed up to three times as often.
+_NEAR = 3.0
+#: It is looked at inside, too, where a logarithm is nearer than so many times its change over the step.
+_CHANGES = 3.0
+
+#: What multipliers pass.
+ONE, MINUS_ONE, CIRCLE = range(3)
+
+
+@kernel(last=True)
+def comes_near(real: Matrix, imaginary: Matrix, what: int, map_: int) -> int:
+    """Return whether a multiplier may have passed 1 or -1, or as one of a pair the circle, and back.
+
+    The first and the last row of ``real`` and ``imaginary`` hold the logarithms at both ends, those that are not known as NaN.
+    A real multiplier becomes one of a pair only where it meets another one of its sign. It leaves its sign only in that way,
+    unless it may be zero, as those of a ``map_`` may.
+    """
+    last, n = real.shape
+    last -= 1
+    for side in range(2):
+        here, there = (0, last) if side == 0 else (last, 0)
+        for i in range(n):
+            x, y = real[here, i], imaginary[here, i]
+            move, partner = math.inf, math.inf
+            for j in range(n):
+                turn = y - imaginary[there, j]
+                turn -= 2 * math.pi * math.floor(turn / (2 * math.pi) + 0.5)
+                move = min(move, math.hypot(x - real[there, j], turn))
+                if j != i and abs(imaginary[here, j]) == abs(y):
+                    partner = min(partner, abs(real[here, j]))
+            distance = math.hypot(x, y)
+            if what == CIRCLE:
+                distance = max(abs(x), partner)
+            elif what == MINUS_ONE:
+                stays = y == 0.0 and partner == math.inf and not map_
+                distance = math.inf if stays else math.hypot(x, math.pi - abs(y))
+            if not (distance > _NEAR and _CHANGES * move < distance):
+                return 1
+    return 0
