@@ -46,9 +46,9 @@ def curves(folder: Path) -> Section:
         for label, nu, kappa_n in found
         if label == "UZ"
     ]
-    last = _highest(line)
-    text = f"the two meet there, at κₙL/2π = {last[1]:.3f}; interpolated: the equations of branch points are singular there"
-    rows.append(Row("secondary bifurcations of (3, 1) exist for ν below", "", f"{last[0]:.5f}", text))
+    last = next((nu, kappa_n) for label, nu, kappa_n in found if label == "LP")
+    text = f"the two meet there, at κₙL/2π = {last[1]:.1f}; the equations of branch points are nearly singular there"
+    rows.append(Row("secondary bifurcations of (3, 1) exist for ν below", "", f"{last[0]:.9f}", text))
     notes = [
         "Folds: collocation, followed in (κₙ, ν); largest difference from the exact quadrature at the points of these runs "
         f"{worst:.0e}.",
@@ -60,15 +60,6 @@ def curves(folder: Path) -> Section:
     ]
     title = "Folds and a secondary bifurcation against ν, ribbon"
     return Section(title, rows, [_draw(lines, line, last, folder)], notes)
-
-
-def _highest(line: np.ndarray) -> tuple[float, float]:
-    """Return the largest nu of a curve (nu, kappa_n), and kappa_n there, by the polynomial through its five highest points."""
-    near = line[np.argsort(-line[:, 0])[:5]]
-    nu = np.polynomial.Polynomial.fit(near[:, 1], near[:, 0], 4)
-    low, high = near[:, 1].min(), near[:, 1].max()
-    top = max((z.real for z in nu.deriv().roots() if z.imag == 0 and low < z.real < high), key=nu)
-    return float(nu(top)), float(top)
 
 
 def fold_curve(m: int, n: int) -> tuple[np.ndarray, dict[float, float], float]:

@@ -118,11 +118,18 @@ class Inspection:
         return "" if located else what
 
     def strays(self, tests: Iterable[TestFunction]) -> str:
-        """Return why the step may have left its branch where branch points are not looked for; "" where not.
+        """Return why the step may have left its branch by its folds and, where branch points are not looked for, by its sign.
 
-        The determinant changes its sign where branches cross, labelled or not, and where a kind of problem knows its equations
-        to be singular; otherwise Newton's method left the branch: another arm of it beside a fold is passed the other way.
+        Where the parameter turns on the branch, a fold is located. The determinant changes its sign where branches cross,
+        labelled or not, and where a kind of problem knows its equations to be singular. Otherwise Newton's method left the
+        branch: another arm of it beside a fold is passed the other way.
         """
+        primary: Any = self.fold and self.fold.name
+        for point in self.special_points(tests) if self._folds else []:
+            if point.stop is not None:
+                break  # what lies beyond the end of the run is none of its branch
+            if not point.is_located and any(point is fold for fold in self._folds):
+                return f"{primary} turns, and no fold was found on the branch"
         if self.settings.branch_points or self._own_home is not None or not self.branch_points.sign_changes:
             return ""
         for point in self.special_points(tests):

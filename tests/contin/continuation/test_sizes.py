@@ -285,3 +285,17 @@ def test_a_branch_that_begins_where_the_load_has_grown(height):
     slope = bent[-1].system.states(bent[-1].x)[0, 1]
     half = 0.5 * slope**2 / height**2 / (12 / 0.8)  # v^2 / 2 = P (1 - cos(largest angle)) where u = 0
     assert pytest.approx((2 * ellipk(half / 2)) ** 2, rel=1e-9) == 12 / 0.8
+
+
+def test_round_off_of_sums_that_cancel_is_no_size():
+    """A multiplier of a shallow arch is zero, a sum of two others: what is left of them moves neither with x nor with them."""
+    arch = contin.VariationalProblem(
+        energy=lambda t, x, w, p: (w.bend + p.e * math.sin(t)) ** 2 / 2 + x.P**2 / 8 + p.q * x.y * math.sin(t),
+        states=["y", "slope", "P"], parameters={"e": 3.0, "q": 0.0}, kinematics=lambda t, x, w, p: (x.slope, w.bend, 0),
+        controls=["bend"], ends=lambda a, b, p: (a.y, b.y),
+        integrals={"thrust": lambda t, x, w, p: (p.e * math.cos(t)) ** 2 - x.slope**2 - x.P / 2}, domain=(0, math.pi),
+    )  # fmt: skip
+    for e in np.linspace(2.5, 3.5, 8):
+        start = solve(arch, lambda t, e=e: (e * math.sin(t), e * math.cos(t), 0), parameters={"e": e})
+        point = trace(start, free=["q"], limits={"q": (-7, 14)}, max_points=2)[-1]
+        assert point.system.scales is None
