@@ -60,7 +60,7 @@ def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
     n, doubt = spectra.real.shape[1], False
     for i in range(n):
         for j in range(n):
-            spectra.square[0, i, j] = equations.slopes_found[0, i, j]
+            spectra.square[0, i, j] = equations.slopes_found[0, i, j] * equations.rates[i]
     fill_eigenvalues(spectra.square, spectra.ones, spectra.others)
     one, other = spectra.ones[0], spectra.others[0]
     largest = 0.0

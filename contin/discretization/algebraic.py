@@ -224,8 +224,8 @@ class Algebraic(System):
 
     @property
     def _evaluated(self) -> Sequence[Batch]:
-        """The residual."""
-        return (self.problem.batch("residual"),)
+        """The residual; in the user's units, too."""
+        return self._residual, self.problem.batch("residual")
 
     def jacobian(self, x: Array) -> Array:
         """Return F_u in the user's units, shape (equations, n)."""

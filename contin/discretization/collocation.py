@@ -380,8 +380,8 @@ class Collocation(System):
 
     @property
     def _evaluated(self) -> Sequence[Batch]:
-        """Right-hand side with integrands, and boundary conditions."""
-        return self.problem.batch("field"), self.problem.batch("boundary")
+        """Right-hand side with integrands, and boundary conditions; in the user's units, too."""
+        return self._field, self._boundary, self.problem.batch("field"), self.problem.batch("boundary")
 
     def _both_ends(self, v: Array) -> Array:
         """Return the states at both ends side by side, shape (1, 2 n)."""

@@ -31,8 +31,8 @@ from contin.arrays import Array
 from contin.discretization.basis import basis, interpolation
 from contin.discretization.mesh import near
 from contin.discretization.switching import Switching
-from contin.discretization.workspace import Codes, Sizes, Values, Workspace, put_free, scale
-from contin.functions.interpreter import Loaded, Points, load, run_loaded
+from contin.discretization.workspace import Codes, Values, Workspace, put_free
+from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, ReadOnlyVector, Vector, helper
 from contin.linalg.condensation import Factored
@@ -351,9 +351,7 @@ class Estimate(NamedTuple):
     rates: Matrix
     changed: Matrix
     at_mesh: Matrix
-    user_at_mesh: Matrix
     points: Matrix
-    user_points: Matrix
     field: Matrix
     integrands: Matrix
     at_gauss: Matrix
@@ -368,35 +366,26 @@ def estimate_of(defect: Defect) -> Estimate:
     points, mesh, count = defect.times.size, system.mesh.size, len(system.integrated)
     values = system.workspace.values
     width, empty = values.field.shape[1], np.empty
-    program = system.problem.batch("functionals" if count else "field")._values_program()
+    integrals = system._batch("functionals" if count else "field").load()
     return Estimate(
-        defect.tables, defect.times, defect.weights, system.mesh, defect.conditions, load(program), defect.least_sizes,
-        empty(count), system.gauss_weights, empty((mesh, width)), empty((mesh, width)), empty((mesh, n)), empty((mesh, n)),
-        empty((points, n)), empty((points, n)), empty((points, width)), empty((points, count)),
+        defect.tables, defect.times, defect.weights, system.mesh, defect.conditions, integrals, defect.least_sizes,
+        empty(count), system.gauss_weights, empty((mesh, width)), empty((mesh, width)), empty((mesh, n)),
+        empty((points, n)), empty((points, width)), empty((points, count)),
         empty((values.points.shape[0], count)), empty((1, system.equations + 1)), empty((1, system.size)), empty(system.size),
     )  # fmt: skip
 
 
 @helper
-def _in_units(scaled: Array, sizes: Array, found: Array) -> None:
-    """Fill in states in the user's units."""
-    for i in range(scaled.shape[0]):
-        for a in range(scaled.shape[1]):
-            found[i, a] = scaled[i, a] * sizes[a]
-
-
-@helper
-def _fill_field(codes: Codes, sizes: Sizes, values: Values, times: Array, states: Array, found: Array) -> None:
-    """Fill in right-hand side and integrands of conditions, divided by their sizes, at states in the user's units."""
+def _fill_field(codes: Codes, values: Values, times: Array, states: Array, found: Array) -> None:
+    """Fill in right-hand side and integrands of conditions at states."""
     run_loaded(codes.field, values.p, Points(times, states, values.none), found, values.nothing)
-    scale(found, sizes.field)
 
 
 @kernel
 def estimate(work: Workspace, factored: Factored, room: Estimate, x: Vector) -> float:
     """Return `Defect.error` at x, for factors right there and states ``work.values.points`` at its Gauss points."""
     codes, mesh, values = work
-    sizes, n, h = mesh.sizes, room.points.shape[1], mesh.h
+    n, h = room.points.shape[1], mesh.h
     degree, size = room.tables.slope.shape[0], x.size
     put_free(mesh, values, x)
     for b in range(room.known.size):
@@ -409,11 +398,9 @@ def estimate(work: Workspace, factored: Factored, room: Estimate, x: Vector) -> 
     for j in range(room.mesh.size):
         for a in range(n):
             room.at_mesh[j, a] = x[j * degree * n + a]
-    _in_units(room.at_mesh, sizes.states, room.user_at_mesh)
-    _fill_field(codes, sizes, values, room.mesh, room.user_at_mesh, room.rates)
+    _fill_field(codes, values, room.mesh, room.at_mesh, room.rates)
     fill_points(n, room.tables, h, x, room.rates[:-1], room.rates[1:], room.points)
-    _in_units(room.points, sizes.states, room.user_points)
-    _fill_field(codes, sizes, values, room.times, room.user_points, room.field)
+    _fill_field(codes, values, room.times, room.points, room.field)
     for i in range(room.left.shape[1]):
         room.left[0, i] = 0.0
     fill_left(n, room.tables, h, x, room.field, room.left[0], room.conditions)
@@ -422,12 +409,10 @@ def estimate(work: Workspace, factored: Factored, room: Estimate, x: Vector) -> 
         room.better[i] = x[i] - room.error[0, i]
     largest = move(n, room.tables, x, room.error[0], room.points, room.at_mesh)
     put_free(mesh, values, room.better)
-    _in_units(room.at_mesh, sizes.states, room.user_at_mesh)
-    _fill_field(codes, sizes, values, room.mesh, room.user_at_mesh, room.changed)
+    _fill_field(codes, values, room.mesh, room.at_mesh, room.changed)
     largest = largest_change(n, room.mesh[-1] - room.mesh[0], room.rates, room.changed, largest)
     if room.known.size:
-        _in_units(room.points, sizes.states, room.user_points)
-        given = Points(room.times, room.user_points, values.none)
+        given = Points(room.times, room.points, values.none)
         run_loaded(room.integrals, values.p, given, room.integrands, values.nothing)
         largest = largest_miss(room.weights, room.integrands, room.known, room.least, largest)
     return float(largest)

@@ -14,7 +14,7 @@ from contin.arrays import Array, Indices
 from contin.discretization.differences import derivative
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
-from contin.discretization.scales import ScaledBatch, Scales
+from contin.discretization.scales import Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.problems.angles import periods_of
@@ -93,14 +93,15 @@ class System(Discretization):
         p[self._free] = x[self.state_size :] * self.free_scales
         return p if self.scales is None else p / self.scales.parameters
 
-    def _batch(self, name: str, rows: Sequence[str] = ()) -> Any:
-        """Return some of the functions, compiled, on scaled inputs; ``rows`` name the sizes of its values."""
-        batch = self.problem.batch(name)
+    def _batch(self, name: str, rows: Sequence[str] = ()) -> Batch:
+        """Return some of the functions, compiled, of scaled inputs; ``rows`` name the sizes of its values."""
+        batch: Batch = self.problem.batch(name)
         if self.scales is None:
             return batch
-        sizes = {"states": self.scales.states, **self.scales.rows}
+        sizes, states = {"states": self.scales.states, **self.scales.rows}, self.scales.states
         values = np.concatenate([sizes[row] for row in rows]) if rows else np.ones(batch.count)
-        return ScaledBatch(batch, self.scales.states, self.scales.parameters, values)
+        ends = [states] if batch.signature.ends else []
+        return batch.sized(np.concatenate([states, *ends, self.scales.parameters]), values)
 
     def _between_scales(self, carry: Carrier, other: Any) -> Carrier:
         """Return a carrier of unknowns as they are, made one to a system that may have other scales."""

@@ -6,6 +6,7 @@ cannot be recorded is evaluated in Python (`contin.functions.interpreted`); a wa
 
 from __future__ import annotations
 
+import copy
 import functools
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -19,9 +20,9 @@ from contin.arrays import Array, Function, Indices, Pattern
 from contin.errors import ProblemError
 from contin.functions import derivatives
 from contin.functions.interpreted import Interpreted
-from contin.functions.interpreter import LANES, run
+from contin.functions.interpreter import LANES, Loaded, load, run
 from contin.functions.program import Inputs, Program, Slope, program
-from contin.functions.recording import Recording, checked, record
+from contin.functions.recording import Recording, checked, record, sized
 from contin.functions.signature import Signature, named_values, takes_arrays
 from contin.functions.switches import Selection, selections, switches, zeros
 from contin.functions.tape import Number, Tape, Unrecordable
@@ -157,12 +158,33 @@ class Batch:
             raise ProblemError("functions: there must be at least one, with a count for each")
         self._programs: dict[Hashable, Any] = {}
         self._seconds: dict[int, float] = {}  # a point takes, by the number of instructions
+        self._sizes: Array = np.empty(0)  # by which inputs and values are divided, if they are
+        self._divided: Batch | None = None  # what all batches with sizes share
         self.interpreted: Interpreted | None = None
         self.recording: Recording | None = None
         try:
             self.recording = checked(self._functions, self._counts, self.signature)
         except Unrecordable as reason:
             self.interpreted = Interpreted(self._functions, self._counts, self.signature, str(reason), pattern)
+
+    def sized(self, inputs: Array, values: Array) -> Batch:
+        """Return the same functions of inputs u, v (with ``ends``) and p that are divided by sizes, as are the values.
+
+        ``inputs`` and ``values`` (count,) are the sizes, powers of two. Programs are made once for all of them.
+        """
+        sizes = np.concatenate([inputs, values])
+        if np.all(sizes == 1):
+            return self
+        if self._divided is None:
+            self._divided = copy.copy(self)
+            vars(self._divided).pop("depends", None)
+            self._divided._programs, self._divided._seconds = {}, {}
+            self._divided.recording = None if self.recording is None else sized(self.recording)
+        found = copy.copy(self._divided)
+        found._sizes = sizes
+        if self.interpreted is not None:
+            found.interpreted = self.interpreted.sized(inputs, values)
+        return found
 
     def is_current(self) -> bool:
         """Return whether all constants that the functions read still have the values that were recorded."""
@@ -443,14 +465,22 @@ class Batch:
                 v["direction", number, slot] = len(v)
         if weights:
             v |= {("weight", row): len(v) + row for row in range(self.count)}
-        p: Mapping[Hashable, int] = {states + ends + slot: slot for slot in range(len(signature.parameters))}
+        p: dict[Hashable, int] = {states + ends + slot: slot for slot in range(len(signature.parameters))}
+        p |= {("size", number): len(signature.parameters) + number for number in range(signature.inputs + self.count)}
         return Inputs({column: column for column in range(states)}, v, p)
+
+    def load(self, columns: Columns | None = None) -> Loaded:
+        """Return the program of the values or, with ``columns``, of values and derivatives, as kernels run it."""
+        found = self._values_program() if columns is None else self._slopes(columns.key)[0]
+        return load(found, len(self.signature.parameters), self._sizes)
 
     # --- the interpreter ---------------------------------------------------------------------------------------------
 
     def _run(self, found: Program, t: Array, u: Array, v: Array, p: Array, out: Array, jac: Array) -> None:
         """Run a program for all points, in several threads where one took long before."""
         count = len(u)
+        if self._sizes.size:
+            p = np.concatenate([p, self._sizes])
         if count < _MANY:
             run(found, (t, u, v), p, out, jac)
             return

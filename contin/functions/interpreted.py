@@ -7,6 +7,7 @@ step where that agrees with differences at a few places, else with differences w
 from __future__ import annotations
 
 import contextlib
+import copy
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -91,7 +92,14 @@ class Interpreted:
         self._complex: bool | None = None
         self._pattern = pattern
         self._colourings: dict[tuple[int, ...], Colouring] = {}
+        self._sizes: tuple[Array, Array] | None = None
         self.error = 0.0
+
+    def sized(self, inputs: Array, values: Array) -> Interpreted:
+        """Return the same functions of inputs divided by sizes, with their values divided by theirs."""
+        found = copy.copy(self)
+        found._sizes = inputs, values
+        return found
 
     def values(self, t: Array, u: Array, v: Array, p: Array) -> Array:
         """Return the values, shape (places, count)."""
@@ -273,6 +281,8 @@ class Interpreted:
     def _values(self, t: Array, x: Array) -> Array:
         """Return the values, shape (places, count), for real or complex inputs x (places, inputs)."""
         columns = []
+        if self._sizes is not None:
+            x = x * self._sizes[0]
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore", np.exceptions.ComplexWarning)
             for index in range(len(self._functions)):
@@ -281,6 +291,8 @@ class Interpreted:
         found = np.hstack([column.reshape(shape) for column, shape in zip(columns, shapes)])
         if np.iscomplexobj(found) and not np.iscomplexobj(x):  # Python's (-1.0) ** 0.5 is complex: it has no real value
             found = np.where(found.imag == 0, found.real, np.nan)
+        if self._sizes is not None:
+            found = found / self._sizes[1]
         if round_off.SEED:
             found = np.array(found, dtype=complex if np.iscomplexobj(found) else float)
             round_off.move(found)

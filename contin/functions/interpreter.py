@@ -614,9 +614,15 @@ class Loaded(NamedTuple):
     parameters: int
 
 
-def load(program: Program) -> Loaded:
-    """Return a program with registers of its own."""
+#: No values.
+_NONE = np.empty(0)
+
+
+def load(program: Program, first: int = 0, values: Array = _NONE) -> Loaded:
+    """Return a program with registers of its own; ``values`` are those of parameters from the ``first`` on."""
     instructions = Instructions(program.code, program.lists, program.scalars.copy(), program.tables, round_off.SEED)
+    at = program.parameters + first
+    instructions.scalars[at : at + len(values)] = values
     room = Room(np.empty(program.registers * LANES), np.empty((max(program.unknowns, 1), program.unknowns + 1)))
     return Loaded(instructions, program.first, program.last, room, program.parameters)
 

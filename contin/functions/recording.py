@@ -56,6 +56,21 @@ class Recording:
         return self.tape.operations[: len(other.tape.operations)] == other.tape.operations
 
 
+def sized(recording: Recording) -> Recording:
+    """Return the same functions of inputs that are divided by sizes; the values are divided by theirs.
+
+    The sizes are further inputs, ``("size", k)`` of all inputs and then of the values.
+    """
+    tape, known = Tape(NUMPY), recording.tape.operations
+    time, count = tape.input(TIME), len(recording.inputs)
+    given = [tape.input(known[place].data) for place in recording.inputs]
+    sizes = [tape.input(("size", k)) for k in range(count + len(recording.results))]
+    moved = {place: each * size for place, each, size in zip(recording.inputs, given, sizes)}
+    values = tape.replay(recording.tape, recording.results, {recording.time: time, **moved})
+    results = tuple(tape.number(value / size).place for value, size in zip(values, sizes[count:]))
+    return Recording(tape, results, time.place, tuple(each.place for each in given))
+
+
 def record(functions: Sequence[Function], counts: Sequence[int], signature: Signature) -> Recording:
     """Return the recording of functions; ``counts`` are their numbers of values, 0 for a bare number.
 

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from contin.discretization.assembly import Bordering, assemble, at_points, collocate
-from contin.discretization.workspace import Workspace, put_free, scale
+from contin.discretization.workspace import Workspace, put_free
 from contin.functions.interpreter import Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Vector, helper
@@ -50,38 +50,21 @@ class Control(NamedTuple):
 
 
 @helper
-def _scale_slopes(slopes, sizes, inputs):
-    """Multiply derivatives by the sizes of inputs, and divide them by those of values."""
-    for i in range(slopes.shape[0]):
-        for a in range(slopes.shape[1]):
-            for b in range(slopes.shape[2]):
-                slopes[i, a, b] *= inputs[b] / sizes[a]
-
-
-@helper
 def _evaluate(codes, mesh, room, x, slopes):
     """Fill values at x and, with ``slopes``, derivatives."""
-    sizes, n = mesh.sizes, room.points.shape[1]
+    n = room.points.shape[1]
     put_free(mesh, room, x)
     at_points(mesh.tables.value, x, room.points)
-    for i in range(room.points.shape[0]):
-        for a in range(n):
-            room.points[i, a] *= sizes.states[a]
     for a in range(n):
-        room.start[0, a] = x[a] * sizes.states[a]
-        room.end[0, a] = x[mesh.states - n + a] * sizes.states[a]
+        room.start[0, a], room.end[0, a] = x[a], x[mesh.states - n + a]
     inside, ends = Points(mesh.times, room.points, room.none), Points(room.zero, room.start, room.end)
     if slopes:
         room.at[0] = math.nan
         run_loaded(codes.field_slopes, room.p, inside, room.field, room.jacobian)
         run_loaded(codes.ends_slopes, room.p, ends, room.boundary, room.at_ends)
-        _scale_slopes(room.jacobian, sizes.field, sizes.field_inputs)
-        _scale_slopes(room.at_ends, sizes.ends, sizes.ends_inputs)
     else:
         run_loaded(codes.field, room.p, inside, room.field, room.nothing)
         run_loaded(codes.ends, room.p, ends, room.boundary, room.nothing)
-    scale(room.field, sizes.field)
-    scale(room.boundary, sizes.ends)
 
 
 @helper

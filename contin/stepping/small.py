@@ -15,7 +15,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.maps import MapSystem
-from contin.functions.interpreter import Loaded, Points, load, run_loaded
+from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
 from contin.linalg.small import factor_small, solve_small
@@ -31,15 +31,15 @@ _SMALL = 32
 class Equations(NamedTuple):
     """F(x) = 0, as `contin.discretization.algebraic` and `contin.discretization.maps` have it, and room to evaluate it in.
 
-    ``sizes`` (size,) and ``rows`` (equations,) are scales; ``parameters`` are all of them, ``free`` the places of the free
-    ones. Of a map, ``is_map`` is 1 and ``gain`` what angles gain: F is the function less u and ``gain``.
+    ``parameters`` are all of them, ``free`` the places of the free ones. ``rates`` (equations,) takes values to rates of states
+    divided by their sizes, of u' = F. Of a map, ``is_map`` is 1 and ``gain`` what angles gain: F is the function less u and
+    ``gain``.
     """
 
     values: Loaded
     slopes: Loaded
-    sizes: Vector
-    rows: Vector
     weights: Vector
+    rates: Vector
     gain: Vector
     is_map: int
     parameters: Vector
@@ -72,15 +72,17 @@ def equations_of(system: Any) -> Equations | None:
     if type(system) not in (Algebraic, MapSystem) or system.size > _SMALL:
         return None
     problem, is_map = system.problem, isinstance(system, MapSystem)
-    batch = problem.batch("map" if is_map else "residual")
+    batch = problem.batch("map") if is_map else system._residual
     given = problem.jacobian is not None or problem.pattern is not None
     if given or batch.interpreted is not None or getattr(system, "rounds", 1) != 1 or system.size != system.equations + 1:
         return None
     n, count, size = system.state_size, system.equations, system.size
+    scales = system.scales
+    rates = np.ones(count) if scales is None or count != n else scales.rows["residual"] / scales.states
     return Equations(
-        load(batch._values_program()), load(batch._slopes(batch.columns(system._free).key)[0]),
-        system.unscaled_factors, np.ones(count) if system.scales is None else system.scales.rows["residual"], system.weights,
-        system.gain if is_map else np.zeros(count), int(is_map), system.parameters.copy(), system._free, np.zeros(1),
+        batch.load(), batch.load(batch.columns(system._free)), system.weights, rates,
+        system.gain if is_map else np.zeros(count), int(is_map), system._scaled_parameters(np.zeros(size)), system._free,
+        np.zeros(1),
         np.empty((1, n)), np.empty((0, n)), np.empty((1, count)), np.zeros((1, count, size)), np.empty((0, 0, 0)),
     )  # fmt: skip
 
@@ -127,12 +129,12 @@ def corrected_small(system: Any, guess: Array, row: Array, target: Any, newton: 
 
 @helper
 def put(equations: Equations, x: Array) -> None:
-    """Put states and free parameters of x, in the user's units, where functions find them."""
+    """Put states and free parameters of x where functions find them."""
     n = equations.states.shape[1]
     for i in range(n):
-        equations.states[0, i] = x[i] * equations.sizes[i]
+        equations.states[0, i] = x[i]
     for k in range(equations.free.size):
-        equations.parameters[equations.free[k]] = x[n + k] * equations.sizes[n + k]
+        equations.parameters[equations.free[k]] = x[n + k]
 
 
 @helper
@@ -154,11 +156,10 @@ def evaluate_slopes(equations: Equations, x: Array) -> None:
 @helper
 def fill_residual(equations: Equations, right: Array) -> None:
     """Fill in F from what was evaluated."""
-    for i in range(equations.rows.size):
-        value = equations.found[0, i]
+    for i in range(equations.gain.size):
+        right[i] = equations.found[0, i]
         if equations.is_map:
-            value -= equations.states[0, i] + equations.gain[i]
-        right[i] = value / equations.rows[i]
+            right[i] -= equations.states[0, i] + equations.gain[i]
 
 
 @helper
@@ -167,7 +168,7 @@ def fill_matrix(equations: Equations, row: Array, matrix: Array) -> None:
     size = row.size
     for i in range(size - 1):
         for j in range(size):
-            matrix[i, j] = equations.slopes_found[0, i, j] * equations.sizes[j] / equations.rows[i]
+            matrix[i, j] = equations.slopes_found[0, i, j]
         if equations.is_map:
             matrix[i, i] -= 1.0
     for j in range(size):
