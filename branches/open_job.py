@@ -303,7 +303,7 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
         labelled[-1] += [point] if point.label else []
         if point.label and point.name != "start":
             continue  # inside a step: a run cannot be resumed from here
-        if run.state.system.scales is None:  # states with scales are not stored; such a stage begins again
+        if run.state.system.scales.are_one:  # states with scales are not stored; such a stage begins again
             writer.mark(run.state)
         if interruption.asked:
             writer.checkpoint(run.start, "interrupted")

@@ -174,4 +174,4 @@ def _saddle(system: CycleCollocation, x: Array) -> tuple[Array, int]:
     if unstable in (0, len(eigenvalues)):
         kind = "stable" if unstable == 0 else "a source"
         raise ProblemError(f"start: the equilibrium where it is slowest is {kind}, no saddle; take a cycle of longer period")
-    return states if system.scales is None else states * system.scales.states, unstable
+    return states * system.scales.states, unstable

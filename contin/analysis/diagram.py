@@ -339,8 +339,7 @@ def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
     states = system.states(x).copy()
     visible = states[:, : getattr(system.problem, "dimension", states.shape[1])]
     visible[:] = symmetry(system.nodes, visible.copy())
-    states = states if system.scales is None else states / system.scales.states
-    return np.concatenate([states.ravel(), x[system.state_size :]])
+    return np.concatenate([(states / system.scales.states).ravel(), x[system.state_size :]])
 
 
 def _seen(system: Any, x: Array) -> Array:

@@ -78,7 +78,7 @@ def scaled(
 
     Unchanged where it has sizes already, or where all are of order one.
     """
-    if not isinstance(system, System) or system.scales is not None:
+    if not isinstance(system, System) or not system.scales.are_one:
         return system, x
     problem, states = system.problem, list(system.problem.states)
     names, stated = [*states, *system.free], settings.scales
@@ -470,7 +470,7 @@ def renewed(system: Discretization, x: Array) -> tuple[Discretization, Carrier]:
 
     A trivial branch that begins at a small load leaves its size to the branches that turn off at loads of order one.
     """
-    if not isinstance(system, System) or system.scales is None:
+    if not isinstance(system, System) or system.scales.are_one:
         return system, np.array
     names, count, scales = list(system.problem.parameters), len(system.problem.states), system.scales
     largest = system.largest(x)
@@ -492,9 +492,7 @@ def outgrown(
     if not isinstance(system, System) or not np.abs(x).max() > USUAL[1]:
         return adapted  # most steps
     names, count = list(system.problem.parameters), len(system.problem.states)
-    states, parameters = np.ones(count), np.ones(len(names))
-    if system.scales is not None:
-        states, parameters = system.scales.states, system.scales.parameters.copy()
+    states, parameters = system.scales.states, system.scales.parameters.copy()
     found = usual(system.largest(x))
     size, size_of_free = found[:count], found[count:]
     if max(size.max(), size_of_free.max(initial=0.0)) <= 1:

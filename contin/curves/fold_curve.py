@@ -242,9 +242,7 @@ def _of_equilibria() -> list[TestFunction]:
         system: Any = trial.system
         v, w, _ = system.null_vectors(trial.x)
         base, scales = system.base, system.base.scales
-        v = v[: base.state_size]
-        if scales is not None:
-            v, w = v * scales.states, w / scales.rows["residual"]
+        v, w = v[: base.state_size] * scales.states, w / scales.rows["residual"]
         return float(w @ v) / float(np.linalg.norm(v) * np.linalg.norm(w))
 
     def others(trial: Trial) -> tuple[float, bool]:

@@ -178,9 +178,8 @@ def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
     share = float(system.gauss_weights @ near)
     if share < _MOSTLY:
         return None
-    scales = np.ones(len(states)) if system.scales is None else system.scales.states
     passes = max(int(np.count_nonzero(near & ~np.roll(near, 1))), 1)
-    return RestingPlace(states * scales, eigenvalues, share, passes, fold)
+    return RestingPlace(states * system.scales.states, eigenvalues, share, passes, fold)
 
 
 @dataclass(frozen=True)

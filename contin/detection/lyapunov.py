@@ -125,8 +125,7 @@ class Coefficient(NamedTuple):
 
 def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:
     """Return the first Lyapunov coefficient at a Hopf point; NaN where another eigenvalue is zero."""
-    size = np.ones(system.state_size) if system.scales is None else system.scales.states
-    field, one = system.as_field(), np.eye(len(size))
+    size, field, one = system.scales.states, system.as_field(), np.eye(system.state_size)
 
     def terms(point: Array) -> Array:
         jacobian = system.jacobian(point)

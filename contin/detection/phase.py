@@ -122,7 +122,7 @@ def _shift(system: CycleCollocation, x: Array, reference: Array) -> float:
     without their means, less half the square of a s + the mean of u - v, up to whole rounds, that is largest.
     """
     part = np.arange(_PLACES) / _PLACES
-    gained = system.gains[-1] if system.scales is None else system.gains[-1] / system.scales.states
+    gained = system.gains[-1] / system.scales.states
     orbits = [system.evaluate_scaled(z, system.order * part) - part[:, None] * gained for z in (x, reference)]
     means = orbits[0].mean(axis=0) - orbits[1].mean(axis=0)
     ours, theirs = (np.fft.fft(orbit, axis=0) for orbit in orbits)

@@ -63,6 +63,11 @@ class Algebraic(System):
         self._none = np.empty((0, self.state_size))  # the absent second state of functions of one point
 
     @property
+    def _rows(self) -> tuple[tuple[str, int], ...]:
+        """The residual's."""
+        return (("residual", self.problem.equation_size),)
+
+    @property
     def nodes(self) -> Array:
         """One place, shape (1,)."""
         return _NO_TIME
@@ -75,7 +80,7 @@ class Algebraic(System):
     def states(self, x: Array) -> Array:
         """Return the states, shape (1, n)."""
         states = x[: self.state_size].reshape(1, -1)
-        return states if self.scales is None else states * self.scales.states
+        return states * self.scales.states
 
     def lifted(self, x: Array, reference: Array) -> Array:
         """Return x with angles moved by whole rounds, so that they are nearest to those of a reference."""
@@ -138,11 +143,8 @@ class Algebraic(System):
         """Return the same with the derivatives by states from the user's function."""
         values, by_parameters = self._residual.jacobian(*given, self._residual.columns(self._free, ()))
         matrix: Any = self._own_jacobian(self.states(x)[0], self.all_parameters(x))
-        if self.scales is not None:
-            rows, columns = 1 / self.scales.rows["residual"], self.scales.states
-            matrix = (
-                matrix * columns * rows[:, None] if not self.is_sparse else matrix.multiply(columns).multiply(rows[:, None])
-            )
+        rows, columns = 1 / self.scales.rows["residual"], self.scales.states
+        matrix = matrix * columns * rows[:, None] if not self.is_sparse else matrix.multiply(columns).multiply(rows[:, None])
         if not self.is_sparse:
             return values[0], np.hstack([matrix, by_parameters[0]])
         from scipy.sparse import csr_array, hstack
@@ -248,7 +250,7 @@ class Algebraic(System):
 
     def as_field(self) -> Algebraic:
         """Return the same problem with the residual divided by the sizes of the states, as their rates; x stays the same."""
-        if self.scales is None:
+        if self.scales.are_one:
             return self
         return self._with(scales=Scales(self.scales.states, self.scales.parameters, {"residual": self.scales.states}))
 

@@ -125,6 +125,11 @@ class Collocation(System):
         problem = self.problem
         return problem.batch("field").columns(parameters, self._layout.order), problem.batch("boundary").columns(parameters)
 
+    @property
+    def _rows(self) -> tuple[tuple[str, int], ...]:
+        """Those of boundary and integral conditions."""
+        return ("boundary", self.problem.boundary_size), ("integrals", self.problem.integral_size)
+
     # --- vectors of unknowns -------------------------------------------------------------------------------------
 
     @property
@@ -147,7 +152,7 @@ class Collocation(System):
     def states(self, x: Array) -> Array:
         """Return the states at the nodes, shape (N d + 1, n)."""
         states = self._scaled_states(x)
-        return states if self.scales is None else states * self.scales.states
+        return states * self.scales.states
 
     def _scaled_states(self, x: Array) -> Array:
         """Return the states divided by their sizes, a view of x."""
@@ -167,12 +172,12 @@ class Collocation(System):
     def states_at_gauss_points(self, x: Array) -> Array:
         """Return the states at the Gauss points in the user's units, shape (N d, n)."""
         points = self.at_gauss_points(x)
-        return points if self.scales is None else points * self.scales.states
+        return points * self.scales.states
 
     def evaluate(self, x: Array, times: Array) -> Array:
         """Return the states at ``times`` (m,), shape (m, n), by the piecewise polynomial."""
         states = self._interpolated(x, times)
-        return states if self.scales is None else states * self.scales.states
+        return states * self.scales.states
 
     def _interpolated(self, x: Array, times: Array) -> Array:
         """Return the piecewise polynomial of the values in x."""
@@ -233,8 +238,7 @@ class Collocation(System):
     def integrands(self, x: Array, times: Array, points: Array) -> Array:
         """Return the integrands of the functionals, with the parameters of x, for states (K, n) divided by their sizes."""
         batch = self.problem.batch("functionals")
-        points = points if self.scales is None else points * self.scales.states
-        values: Array = batch.values(times, points, _NONE(self._n), self.all_parameters(x))
+        values: Array = batch.values(times, points * self.scales.states, _NONE(self._n), self.all_parameters(x))
         return values
 
     # --- the discrete equations ----------------------------------------------------------------------------------
@@ -582,7 +586,7 @@ class Collocation(System):
         largest: Array = (self.mesh[-1] - self.mesh[0]) * np.nan_to_num(values)
         largest[largest == 0] = 1.0
         if name == "field":
-            largest[: self._n] = sizes if self.scales is None else sizes * self.scales.states
+            largest[: self._n] = sizes * self.scales.states
         return largest
 
     def on_breaks(self) -> Collocation:

@@ -79,7 +79,7 @@ class ConnectionCollocation(Conditioned):
 
     @property
     def _sizes(self) -> Array:
-        return np.ones(self._n) if self.scales is None else self.scales.states
+        return self.scales.states
 
     def _places(self, p: Array) -> list[Array]:
         """Return the coordinates of the first and of the last equilibrium in the user's units, shape (m, n) each."""
@@ -244,7 +244,8 @@ class ConnectionCollocation(Conditioned):
     def condition_columns(self, x: Array, names: Sequence[str]) -> Array:
         """Return the derivatives of these conditions by any parameters."""
         by_parameters = self._conditions_at_ends(x, names)[2]
-        return by_parameters if self.scales is None else by_parameters * self.scales.parameters[self._indices(names)]
+        found: Array = by_parameters * self.scales.parameters[self._indices(names)]
+        return found
 
     # --- for special points of homoclinic orbits -----------------------------------------------------------------
 

@@ -73,8 +73,7 @@ class PeriodicCollocation(Collocation):
         super().__init__(problem, mesh, degree, free, parameters, scales)
         self._known: dict[bytes, tuple[ComplexArray, Mask, ComplexArray]] = {}
         self.order = problem.order
-        sizes = np.ones(self._n) if scales is None else scales.states
-        self._turn: Array = problem.symmetry * sizes / sizes[:, None]
+        self._turn: Array = problem.symmetry * self.scales.states / self.scales.states[:, None]
         values = dict(zip(problem.parameters, map(float, self.parameters)))
         check_windings(problem.angles, self.free, values)
         #: What angles have gained after 0, 1, ... of the parts that a symmetry divides the cycle into, shape (order + 1, n).
@@ -134,8 +133,7 @@ class PeriodicCollocation(Collocation):
 
     def evaluate_scaled(self, x: Array, times: Array) -> Array:
         """Return the states divided by their sizes at ``times`` (m,), any number of rounds on, shape (m, n)."""
-        states = self.evaluate(x, times)
-        return states if self.scales is None else states / self.scales.states
+        return self.evaluate(x, times) / self.scales.states
 
     def moved(self, x: Array, shift: float) -> Array:
         """Return a cycle that begins later by ``shift``, in units of the part that is computed."""
@@ -172,8 +170,7 @@ class PeriodicCollocation(Collocation):
         found = extremes(self.degree, *self._whole(x), self._n)
         round_ = self.gains[-1] != 0
         found[round_] = self.circles[round_, None] * [0.5, -0.5]
-        if self.scales is not None:
-            found *= self.scales.states[:, None]
+        found *= self.scales.states[:, None]
         own = [] if PERIOD in self.problem.parameters else [self.duration(x)]
         means = super().functionals(x) if self.problem.means else np.empty(0)
         return np.concatenate([found.ravel(), own, means])
@@ -183,7 +180,7 @@ class PeriodicCollocation(Collocation):
         if self.order == 1:
             return self.mesh, x
         states = x[: len(self.nodes) * self._n].reshape(-1, self._n)
-        gains = self.gains if self.scales is None else self.gains / self.scales.states
+        gains = self.gains / self.scales.states
         parts = [states @ np.linalg.matrix_power(self.turn, k).T + gains[k] for k in range(self.order)]
         values = np.concatenate([*(part[:-1] for part in parts), parts[-1][-1:]])
         mesh = (np.arange(self.order)[:, None] + self.mesh[:-1]).ravel() / self.order
@@ -377,7 +374,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         """Take the phase row from an orbit, states at the nodes."""
         self.reference = reference
         self._amplitude: Array | None = None
-        scaled = reference if self.scales is None else reference / self.scales.states
+        scaled = reference / self.scales.states
         self._phase = self.phase_row(scaled)
         self._target = float(self._phase[: self.state_size] @ scaled.ravel()) if self.rotates else 0.0
 
@@ -405,9 +402,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
     @property
     def start_direction(self) -> Array:
         """The direction in which the reference leaves t = 0, scaled, shape (n,)."""
-        first: Array = self.reference[1] - self.reference[0]
-        if self.scales is not None:
-            first /= self.scales.states
+        first = (self.reference[1] - self.reference[0]) / self.scales.states
         return np.asarray(first / np.linalg.norm(first), dtype=float)
 
     def _computed(self, x: Array) -> ComplexArray:
@@ -470,7 +465,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
             group = self._mean_turn
             reference = self.reference - group @ (weights @ self.reference)
             row = weights[:, None] * (reference - (weights @ reference) @ group) / (weights @ np.sum(reference**2, axis=1))
-            self._amplitude = (row if self.scales is None else row * self.scales.states).ravel()
+            self._amplitude = (row * self.scales.states).ravel()
         return self._amplitude
 
     # --- meshes and references -----------------------------------------------------------------------------------
@@ -484,7 +479,7 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 
     def _between(self, states: Array, times: Array) -> Array:
         """Return states at the nodes, in the user's units, carried to other times."""
-        x = np.concatenate([(states if self.scales is None else states / self.scales.states).ravel(), np.zeros(len(self.free))])
+        x = np.concatenate([(states / self.scales.states).ravel(), np.zeros(len(self.free))])
         return self.evaluate(x, times)
 
     def with_reference(self, x: Array) -> CycleCollocation:

@@ -7,6 +7,7 @@ problem. Scales are powers of two: multiplication by them is exact.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,11 +34,22 @@ class Scales:
         """Return all sizes by name, for a file."""
         return {"states": self.states, "parameters": self.parameters, **self.rows}
 
+    @functools.cached_property
+    def are_one(self) -> bool:
+        """Whether nothing is scaled."""
+        return all(np.all(sizes == 1) for sizes in self.arrays().values())
+
     @classmethod
     def of_arrays(cls, arrays: dict[str, Array]) -> Scales:
         """Return the scales that `arrays` gave."""
         rows = {name: sizes for name, sizes in arrays.items() if name not in ("states", "parameters")}
         return cls(arrays["states"], arrays["parameters"], rows)
+
+
+@functools.cache  # systems with the same sizes have the same object
+def nothing_scaled(states: int, parameters: int, rows: tuple[tuple[str, int], ...]) -> Scales:
+    """Return sizes that are all one; ``rows`` are names and numbers of equations."""
+    return Scales(np.ones(states), np.ones(parameters), {name: np.ones(count) for name, count in rows})
 
 
 def usual(sizes: Array | float) -> Array:

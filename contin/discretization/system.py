@@ -14,7 +14,7 @@ from contin.arrays import Array, Indices
 from contin.discretization.differences import derivative
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
-from contin.discretization.scales import Scales
+from contin.discretization.scales import Scales, nothing_scaled
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.problems.angles import periods_of
@@ -52,9 +52,14 @@ class System(Discretization):
                 raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}")
         self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
         self._free = self._indices(self.free)
-        self.scales = scales
+        self.scales = scales or nothing_scaled(len(problem.states), len(names), self._rows)
         #: Sizes of the free parameters.
-        self.free_scales: Array = np.ones(len(self.free)) if scales is None else scales.parameters[self._free]
+        self.free_scales: Array = self.scales.parameters[self._free]
+
+    @property
+    @abstractmethod
+    def _rows(self) -> tuple[tuple[str, int], ...]:
+        """Names and numbers of the equations that have sizes of their own."""
 
     def __repr__(self) -> str:
         mesh = f"{self.intervals} interval{'s' * (self.intervals != 1)} of degree {self.degree}, " * bool(self.intervals)
@@ -73,13 +78,9 @@ class System(Discretization):
 
     def pack(self, states: Any, values: Mapping[str, float]) -> Array:
         """Return a vector of unknowns from states and the mapping of free parameters."""
-        states = np.asarray(states, dtype=float)
+        scaled = np.asarray(states, dtype=float).reshape(-1, self.scales.states.size) / self.scales.states
         free = np.array([float(values[name]) for name in self.free])
-        if self.scales is None:
-            return np.concatenate([states.ravel(), free])
-        return np.concatenate(
-            [(states.reshape(-1, self.scales.states.size) / self.scales.states).ravel(), free / self.free_scales]
-        )
+        return np.concatenate([scaled.ravel(), free / self.free_scales])
 
     def all_parameters(self, x: Array) -> Array:
         """Return the values of all parameters, shape (number of names,), the free ones from x."""
@@ -89,15 +90,13 @@ class System(Discretization):
 
     def _scaled_parameters(self, x: Array) -> Array:
         """Return all parameters divided by their sizes."""
-        p = self.parameters.copy()
-        p[self._free] = x[self.state_size :] * self.free_scales
-        return p if self.scales is None else p / self.scales.parameters
+        p = self.parameters / self.scales.parameters
+        p[self._free] = x[self.state_size :]
+        return p
 
     def _batch(self, name: str, rows: Sequence[str] = ()) -> Batch:
         """Return some of the functions, compiled, of scaled inputs; ``rows`` name the sizes of its values."""
         batch: Batch = self.problem.batch(name)
-        if self.scales is None:
-            return batch
         sizes, states = {"states": self.scales.states, **self.scales.rows}, self.scales.states
         values = np.concatenate([sizes[row] for row in rows]) if rows else np.ones(batch.count)
         ends = [states] if batch.signature.ends else []
@@ -113,16 +112,13 @@ class System(Discretization):
     @property
     def unscaled_factors(self) -> Array:
         """Sizes of all unknowns, shape (size,)."""
-        if self.scales is None:
-            return np.ones(self.size)
         count = self.state_size // self.scales.states.size
         return np.concatenate([np.tile(self.scales.states, count), self.free_scales])
 
     @functools.cached_property
     def circles(self) -> Array:
         """Periods of the states that are angles, divided by their sizes, and zero for the others, shape (n,)."""
-        periods = periods_of(self.problem)
-        return periods if self.scales is None else periods / self.scales.states
+        return periods_of(self.problem) / self.scales.states
 
     def magnitudes(self, x: Array) -> Array:
         """Return the largest value of each state, and each free parameter, in the places of the unknowns, shape (size,)."""

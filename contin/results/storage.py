@@ -145,7 +145,7 @@ def _arrays_of(system: Discretization, number: int) -> dict[str, Array]:
     arrays = {f"parameters{number}": base.parameters}
     if isinstance(base, Collocation):
         arrays[f"mesh{number}"] = base.mesh
-    if base.scales is not None:
+    if not base.scales.are_one:
         arrays |= {f"scale_{name}{number}": sizes for name, sizes in base.scales.arrays().items()}
     return arrays
 

@@ -78,7 +78,7 @@ def equations_of(system: Any) -> Equations | None:
         return None
     n, count, size = system.state_size, system.equations, system.size
     scales = system.scales
-    rates = np.ones(count) if scales is None or count != n else scales.rows["residual"] / scales.states
+    rates = scales.rows["residual"] / scales.states if count == n else np.ones(count)
     return Equations(
         batch.load(), batch.load(batch.columns(system._free)), system.weights, rates,
         system.gain if is_map else np.zeros(count), int(is_map), system._scaled_parameters(np.zeros(size)), system._free,

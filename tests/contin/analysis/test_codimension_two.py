@@ -158,7 +158,7 @@ def test_hopf_points_pass_a_zero_hopf_point():
         found = contin.curve(zero_hopf(1), kind="HB", direction=direction, limits={"b": (-0.2, 0.2)})
         assert labels(found) == ["ZH", "EP"] and found.points[-1]["b"] == pytest.approx(0.2 * direction, abs=1e-12)
         for point in found:
-            z = point.x[2] if point.system.scales is None else point.system.states(point.x)[0, 2]
+            z = point.system.states(point.x)[0, 2]
             assert (point["a"], point["b"]) == pytest.approx((-(z**2), z - z**2), abs=1e-10)
             assert point["frequency"] == pytest.approx(2, abs=1e-10)
 

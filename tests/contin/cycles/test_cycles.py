@@ -272,7 +272,7 @@ def test_cycles_that_outgrow_the_sizes_of_their_hopf_point(errors):
     (doubling,) = cycles.labelled("PD")
     assert doubling["F"] == pytest.approx(8.157983671848, abs=5e-11)
     assert all("round-off" in note for note in cycles.notes)
-    assert np.all(cycles[-2].system.scales is None or cycles[-2].system.scales.states >= 0.01)  # not 2e-4
+    assert np.all(cycles[-2].system.scales.states >= 0.01)  # not 2e-4
     assert not errors or doubling.errors["F"] < 1e-10
 
 
