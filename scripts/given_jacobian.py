@@ -1,7 +1,7 @@
 """CPU time and memory of a large equilibrium problem, by what is known of its Jacobian.
 
-``python scripts/given_jacobian.py [N ...]``: Bratu's problem by finite differences with N unknowns, with the recorded pattern,
-with a given pattern, and with a given Jacobian. Each run is a process of its own, after a small run that loads what all need.
+``python scripts/given_jacobian.py [N ...]``: Bratu's problem by finite differences with N unknowns, with the derivatives
+found by recording, and with a given Jacobian. Each run is a process of its own, after a small run that loads what all need.
 The first solution includes the pattern and the comparison; compiled kernels are there from a run before. A
 linearization is the residual, the Jacobian and its factors.
 """
@@ -19,7 +19,7 @@ from scipy import sparse
 
 import contin
 
-KINDS = ("traced", "pattern", "Jacobian")
+KINDS = ("recorded", "given")
 #: Linearizations of which the fastest counts.
 REPEATS = 5
 
@@ -39,7 +39,7 @@ def derivatives(u, p):
 def measure(count: int, kind: str) -> dict[str, float]:
     """Return CPU seconds to the first solution and of a linearization, and megabytes at most."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    given = {"Jacobian": {"jacobian": derivatives}, "pattern": {"pattern": derivatives(np.zeros(count), [0.0])}, "traced": {}}
+    given = {"given": {"jacobian": derivatives}, "recorded": {}}
     problem = contin.AlgebraicProblem(bratu, count, {"lam": 1.0}, count=count, dynamics=False, **given[kind])
     began = time.process_time()
     start = contin.solve(problem, np.zeros(count))

@@ -126,9 +126,8 @@ class Algebraic(System):
     def _jacobian(self, x: Array) -> tuple[Array, Any]:
         """Return the residual and F_x, shape (equations, size), a sparse array where `is_sparse`."""
         given = _NO_TIME, x[: self.state_size].reshape(1, -1), self._none, self._scaled_parameters(x)
-        if self.problem.jacobian is not None or self.problem.pattern is not None:
-            check_given(self.problem, self.states(x)[0], self.all_parameters(x))
         if self.problem.jacobian is not None:
+            check_given(self.problem, self.states(x)[0], self.all_parameters(x))
             return self._given_jacobian(x, given)
         columns = self._by_unknowns
         if not self.is_sparse:
@@ -218,7 +217,7 @@ class Algebraic(System):
     def bent(self, x: Array, w: Array, v: Array) -> Array:
         """Return the gradient of w.(F_x v), shape (size,)."""
         if self.problem.batch("residual").interpreted is not None:
-            return super().bent(x, w, v)  # two Jacobians, given or with a given pattern, instead of one value for each entry
+            return super().bent(x, w, v)  # two Jacobians instead of one value for each entry
         u, p, n, batch = x[: self.state_size].reshape(1, -1), self._scaled_parameters(x), self.state_size, self._residual
         wide = self._wide(v, v[None, :n])
         found: Array = batch.bent(_NO_TIME, u, self._none, p, w[None], wide, batch.columns(self._free))[0]

@@ -1,4 +1,4 @@
-"""A Jacobian or sparsity pattern that a user gives, compared once with differences of the residual."""
+"""A Jacobian that a user gives, compared once with differences of the residual."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _SAFE, _LEAST = 20.0, 1e-9
 
 
 def check_given(problem: AlgebraicProblem, u: Array, p: Array) -> None:
-    """Compare a given Jacobian, or the pattern, with differences of the residual along a random direction, the first time.
+    """Compare a given Jacobian with differences of the residual along a random direction, the first time.
 
     Raises
     ------
     ProblemError
-        An entry is wrong or missing; the message names it.
+        An entry is wrong; the message names it.
     """
-    if (problem.jacobian is None and problem.pattern is None) or problem.compared:
+    if problem.jacobian is None or problem.compared:
         return
     problem.compared.append(True)
     random = np.random.default_rng(3)
@@ -36,53 +36,16 @@ def check_given(problem: AlgebraicProblem, u: Array, p: Array) -> None:
     direction = size * random.uniform(0.5, 1.0, u.size) * random.choice([-1.0, 1.0], u.size)
     for here in (place, u):
         with np.errstate(all="ignore"):
-            matrix = _matrix(problem, here, p)
+            matrix = problem.jacobian_at(here, p)
             wanted, error = _slope(problem, here, p, direction)
         terms = abs(matrix) @ np.abs(direction)
         if np.isfinite(wanted).all() and np.isfinite(terms).all():
             break
     else:
         return  # nothing to compare with: Newton's method will say that there are no values
-    if problem.jacobian is None and problem.batch("residual").recording is not None:
-        _check_entries(problem, matrix)
-        return
     excess = np.abs(matrix @ direction - wanted) - _SAFE * error - _LEAST * (terms + np.abs(wanted))
     if np.any(excess > 0):
         raise ProblemError(_wrong_entry(problem, (here, p), matrix, int(np.argmax(excess))))
-
-
-def _check_entries(problem: AlgebraicProblem, matrix: Any) -> None:
-    """Compare a pattern with the entries of the exact Jacobian at one place, those of zeros left out.
-
-    Raises
-    ------
-    ProblemError
-        An entry is missing.
-    """
-    entries = matrix.tocoo()
-    given = set(zip(*(side.tolist() for side in problem.entries)))
-    for row, column, value in zip(entries.row.tolist(), entries.col.tolist(), entries.data.tolist()):
-        if value != 0 and (row, column) not in given:
-            raise ProblemError(_missing(problem, row, column))
-
-
-def _missing(problem: AlgebraicProblem, row: int, column: int) -> str:
-    """Return the sentence that names an entry that a pattern lacks."""
-    name = problem.state_names[column]
-    return f"pattern: equation {row} depends on {name}, so the pattern must have the entry ({row}, {column})"
-
-
-def _matrix(problem: AlgebraicProblem, u: Array, p: Array) -> Any:
-    """Return the derivatives by states as they are given, or found with the given pattern."""
-    if problem.jacobian is not None:
-        return problem.jacobian_at(u, p)
-    from scipy.sparse import csr_array  # type: ignore[import-untyped]  # .1 s; few problems need it
-
-    batch = problem.batch("residual")
-    columns = batch.columns([])
-    entries = batch.entries(np.zeros(1), u[None], np.empty((0, u.size)), p, columns)[1]
-    rows, places = columns.rows, columns.places
-    return csr_array((entries, (rows, places)), shape=(problem.equation_size, u.size))
 
 
 def _slope(problem: AlgebraicProblem, u: Array, p: Array, direction: Array) -> tuple[Array, Array]:
@@ -98,7 +61,7 @@ def _slope(problem: AlgebraicProblem, u: Array, p: Array, direction: Array) -> t
 
 
 def _wrong_entry(problem: AlgebraicProblem, place: tuple[Array, Array], matrix: Any, row: int) -> str:
-    """Return the sentence that names the entry of a row that differs most, or of a pattern the one that is missing."""
+    """Return the sentence that names the entry of a row that differs most."""
     u, p = place
     given = matrix[[row]].toarray()[0] if hasattr(matrix, "toarray") else matrix[row]
     known, size = np.empty(u.size), 1 + np.abs(u)
@@ -107,11 +70,7 @@ def _wrong_entry(problem: AlgebraicProblem, place: tuple[Array, Array], matrix: 
         along[column] = size[column]
         known[column] = _slope(problem, u, p, along)[0][row] / size[column]
     differs = np.abs(known - given) * size
-    if problem.jacobian is None:  # what stands beside a missing entry has its derivative, too
-        differs[given != 0] = 0.0
     column = int(np.argmax(differs))
     name = problem.state_names[column]
-    if problem.jacobian is None:
-        return _missing(problem, row, column)
     numbers = f"{given[column]:.6g}, must be {known[column]:.6g}"
     return f"jacobian: the derivative of equation {row} by {name} is {numbers} (by differences of the residual)"

@@ -115,8 +115,6 @@ class Batch:
         Names, in order.
     times : bool
         The functions take t; ``f(u, p)`` without.
-    pattern : pair of ndarray of int, optional
-        Values and inputs of the entries of the Jacobian, where they are known and the functions cannot be recorded.
 
     Warns
     -----
@@ -148,7 +146,6 @@ class Batch:
         *,
         ends: bool = False,
         times: bool = True,
-        pattern: tuple[Indices, Indices] | None = None,
     ) -> None:
         self.signature = Signature(tuple(states), tuple(parameters), times and not ends, ends)
         self.count = sum(max(count, 1) for count in counts)
@@ -165,7 +162,7 @@ class Batch:
         try:
             self.recording = checked(self._functions, self._counts, self.signature)
         except Unrecordable as reason:
-            self.interpreted = Interpreted(self._functions, self._counts, self.signature, str(reason), pattern)
+            self.interpreted = Interpreted(self._functions, self._counts, self.signature, str(reason))
 
     def sized(self, inputs: Array, values: Array) -> Batch:
         """Return the same functions of inputs u, v (with ``ends``) and p that are divided by sizes, as are the values.

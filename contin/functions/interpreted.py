@@ -1,7 +1,7 @@
 """Users' functions that cannot be recorded, evaluated in Python: values and derivatives in the place of a recording.
 
-A function that takes arrays of places instead of numbers is called once for all of them. Derivatives are taken with the complex
-step where that agrees with differences at a few places, else with differences whose error is estimated.
+A function that takes arrays of places instead of numbers is called once for all of them. Derivatives are differences with an
+estimated error.
 """
 
 from __future__ import annotations
@@ -19,13 +19,10 @@ from contin import checks
 from contin.arrays import Array, Function, Indices
 from contin.errors import InterpretedWarning, ProblemError
 from contin.functions import round_off
-from contin.functions.colouring import Colouring, SparsePattern, colouring
 from contin.functions.signature import Signature, named_values
 
 #: What names of this package's modules begin with.
 _PACKAGE = __name__.partition(".")[0] + "."
-#: The complex step: small enough that its square is nothing.
-_STEP = 1e-30
 #: First length of differences, relative to the size of an input, of first and of higher derivatives, which are differences of
 #: differences. Errors of fourth order and of round-off are below 1e-11, or 1e-8, where a function changes over such a size.
 _DIFFERENCE, _NESTED = 2e-4, 2e-3
@@ -47,10 +44,6 @@ _WEIGHTS = (8 / 12, -1 / 12)
 _PLACES = 3
 #: Their distance, relative to 1 + |x|.
 _ASIDE = 0.1
-#: Relative difference up to which the complex step agrees with differences.
-_AGREES = 1e-6
-#: With more inputs than this the ways are compared along as many random directions, not for each input.
-_MANY = 100
 
 
 class _Estimated(NamedTuple):
@@ -74,24 +67,15 @@ class Interpreted:
         Why the functions are not recorded.
     error : float
         Largest estimated error of a derivative so far, relative to the largest derivative at its place and to the values over
-        the sizes of the inputs; 0 with complex steps.
+        the sizes of the inputs.
     """
 
-    def __init__(
-        self,
-        functions: Sequence[Function],
-        counts: Sequence[int],
-        signature: Signature,
-        reason: str,
-        pattern: tuple[Indices, Indices] | None = None,
-    ) -> None:
+    def __init__(self, functions: Sequence[Function], counts: Sequence[int], signature: Signature, reason: str) -> None:
         self._functions, self._counts, self._signature, self.reason = tuple(functions), tuple(counts), signature, reason
         self._tuples = [None if names is None else named_values(tuple(names)) for names in signature.arguments]
         self._fills = [signature.fills(function) for function in self._functions]
         self._for_arrays: dict[int, bool] = {}
-        self._complex: bool | None = None
-        self._pattern = pattern
-        self._colourings: dict[tuple[int, ...], Colouring] = {}
+        self._said = False
         self._sizes: tuple[Array, Array] | None = None
         self.error = 0.0
 
@@ -108,29 +92,24 @@ class Interpreted:
     def jacobian(self, t: Array, u: Array, v: Array, p: Array, inputs: Indices) -> tuple[Array, Array]:
         """Return values and derivatives by ``inputs``, shape (places, count, inputs)."""
         x = self._joined(u, v, p)
-        jac, found = np.zeros((len(x), self._count, len(inputs))), self._coloured(inputs)
-        for group, rows, columns in self._groups(inputs, found):
-            jac[:, rows, columns] += self._slopes(t, x, group)[:, rows]
-        return self._values(t, x), jac
+        slopes = [self._along(t, x, [np.broadcast_to(unit, x.shape)]).values for unit in np.eye(x.shape[1])[inputs]]
+        if slopes and not self._said:
+            self._said = True
+            self._say()
+        return self._values(t, x), np.stack(slopes, axis=2) if slopes else np.zeros((len(x), self._count, 0))
 
     def entries(
         self, t: Array, u: Array, v: Array, p: Array, inputs: Indices, rows: Indices, places: Indices
     ) -> tuple[Array, Array]:
         """Return the values at one place, and the derivatives of the values ``rows`` by the inputs in the columns
         ``places``."""
-        x, starts = self._joined(u, v, p), np.zeros(len(rows))
-        at = {entry: number for number, entry in enumerate(zip(rows.tolist(), places.tolist()))}
-        for group, mine, columns in self._groups(inputs, self._coloured(inputs)):
-            slopes = self._slopes(t, x, group)[0, mine]
-            starts[[at[entry] for entry in zip(mine.tolist(), columns.tolist())]] = slopes
-        return self._values(t, x)[0], starts
+        values, jacobian = self.jacobian(t, u, v, p, inputs)
+        return values[0], jacobian[0, rows, places]
 
     def entries_of(self, inputs: Sequence[int]) -> tuple[Indices, Indices]:
-        """Return values and columns of the entries of the Jacobian that may differ from zero."""
-        found = self._coloured(np.array(inputs, dtype=np.int64))
-        rows, columns, _ = found.entries
-        order = np.lexsort((columns, rows))
-        return rows[order], columns[order]
+        """Return values and columns of the entries of the Jacobian, all of which may differ from zero."""
+        rows, columns = np.indices((self._count, len(inputs))).reshape(2, -1)
+        return rows, columns
 
     def along(self, t: Array, u: Array, v: Array, p: Array, directions: Sequence[Array]) -> Array:
         """Return the derivative of the values along directions, shape (places, count)."""
@@ -149,61 +128,22 @@ class Interpreted:
 
     def _say(self) -> None:
         names = " and ".join(self._name(index) for index in range(len(self._functions)))
-        how = "the complex step" if self._complex else f"differences (an estimated error of {self.error:.0e})"
+        how = f"differences (an estimated error of {self.error:.0e})"
         text = f"{names} is evaluated in Python, 10 to 1000 times as slow as recorded, with derivatives by {how}: {self.reason}"
         warnings.warn(text, InterpretedWarning, stacklevel=_users_level())
 
     # --- derivatives ---------------------------------------------------------------------------------------------
 
-    def _coloured(self, inputs: Indices) -> Colouring:
-        key = tuple(np.asarray(inputs).tolist())
-        if key not in self._colourings:
-            shape = self._count, self._signature.inputs
-            if self._pattern is not None:
-                depends: Any = SparsePattern.of_entries(*self._pattern, shape)
-            else:
-                depends = np.ones(shape, dtype=bool)
-            self._colourings[key] = colouring(depends, key)
-        return self._colourings[key]
-
-    def _groups(self, inputs: Indices, found: Colouring) -> list[tuple[Indices, Indices, Indices]]:
-        """Return inputs that are changed together, the values that depend on one of them, and its column."""
-        groups = []
-        for colour in range(len(found.owner)):
-            mine = np.flatnonzero(found.owner[colour] >= 0)
-            groups.append((found.inputs[found.inputs[colour] : found.inputs[colour + 1]], mine, found.owner[colour, mine]))
-        return groups
-
-    def _slopes(self, t: Array, x: Array, group: Indices) -> Array:
-        """Return the derivatives of all values by inputs that are changed together."""
-        first = self._complex is None
-        if first:
-            self._complex = self._takes_complex(t[:1], x[:1])
-        direction = np.zeros(x.shape)
-        direction[:, group] = 1.0
-        found = self._along(t, x, [direction]).values
-        if first:
-            self._say()
-        return found
-
     def _along(self, t: Array, x: Array, directions: Sequence[Array]) -> _Estimated:
-        """Return derivatives along directions: complex steps for the first one where they are right, differences for others."""
+        """Return derivatives along directions."""
         if not directions:
             return _rounded(self._values(t, x))
         *others, last = directions
-        if not others and self._complex:
-            return _rounded(self._complex_step(t, x, last))
 
         def inner(t: Array, x: Array, places: Indices) -> _Estimated:
             return self._along(t, x, [direction[places] for direction in others])
 
         return self._difference(inner, t, x, last, nested=bool(others))
-
-    def _complex_step(self, t: Array, x: Array, direction: Array) -> Array:
-        """Return the derivative along a direction from one evaluation with complex numbers."""
-        moved: Any = x + 1j * _STEP * direction
-        found: Array = self._values(t, moved).imag / _STEP
-        return found
 
     def _difference(
         self,
@@ -255,31 +195,10 @@ class Interpreted:
     def _count(self) -> int:
         return sum(max(count, 1) for count in self._counts)
 
-    def _takes_complex(self, t: Array, x: Array) -> bool:
-        """Return whether the complex step agrees with differences at this place and some beside it."""
-        places, agreed = _beside(x), 0
-        times = np.repeat(t, len(places))
-        try:
-            for unit in _directions(x.shape[1]):
-                direction = np.broadcast_to(unit, places.shape)
-                difference, _ = self._difference(lambda t, x, _: _rounded(self._values(t, x)), times, places, direction)
-                known = np.all(np.isfinite(difference), axis=1)
-                step = self._complex_step(times[known], places[known], direction[known])
-                scale = 1 + np.abs(difference[known])
-                if not np.all(np.abs(step - difference[known]) <= _AGREES * scale):
-                    self.error = 0.0
-                    return False
-                agreed += int(known.sum())
-        except Exception:  # a function for real numbers may raise anything
-            self.error = 0.0
-            return False
-        self.error = 0.0
-        return agreed > 0
-
     # --- values --------------------------------------------------------------------------------------------------
 
     def _values(self, t: Array, x: Array) -> Array:
-        """Return the values, shape (places, count), for real or complex inputs x (places, inputs)."""
+        """Return the values, shape (places, count), for inputs x (places, inputs)."""
         columns = []
         if self._sizes is not None:
             x = x * self._sizes[0]
@@ -289,12 +208,12 @@ class Interpreted:
                 columns.append(self._function_values(index, t, x))
         shapes = [(len(x), max(count, 1)) for count in self._counts]
         found = np.hstack([column.reshape(shape) for column, shape in zip(columns, shapes)])
-        if np.iscomplexobj(found) and not np.iscomplexobj(x):  # Python's (-1.0) ** 0.5 is complex: it has no real value
+        if np.iscomplexobj(found):  # Python's (-1.0) ** 0.5 is complex: it has no real value
             found = np.where(found.imag == 0, found.real, np.nan)
         if self._sizes is not None:
             found = found / self._sizes[1]
         if round_off.SEED:
-            found = np.array(found, dtype=complex if np.iscomplexobj(found) else float)
+            found = np.array(found, dtype=float)
             round_off.move(found)
         return found
 
@@ -362,16 +281,6 @@ class Interpreted:
         return result
 
 
-def _directions(count: int) -> Array:
-    """Return the directions in which derivatives are compared: every input or, of many, some mixtures of all."""
-    random = np.random.default_rng(5)
-    return (
-        np.eye(count)
-        if count <= _MANY
-        else random.uniform(0.5, 1.0, (_PLACES, count)) * random.choice([-1, 1], (_PLACES, count))
-    )
-
-
 def _users_level() -> int:
     """Return the number of calls from here up to code outside the package."""
     frame, level = sys._getframe(1), 1
@@ -381,8 +290,8 @@ def _users_level() -> int:
 
 
 def _beside(x: Array) -> Array:
-    """Return the place x (1, inputs) and some beside it, of the real parts."""
+    """Return the place x (1, inputs) and some beside it."""
     random = np.random.default_rng(7)
-    x = np.nan_to_num(x.real)
+    x = np.nan_to_num(x)
     aside = _ASIDE * (1 + np.abs(x)) * random.uniform(0.2, 1.0, (_PLACES, x.shape[1]))
     return np.vstack([x, x + aside])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import warnings
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array, Function, Indices
+from contin.arrays import Array, Function
 from contin.errors import ProblemError
 from contin.functions import round_off
 from contin.functions.batch import Batch
@@ -43,14 +44,11 @@ class AlgebraicProblem(Restated):
     jacobian : callable, optional
         ``jacobian(u, p)``, with the arguments of the residual, returns the derivatives by the states: an array (equations,
         states) or a sparse matrix of SciPy. It is called in Python. Derivatives by parameters are still found.
-    pattern : sparse matrix, array of bool, or pair of arrays, optional
-        Which equations depend on which states: a matrix (equations, states) whose entries that are not zero count, or the
-        numbers of equations and of states, from 0. It is found by tracing the residual otherwise.
     angles : sequence of str, or mapping of str to float, optional
         States in which the residual is periodic, with the period 2 pi or, in a mapping, any other. Solutions that differ by
         whole rounds are the same: a branch that comes back one round on is closed.
 
-    A Jacobian or pattern is compared with differences of the residual once, near the first solution.
+    A Jacobian is compared with differences of the residual once, near the first solution.
 
     Raises
     ------
@@ -86,7 +84,8 @@ class AlgebraicProblem(Restated):
         if self.jacobian is not None and argument_count(checks.function("jacobian", self.jacobian)) != 2:
             raise ProblemError("jacobian must take 2 arguments, (u, p)")
         if self.pattern is not None:
-            _ = self._sparsity  # checked
+            warnings.warn("pattern= has no effect any more, and will go: entries are found by recording, or give jacobian=",
+                          DeprecationWarning, stacklevel=3)  # fmt: skip
         if self.dynamics and self.equation_size != len(self.state_names):
             object.__setattr__(self, "dynamics", False)
         object.__setattr__(self, "angles", angle_periods(self.angles, self.state_names))
@@ -139,45 +138,15 @@ class AlgebraicProblem(Restated):
     def _compiled(self, name: str) -> Batch:
         u, p = self.state_names, tuple(self.parameters)
         if name == "residual":
-            return Batch([self.residual], [self._shape], u, p, times=False, pattern=self._sparsity)
+            return Batch([self.residual], [self._shape], u, p, times=False)
         functions = list(self.functionals.values())
         if any(result_count(f, self._signature.arguments, "a functional") for f in functions):
             raise ProblemError("functionals: each must be f(u, p) and return one number")
         return Batch(functions, [0] * len(functions), u, p, times=False)
 
     @functools.cached_property
-    def _sparsity(self) -> tuple[Indices, Indices] | None:
-        """The pattern of states and parameters, of which all equations may depend; None where none was given.
-
-        With a Jacobian only the derivatives by parameters are asked for.
-
-        Raises
-        ------
-        ProblemError
-            The pattern does not fit.
-        """
-        count, states, parameters = self.equation_size, len(self.state_names), len(self.parameters)
-        if self.pattern is None and self.jacobian is None:
-            return None
-        equations, inputs = self.entries
-        by_parameters = np.repeat(states + np.arange(parameters), count)
-        equations = np.concatenate([equations, np.tile(np.arange(count), parameters)])
-        return equations, np.concatenate([inputs, by_parameters])
-
-    @functools.cached_property
-    def entries(self) -> tuple[Indices, Indices]:
-        """Equations and states of the entries of the given pattern; none without one.
-
-        Raises
-        ------
-        ProblemError
-            The pattern does not fit.
-        """
-        return _entries(self.pattern, (self.equation_size, len(self.state_names)))
-
-    @functools.cached_property
     def compared(self) -> list[bool]:
-        """Holds an entry when the given Jacobian or pattern has been compared with differences."""
+        """Holds an entry when the given Jacobian has been compared with differences."""
         return []
 
     @functools.cached_property
@@ -217,33 +186,3 @@ class AlgebraicProblem(Restated):
             matrix = matrix.copy()
             round_off.move(matrix if isinstance(matrix, np.ndarray) else matrix.data)
         return matrix
-
-
-def _entries(pattern: Any, shape: tuple[int, int]) -> tuple[Indices, Indices]:
-    """Return equations and states of the entries of a user's pattern; none without one.
-
-    Raises
-    ------
-    ProblemError
-    """
-    if pattern is None:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    allowed = f"a matrix of shape {shape}, equations by states, or two arrays of their numbers from 0"
-    try:
-        if isinstance(pattern, tuple) and len(pattern) == 2:
-            given = [np.asarray(part).ravel() for part in pattern]
-            with np.errstate(invalid="ignore"):  # numbers that are not whole differ
-                equations, states = (part.astype(np.int64) for part in given)
-            fits = (
-                all(np.array_equal(*pair) for pair in zip(given, (equations, states)))
-                and equations.size == states.size
-                and bool(np.all((equations >= 0) & (equations < shape[0]) & (states >= 0) & (states < shape[1])))
-            )
-        else:
-            matrix = pattern if hasattr(pattern, "tocoo") else np.asarray(pattern, dtype=bool)
-            fits, (equations, states) = matrix.shape == shape, matrix.nonzero()
-    except (TypeError, ValueError, OverflowError):
-        fits = False
-    if not fits:
-        raise ProblemError(f"pattern: {checks.shown(pattern)} must be {allowed}")
-    return equations, states

@@ -21,7 +21,7 @@ class BoundaryValueProblem(Restated):
     """u' = rhs(t, u, p) on ``domain``, with conditions at both ends and under the integral.
 
     Every function is plain Python; ``u`` and ``p`` come as named tuples (``u.x``, ``p.mu``, ``x, y = u``). They are
-    compiled, and differentiated to round-off by the complex step (comparisons then decide on real parts).
+    recorded, and differentiated exactly (a comparison compares values; the derivative is that of the case that applies).
     A function with one argument more fills that array instead of returning a tuple, and gets arrays: the way for
     states too many to name. It then needs ``boundary_count`` or ``integral_count``.
 

@@ -73,8 +73,8 @@ def equations_of(system: Any) -> Equations | None:
         return None
     problem, is_map = system.problem, isinstance(system, MapSystem)
     batch = problem.batch("map") if is_map else system._residual
-    given = problem.jacobian is not None or problem.pattern is not None
-    if given or batch.interpreted is not None or getattr(system, "rounds", 1) != 1 or system.size != system.equations + 1:
+    recorded = problem.jacobian is None and batch.interpreted is None
+    if not recorded or getattr(system, "rounds", 1) != 1 or system.size != system.equations + 1:
         return None
     n, count, size = system.state_size, system.equations, system.size
     scales = system.scales

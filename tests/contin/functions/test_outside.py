@@ -83,7 +83,7 @@ def test_constants_that_change_between_runs_count():
 
 
 @pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
-def test_complex_numbers_of_the_user_are_no_complex_step():
+def test_complex_numbers_of_the_user_in_python():
     """|exp(i x)|^2 x = x, and Re((x + i y)^2) = x^2 - y^2, in Python, as ``try`` cannot be recorded."""
 
     def function(u, p):

@@ -1,4 +1,4 @@
-"""Jacobians and sparsity patterns that a user gives."""
+"""Jacobians that a user gives."""
 
 import numpy as np
 import pytest
@@ -37,10 +37,6 @@ def without_the_exponential(u, p):
     return sparse.diags_array([off, -2 * np.ones(len(u)), off], offsets=[-1, 0, 1])
 
 
-def tridiagonal(n):
-    return sparse.diags_array([np.ones(n - 1), np.ones(n), np.ones(n - 1)], offsets=[-1, 0, 1])
-
-
 def fold(n=SIZE, residual=bratu, **given):
     problem = AlgebraicProblem(residual, n, {"lam": 0.0}, count=n, dynamics=False, **given)
     branch = trace(solve(problem, [0.0] * n), free=["lam"], limits={"lam": (0, 4)}, max_points=12)
@@ -49,35 +45,31 @@ def fold(n=SIZE, residual=bratu, **given):
 
 @pytest.mark.parametrize("n", [SIZE, pytest.param(250, marks=pytest.mark.full)])
 def test_the_fold_is_the_same(n):
-    """Traced, with a pattern, and with a Jacobian, sparse and dense; from 200 states on the matrix is kept sparse."""
+    """Traced, and with a Jacobian, sparse and dense; from 200 states on the matrix is kept sparse."""
     expected = fold(n)
-    rows, columns = tridiagonal(n).nonzero()
-    for given in (
-        {"pattern": tridiagonal(n)},
-        {"pattern": (rows, columns)},
-        {"jacobian": derivatives},
-        {"jacobian": lambda u, p: derivatives(u, p).toarray()},
-    ):
-        found = fold(n, **given)
+    for given in (derivatives, lambda u, p: derivatives(u, p).toarray()):
+        found = fold(n, jacobian=given)
         assert found["lam"] == pytest.approx(expected["lam"], abs=1e-11)
     assert fold(n, jacobian=derivatives).system.is_sparse == (n == 250)
 
 
 @pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
-def test_a_function_in_python_is_called_once_for_each_colour_or_not_at_all():
-    """For the values, the three colours of the pattern, and the parameter; the first calls compare with differences."""
-    counts = {}
-    for name, given in (("pattern", {"pattern": tridiagonal(150)}), ("jacobian", {"jacobian": derivatives})):
-        model = Counted()
-        problem = AlgebraicProblem(model.residual, 150, {"lam": 1.0}, count=150, dynamics=False, **given)
-        point = solve(problem, [0.0] * 150)
-        system, x = point.system.with_free(["lam"], point.x)
-        border = np.eye(system.size)[-1:]
-        system.linearize(x, border)
-        model.calls = 0
-        system.linearize(x, border)
-        counts[name] = model.calls
-    assert counts == {"pattern": 1 + 3 + 1, "jacobian": 1 + 1}
+def test_a_function_in_python_is_hardly_called_beside_its_jacobian():
+    """For the values, and four times at least for the difference by the parameter; the first calls compare with differences."""
+    model = Counted()
+    problem = AlgebraicProblem(model.residual, 150, {"lam": 1.0}, count=150, dynamics=False, jacobian=derivatives)
+    point = solve(problem, [0.0] * 150)
+    system, x = point.system.with_free(["lam"], point.x)
+    border = np.eye(system.size)[-1:]
+    system.linearize(x, border)
+    model.calls = 0
+    system.linearize(x, border)
+    assert 5 <= model.calls <= 9
+
+
+def test_a_pattern_has_no_effect_any_more():
+    with pytest.warns(DeprecationWarning, match="pattern= has no effect"):
+        AlgebraicProblem(bratu, SIZE, {"lam": 1.0}, count=SIZE, dynamics=False, pattern=np.eye(SIZE))
 
 
 def test_named_states_scales_and_a_curve_of_folds():
@@ -105,17 +97,8 @@ def test_wrong_ones_are_refused():
         ProblemError, match=r"jacobian: the derivative of equation \d+ by u\d+ is -2, must be -1.99.* \(by differences"
     ):
         fold_at_one(jacobian=without_the_exponential)
-    diagonal = sparse.eye_array(SIZE)
-    with pytest.raises(
-        ProblemError, match=r"pattern: equation (\d+) depends on u\d+, so the pattern must have the entry \(\1, \d+\)"
-    ):
-        fold(pattern=diagonal)
     with pytest.raises(ProblemError, match=r"jacobian: its shape \(2, 2\) must be \(30, 30\), equations by states"):
         fold(jacobian=lambda u, p: np.eye(2))
-    with pytest.raises(
-        ProblemError, match=r"pattern: .* must be a matrix of shape \(30, 30\), equations by states, or two arrays"
-    ):
-        fold(pattern=np.eye(3))
     with pytest.raises(ProblemError, match="jacobian must take 2 arguments"):
         fold(jacobian=lambda u: u)
     with pytest.raises(ProblemError, match="jacobian: None must be a matrix of numbers|jacobian: its shape"):
