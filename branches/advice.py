@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 from collections.abc import Callable, Iterator
 
-from contin import Collocation, ContinError, Continuation, Point, Settings, State, Stop, exact_text
+from contin import Collocation, ContinError, Continuation, Point, Reason, Settings, State, Stop, exact_text
 
 #: Points that a run must find with a changed field before that change is advised. With 1, changes were advised that help for
 #: one step only; with 100, a failed run takes as long again as a stage.
@@ -36,9 +36,9 @@ def no_state(run: Continuation, place: str) -> Stop:
     for field, state, settings in _changes(run):
         if _goes_on(state, settings):
             message = f"no state was found beyond {place} with steps down to {step}"
-            return Stop("no convergence", message, f"the run goes on with {field}")
+            return Stop(Reason.NO_CONVERGENCE, message, f"the run goes on with {field}")
     return Stop(
-        "no convergence", f"no state was found beyond {place}: neither smaller steps nor a finer mesh go on from there",
+        Reason.NO_CONVERGENCE, f"no state was found beyond {place}: neither smaller steps nor a finer mesh go on from there",
         "its last state shows where the strip bends or twists most; another law may go on",
     )  # fmt: skip
 
@@ -70,13 +70,13 @@ def _goes_on(state: State, settings: Settings) -> bool:
         trial = dataclasses.replace(settings, max_points=state.accepted + _POINTS, errors=False)
         run = Continuation(state.system, state.x, trial, state=state, start=start)
         count = sum(not point.label for point in run)
-        return run.stop is not None and run.stop.reason != "no convergence" and count > 0
+        return run.stop is not None and run.stop.reason != Reason.NO_CONVERGENCE and count > 0
     return False
 
 
 def reached(stop: Stop, last: Point, run: Continuation, shown: Callable[[str, float], str]) -> Stop:
     """Return the stop of a run at a limit, with the value in the words of ``shown(name, value)``; others as they are."""
-    if stop.reason != "limit":
+    if stop.reason != Reason.LIMIT:
         return stop
     for name, ends in run.settings.limits.items():
         end = min(ends, key=lambda end: abs(end - last[name]))

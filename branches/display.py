@@ -115,13 +115,15 @@ class Display:
 
     def summary(self, config, events, count: int, seconds: float, path, outcome: str, stop) -> None:
         """What came out, in lines to quote; ``events`` are rows of the result's table of labelled points."""
+        from contin import Reason  # loaded by then
+
         self.clear()
         lines = [] if self._quiet else [""]
         lines.append(f"{name_of(config)}: {count} points in {seconds:.2f} s")
         lines += [f"  {_describe(config, event)}" for event in events]
         if outcome == "interrupted":
             lines.append(f"  interrupted; go on with --resume --out {shlex.quote(str(path))}")
-        elif stop is not None and stop.reason != "trivial branch":
+        elif stop is not None and stop.reason != Reason.TRIVIAL_BRANCH:
             lines.append(f"  stopped: {stop}")
         self.note("\n".join([*lines, f"  written to {path}"]))
 

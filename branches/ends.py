@@ -9,7 +9,7 @@ import numpy as np
 
 from branches.advice import no_state
 from branches.config import Config
-from contin import Continuation, Point, Stop
+from contin import Continuation, Point, Reason, Stop
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import covering, thresholds
@@ -36,7 +36,7 @@ def checked(point: Point, run: Continuation, config: Config) -> Point:
     if is_threshold(config, index, point["kappa_n"], point.errors.get("kappa_n", math.nan)):
         return point
     run.stop = Stop(
-        "no convergence",
+        Reason.NO_CONVERGENCE,
         f"M2 = 0 at kappa_n = {point['kappa_n']:.10g}, where the mode n = {config.n} has no bifurcation of the "
         f"{abs(index)}-covered circle",
         "smaller steps may help (steps.largest)",
@@ -60,7 +60,7 @@ def is_threshold(config: Config, index: int, kappa_n: float, error: float) -> bo
 def _explained(run: Continuation, config: Config) -> Stop | None:
     """Return why a run failed: the end of the law, or that no state was found, with what to change."""
     margin, state, stop = convexity.margin(LAWS[config.law]), run.state, run.stop
-    if stop is None or stop.reason != "no convergence":
+    if stop is None or stop.reason != Reason.NO_CONVERGENCE:
         return stop
     value = Solution.at(state.system, state.x).parameters["kappa_n"]
     finite = np.all(np.isfinite(state.system.residual(run.predicted(run.settings.min_step))))
@@ -68,7 +68,7 @@ def _explained(run: Continuation, config: Config) -> Stop | None:
     if left > _NEARLY_CONVEX:
         return no_state(run, f"kappa_n = {value:.6g}")
     return Stop(
-        "no convergence",
+        Reason.NO_CONVERGENCE,
         f"the law has no response beyond kappa_n = {value:.6g}: its strain energy loses its convexity close by "
         f"(det D2U / (U_11 U_33) has fallen to {left:.2g})",
     )

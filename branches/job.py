@@ -16,7 +16,7 @@ from branches.ends import checked
 from branches.files import StoreError, only_run, prepare
 from branches.start import UntilPrimary, seed, settings_of
 from branches.store import BranchWriter, open_branch, read_state
-from contin import Continuation, Stop, exact_text
+from contin import Continuation, Reason, Stop, exact_text
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 
@@ -106,7 +106,7 @@ def _run_branch(config: Config, path: Path, display, resume: bool, overwrite: bo
 
 def _shown(stop: Stop | None) -> Stop | None:
     """Return why a run ended as people are told: a limit is one that the scene sets, not one of the strip."""
-    if stop is None or stop.reason != "limit":
+    if stop is None or stop.reason != Reason.LIMIT:
         return stop
     return dataclasses.replace(stop, message=f"{stop.message}, the scene's own limit")
 
@@ -135,7 +135,7 @@ def compute_branch(config: Config, display) -> Computed:
     run, watch = begun(config)
     with contextlib.closing(_writer(None, config, run, watch)) as writer:
         outcome = _follow(config, run, writer, display, Interruption(()))
-        stop = run.stop.reason if run.stop else ""
+        stop = str(run.stop.reason) if run.stop else ""
         tables = writer.points(), writer.events()
         return Computed(writer.image(), outcome, str(run.stop or ""), stop, config.model_dump(), *tables)
 
@@ -205,7 +205,7 @@ def _follow(config: Config, run: Continuation, writer: BranchWriter, display, in
             if writer.due():
                 writer.checkpoint(run.start, "running")
         writer.note(run.notes)
-        outcome = "lost" if run.stop.reason == "no convergence" else "complete"
+        outcome = "lost" if run.stop.reason == Reason.NO_CONVERGENCE else "complete"
         writer.checkpoint(run.start, outcome, run.stop)
     return outcome
 

@@ -35,6 +35,7 @@ from contin import (
     MeshControl,
     Point,
     ProblemError,
+    Reason,
     Settings,
     Stop,
     exact_text,
@@ -313,7 +314,7 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
     writer.flush()
     writer.note(_notes(config, number, run))
     stop = _told(config, number, run, labelled[-1][-1])
-    if stop.reason in ("no convergence", "event"):
+    if stop.reason in (Reason.NO_CONVERGENCE, Reason.EVENT):
         stop = dataclasses.replace(stop, message=f"stage {number}: {stop.message}")
         writer.checkpoint(run.start, "lost", stop)
         return "lost", stop
@@ -324,10 +325,10 @@ def _through(config: OpenConfig, run: Continuation, labelled, writer: BranchWrit
 def _told(config: OpenConfig, number: int, run: Continuation, last: Point) -> Stop:
     """Return why a stage ended, in the fields and units of the scene."""
     name = config.stages[number - 1].follow
-    law = config.strip(number).explained(run) if run.stop.reason in ("no convergence", "event") else None
+    law = config.strip(number).explained(run) if run.stop.reason in (Reason.NO_CONVERGENCE, Reason.EVENT) else None
     if law is not None:
         return Stop(run.stop.reason, law)
-    if run.stop.reason == "no convergence":
+    if run.stop.reason == Reason.NO_CONVERGENCE:
         here = run.state.system.parameter(run.state.x, name)
         here = without_round_off(here, max(map(abs, run.settings.limits[name])))
         return no_state(run, _shown(config, name, here))

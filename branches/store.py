@@ -235,7 +235,7 @@ class BranchWriter:
         self.flush()
         self._file.attrs["status"] = status
         self._file.attrs["stop"] = str(stop or "")
-        self._file.attrs["stop_reason"] = stop.reason if stop else ""
+        self._file.attrs["stop_reason"] = str(stop.reason) if stop else ""
         self._file.attrs["notes"] = "\n".join(self.notes)
         if self._mark is not None:
             self._write_state(*self._mark, start)

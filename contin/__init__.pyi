@@ -36,7 +36,7 @@ from .results.point import Point, point_of
 from .results.storage import load, save
 from .stepping.newton import Newton, correct
 from .stepping.settings import Settings
-from .stepping.state import State, Stop
+from .stepping.state import Reason, State, Stop
 from .stepping.trial import Monitor, TestFunction, Trial
 
 __version__: str
@@ -45,7 +45,7 @@ __all__ = [
     "Algebraic", "AlgebraicProblem", "AutoBranch", "AutoSolution", "Batch", "BoundaryValueProblem", "Branch", "BranchPoint",
     "Collocation", "ConnectionProblem", "ContinError", "Continuation", "ConvergenceError", "CycleProblem", "Diagram",
     "MapProblem", "MeshControl", "Monitor", "MultiplePoint", "Newton", "Point", "ProblemError", "Segment",
-    "SegmentedProblem", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem",
+    "Reason", "SegmentedProblem", "Settings", "State", "Stop", "StoredColumns", "TestFunction", "Trial", "VariationalProblem",
     "basis", "cache_directory", "correct", "curve", "cycle", "diagram", "eigenbasis", "exact_text", "follow", "from_auto",
     "gradient", "homoclinic", "interpolation", "least", "load", "locate_branch_point", "minimum", "point_of", "read_auto",
     "read_columns",

@@ -53,7 +53,7 @@ def tests(material: Material, strains: Strains) -> list[TestFunction]:
 def explained(material: Material, strains: Strains, run: Continuation) -> str | None:
     """Return that a run met the end of the law, or failed near it, in a sentence; None for a run that stopped elsewhere."""
     for test in tests(material, strains):
-        state, met = run.state, run.stop is not None and run.stop.message == f"met {test.name}"
+        state, met = run.state, run.stop is not None and run.stop.event == test.name
         if met or test.function(Trial.without_tangent(state.system, state.x)) < _NEARLY_ENDED:
             return f"{test.name}, {_REASONS[material.law]}"
     return None

@@ -31,7 +31,7 @@ from contin.results import plot
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of
 from contin.stepping.settings import Options, Settings, settings_with
-from contin.stepping.state import Stop
+from contin.stepping.state import Reason, Stop
 
 Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -239,7 +239,7 @@ class _Explorer:
             if place == 0 and origin is not None:
                 origin.also.append(point)
             elif self._is_known(point, number, depth) and run.stop is None:
-                branch.stop = Stop("known branch", "came to a branch that was followed before")
+                branch.stop = Stop(Reason.KNOWN_BRANCH, "came to a branch that was followed before")
                 break
         branch.stop, branch.notes = branch.stop or run.stop, run.notes
 

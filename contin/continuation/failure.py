@@ -12,7 +12,7 @@ from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
 from contin.names import exact_text
 from contin.stepping.settings import Settings
-from contin.stepping.state import State, Stop
+from contin.stepping.state import Reason, State, Stop
 from contin.stepping.step import aims, corrected, judged, predict
 from contin.stepping.trial import TestFunction, Trial
 
@@ -40,7 +40,7 @@ def met(ends: Sequence[TestFunction], here: Trial, first: Trial) -> Stop | None:
     """Return the reason to stop where the domain of the equations ends: a test function that ends runs is nearly zero."""
     for test in ends:
         if abs(here.value(test)) < _NEARLY * abs(first.value(test)):
-            return Stop("event", f"met {test.name}")
+            return Stop(Reason.EVENT, f"met {test.name}", event=test.name)
     return None
 
 
@@ -49,17 +49,17 @@ def no_convergence(state: State, settings: Settings, error: ConvergenceError) ->
     least = exact_text(settings.min_step)
     if not np.isfinite(state.system.residual(predict(state, settings.min_step))).all():
         return Stop(
-            "no convergence", f"the equations have no finite value a step of min_step = {least} further on",
+            Reason.NO_CONVERGENCE, f"the equations have no finite value a step of min_step = {least} further on",
             "look for what they divide by, or take a root or logarithm of: their domain ends there",
         )  # fmt: skip
     known = advice(state, settings)
     if not known and _meets_corner(state):
         return Stop(
-            "no convergence", f"the derivatives of the equations jump a step of min_step = {least} further on",
+            Reason.NO_CONVERGENCE, f"the derivatives of the equations jump a step of min_step = {least} further on",
             "abs, max, min, if and tables have corners; a smooth form such as sqrt(x**2 + d**2) for abs(x) can be followed",
         )  # fmt: skip
     return Stop(
-        "no convergence", f"the step became smaller than min_step = {least} ({error})", known or _as_it_is(state, settings)
+        Reason.NO_CONVERGENCE, f"the step became smaller than min_step = {least} ({error})", known or _as_it_is(state, settings)
     )
 
 

@@ -29,7 +29,7 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
     """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
     if not found.label:
         return found  # a regular point
-    labelled = found.label != "MX" and found.name != "closed"  # closed: the first point once more
+    labelled = found.label != "MX" and not found.closes
     first, coarse = found.trial, own_normal_form(found.trial.system, found)
     if found.errors is None and labelled and settings.errors:
         again = refined(found.same_as or found, settings)
@@ -49,7 +49,7 @@ def is_confirmed(point: SpecialPoint, segment: Segment, notes: Notes) -> bool:
     Others are noted: they get no label. The end of a run keeps its own. So does a point whose errors are not known because
     Newton's method fails on the finer mesh; that is noted.
     """
-    what = f"{point.label} {point.name.removeprefix('possible').strip()}".strip()
+    what = f"{point.label} {point.name}".strip()
     unknown = point.label in _CONFIRMED and any(np.isnan(error) for error in (point.errors or {}).values())
     if point.stop is not None or (point.is_located and not (unknown and point.is_lost)):
         if point.stop is None and unknown:
@@ -76,6 +76,6 @@ def index_changes(
     for group, (before, after), pair in zip(groups, itertools.pairwise(values), itertools.pairwise(whole)):
         changes += [pair if nullity_of(point) else None for point in group]
         if abs(after - before) > sum(map(nullity_of, group)) or (group[0].label == "LP" and after == before):
-            name = f"{group[0].label} {group[0].name}".strip()
+            name = f"{group[0].label} {group[0].full_name}".strip()
             notes.add(f"the index goes from {before:g} to {after:g} at {name} ({notes.place(group[0].trial)})")
     return changes

@@ -18,7 +18,7 @@ from contin.names import value_names
 from contin.stepping.newton import Newton, correct
 from contin.stepping.settings import Settings
 from contin.stepping.settling import ROUNDS
-from contin.stepping.state import State, Stop, standing_at
+from contin.stepping.state import Reason, State, Stop, standing_at
 from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
 
 #: A start this far outside a limit (relative to 1 + its size) still lies on it: it was located there, to round-off.
@@ -132,9 +132,9 @@ def begins_outside(trial: Trial, settings: Settings, own: Sequence[TestFunction]
         size = min(1.0, high - low)
         if not low - _SLACK * (size + abs(low)) <= trial[name] <= high + _SLACK * (size + abs(high)):
             ends = " ... ".join(value_names((low, high)).values())
-            return Stop("limit", f"{name} = {trial[name]:.10g} at the start lies outside {ends}")
+            return Stop(Reason.LIMIT, f"{name} = {trial[name]:.10g} at the start lies outside {ends}")
     beside = Trial.without_tangent(trial.system, trial.x + _ENTERS * trial.tangent)
     for test in own:
         if test.terminal and trial.value(test) < 0 and (singular or not test.function(beside) > 0):
-            return Stop("event", f"{test.name} at the first point")
+            return Stop(Reason.EVENT, f"{test.name} at the first point")
     return None

@@ -12,7 +12,7 @@ from contin.continuation.run import Continuation
 from contin.errors import ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point
-from contin.stepping.state import Stop
+from contin.stepping.state import Reason, Stop
 
 #: Seconds before a line is shown, and between two of them: calls that are done at once show none, and the terminal is not
 #: flooded.
@@ -88,9 +88,9 @@ def follow_until_interrupted(run: Continuation, progress: Progress) -> Branch:
     except KeyboardInterrupt:
         if not branch.points:
             raise
-        run.stop = Stop("interrupted", f"interrupted after {len(branch.points)} points", "trace from the last one goes on")
+        run.stop = Stop(Reason.INTERRUPTED, f"interrupted after {len(branch.points)} points", "trace from the last one goes on")
         print(f"contin: {run.stop}", file=sys.stderr)
     branch.stop, branch.notes = run.stop, run.notes
-    if len(branch.points) == 1 and branch.stop is not None and branch.stop.reason == "limit":
+    if len(branch.points) == 1 and branch.stop is not None and branch.stop.reason == Reason.LIMIT:
         raise ProblemError(f"limits: {branch.stop.message}; widen them, or start inside them")
     return branch

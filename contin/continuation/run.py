@@ -49,7 +49,7 @@ from contin.names import exact_text
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.stepping.settings import Settings, check
-from contin.stepping.state import State, Stop
+from contin.stepping.state import Reason, State, Stop
 from contin.stepping.step import Judgement, predict, up_to_limits
 from contin.stepping.trial import Linearization, Trial
 
@@ -271,10 +271,10 @@ class Continuation:
             here, first = self._here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
             failed = met(self._ends, here, first) or no_convergence(self.state, self.settings, error)
             stop = own_stop(self.state.system, here, failed)
-            if stop.reason == "no convergence" and self._takes_shorter_steps():
+            if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
                 return
             self.stop = stop
-            label, name = ("EP", stop.message.removeprefix("met ")) if stop.reason == "event" else ("MX", "no convergence")
+            label, name = ("EP", stop.event) if stop.event else ("MX", "no convergence")
             yield self._point(SpecialPoint(0.0, label, name, here), self.state, accuracy=self._accuracy)
             return
         segment, special = step.segment, [own_end(step.segment.trial.system, point) for point in step.special]
@@ -296,13 +296,13 @@ class Continuation:
         self._notes.corners(step.end)
         self._notes.noise(segment, max(self.settings.newton.tolerance, NOISY))
         if self.state.accepted >= self.settings.max_points:
-            self.stop = Stop("max points", f"max_points = {self.settings.max_points} reached", "raise it to go on")
+            self.stop = Stop(Reason.MAX_POINTS, f"max_points = {self.settings.max_points} reached", "raise it to go on")
         elif self._steps.fold is not None and self.state.accepted == _STANDING and not self.state.sense:
             self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
             if self.stop is None and not segment.trial.system.intervals:
                 place = f"{self.primary} stays at {segment.trial[self.primary]:.10g}, as far as can be told"
                 self._notes.add(f"{place}: a vertical family, as of a linear or conservative system; folds are not told there")
-        label, name = ("EP", self.stop.reason) if self.stop else ("", "")
+        label, name = ("EP", str(self.stop.reason)) if self.stop else ("", "")
         found_at_end = located_again(SpecialPoint(segment.step, label, name, step.end), self.settings)
         yield self._point(found_at_end, segment.state, accuracy=self._accuracy)
 
@@ -404,7 +404,7 @@ class Continuation:
         """Return the point of a branch; its accuracy is estimated where it is not known."""
         trial, system = found.trial, found.trial.system
         parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
-        if accuracy is None and found.name != "closed" and np.isfinite(trial.tangent).all():
+        if accuracy is None and not found.closes and np.isfinite(trial.tangent).all():
             accuracy = accuracy_of(trial)
         elif accuracy is None:  # at a branch point the equations are singular; the end of the step is on no finer mesh
             accuracy = self._accuracy
@@ -414,7 +414,7 @@ class Continuation:
         if found.label:
             self._notes.phases(found, accuracy.error)
         return Point(
-            found.label, found.name, parameters, trial.functionals, trial.x, trial.tangent, system,
+            found.label, found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system,
             state.arclength + found.at, trial.iterations, trial.newton_error, found.errors or {}, found.details,
             stability.index, stability.nullity, change, stability.breaks,
             *(("", None) if found.test is None else (found.test.column, found.test.value)), accuracy.error,

@@ -29,7 +29,7 @@ from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.maps import MapSystem
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
-from contin.stepping.state import Stop
+from contin.stepping.state import Reason, Stop
 from contin.stepping.trial import TestFunction, Trial
 
 #: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
@@ -178,7 +178,7 @@ def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
     system = segment.state.system
     stop = None
     if turns_back(found.trial, [system.state_size, system.size - 1]):
-        stop = Stop("pitchfork", "the folds end on a pitchfork: beyond it the curve is its own mirror image")
+        stop = Stop(Reason.PITCHFORK, "the folds end on a pitchfork: beyond it the curve is its own mirror image")
     return [SpecialPoint(found.at, _MEETS.label, _MEETS.name, found.trial, stop, found, _MEETS)]
 
 

@@ -26,7 +26,7 @@ from contin.curves.fold_curve import normal_product, turns_back
 from contin.detection.interpolated import interpolated_zero
 from contin.detection.lyapunov import Coefficient
 from contin.detection.segment import Segment, SpecialPoint
-from contin.stepping.state import Stop
+from contin.stepping.state import Reason, Stop
 from contin.stepping.trial import TestFunction, Trial
 
 #: Cosines of the angles at strong resonances.
@@ -173,7 +173,7 @@ def _touched(segment: Segment, test: TestFunction, distance: Callable[[Trial], f
         return None
     stop = None
     if turns_back(found.trial, slice(segment.state.system.state_size, None)):
-        stop = Stop("pitchfork", f"met {test.name} on a symmetric cycle: beyond it the curve is its own mirror image")
+        stop = Stop(Reason.PITCHFORK, f"met {test.name} on a symmetric cycle: beyond it the curve is its own mirror image")
     return [SpecialPoint(found.at, test.label, test.name, found.trial, stop, found, test)]
 
 

@@ -33,7 +33,7 @@ _GAP = 1e-2
 #: The same without a mesh, where branches that cross are parted by the root of round-off, 1e-8, or of the last digits of data:
 #: ten digits part them by 1e-5. At 1e-2, cycles of maps of period 32 were "branch points" with residuals of 1e-2.
 _GAP_WITHOUT_MESH = 1e-5
-#: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is "possible".
+#: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is not located.
 _HALVINGS = 12
 #: The smallest singular value is smaller by far than the next one if their quotient is above this. In layers whose steps were
 #: divided it is 77 and more; three times larger, the first of these are divided again.
@@ -139,7 +139,7 @@ class BranchPointSearch:
                 break
             low, high = (middle, high) if sign == segment.before.sign else (low, middle)
             middle = (low + high) / 2
-        return SpecialPoint(high, "BP", "possible", trial)
+        return SpecialPoint(high, "BP", "", trial, is_located=False)
 
     @functools.cached_property
     def multiple(self) -> SpecialPoint:
@@ -157,7 +157,7 @@ class BranchPointSearch:
                     return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
         kernel = smallest_directions(segment.trial.factors, state.system.size, count + 1)[0][:count]
         kernel = canonical_basis(kernel, state.system.weights)
-        return SpecialPoint(step, "BP", "possible", segment.trial, details=MultiplePoint(count, kernel))
+        return SpecialPoint(step, "BP", "", segment.trial, details=MultiplePoint(count, kernel), is_located=False)
 
     def _apart(self, middle: float) -> bool:
         """Return whether the singular values pass zero at different places, as seen from halfway between the expected ones.

@@ -358,13 +358,13 @@ def _unstable(trial: Trial) -> int:
 
 
 def _doubtful(point: SpecialPoint) -> SpecialPoint:
-    """Return a special point, named "possible" where the multiplier that is 1 has such an error that others mean little."""
+    """Return a special point, as not located where the multiplier that is 1 has such an error that others mean little."""
     system: Any = point.trial.system
     trivial = _trivial(system, point.trial.x)
     if trivial is None or not point.is_located:
         return point
     error = abs(np.expm1(system.eigenvalues(point.trial.x)[trivial]))
-    return dataclasses.replace(point, name=f"possible {point.name}") if error > _MEANINGLESS else point
+    return dataclasses.replace(point, is_located=error <= _MEANINGLESS)
 
 
 def _passes(segment: Segment, point: SpecialPoint) -> bool:

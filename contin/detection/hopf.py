@@ -222,7 +222,7 @@ def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[Sp
 def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint | None:
     """Return the place where the real part of an eigenvalue vanishes that has these values at two places.
 
-    The second place, named "possible", where that fails; None where the pair turns out to be real.
+    The second place, not located, where that fails; None where the pair turns out to be real.
     """
     (a, b), (first, last) = (left[0], right[0]), pair
 
@@ -232,12 +232,12 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
             raise ConvergenceError("no eigenvalue is known there")
         return found
 
-    lost = ""
+    is_located = True
     try:
         at = find_zero(real_part, (a, first.real), (b, last.real), segment.precision)
         there = segment.at(at)
     except ConvergenceError:
-        (at, there), lost = right, "possible "
+        (at, there), is_located = right, False
     values = _upper(there)
     if not values.size:
         return None
@@ -249,9 +249,10 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
         return None
     label, name = crossing
     test = _nearest(1j * frequency)
-    if not lost and 0.0 in (first.real, last.real) and not passes(segment, at, frequency):
+    if is_located and 0.0 in (first.real, last.real) and not passes(segment, at, frequency):
         return None  # the pair lies on the axis before
-    return SpecialPoint(at, label, lost + name, there, None, {"frequency": frequency, "pairs": 1}, test)
+    details = {"frequency": frequency, "pairs": 1}
+    return SpecialPoint(at, label, name, there, None, details, test, is_located=is_located)
 
 
 def passes(segment: Segment, at: float, frequency: float) -> bool:

@@ -25,7 +25,7 @@ from contin.discretization.cycles import CycleCollocation
 from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.problems.cycle import PERIOD
-from contin.stepping.state import Stop
+from contin.stepping.state import Reason, Stop
 from contin.stepping.trial import TestFunction, Trial
 
 #: Smallest size of a cycle as a part of that before the step. A branch that ends at a Hopf point is this near to it at the end
@@ -72,7 +72,7 @@ def _of_cycles(system: CycleCollocation, segment: Segment) -> SpecialPoint | Non
         return None
     if not segment.passes_by(x, at):
         return None
-    stop = Stop("Hopf", "the cycles shrink onto an equilibrium, a Hopf point")
+    stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
     there, details = Trial.without_tangent(system, x), {"frequency": frequency, "pairs": 1}
     sizes = dict(zip(system.free, map(float, error * system.free_scales)))
     return SpecialPoint(at, "HB", "Hopf", there, stop, details, errors=sizes)

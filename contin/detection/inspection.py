@@ -25,7 +25,7 @@ from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
 from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
 from contin.stepping.settings import Settings
-from contin.stepping.state import Stop
+from contin.stepping.state import Reason, Stop
 from contin.stepping.trial import Linearization, TestFunction, Trial
 
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
@@ -300,7 +300,7 @@ class Inspection:
 
     @functools.cached_property
     def _trivial_end(self) -> SpecialPoint | None:
-        """The end of a branch on the trivial one, where ``settings.trivial`` crosses zero; "possible" without a zero there.
+        """The end of a branch on the trivial one, where ``settings.trivial`` crosses zero; not located without a zero there.
 
         It is the branch point inside the step if the quantity is zero there, else the quantity's zero. Either must lie on the
         cubic through both ends of the step: elsewhere it belongs to another branch.
@@ -309,7 +309,7 @@ class Inspection:
         before, trial = segment.before, segment.trial
         if name is None or not crossed(before, trial, name, segment.newton):
             return None
-        stop = Stop("trivial branch", f"returned to the trivial branch ({name} = 0)")
+        stop = Stop(Reason.TRIVIAL_BRANCH, f"returned to the trivial branch ({name} = 0)")
         if not self.settings.branch_points or self.branch_points.sign_changes:
             point = self.branch_points.simple
             if self._is_home(point):
@@ -318,8 +318,8 @@ class Inspection:
         point = segment.locate(test, (segment.low, before), (segment.step, trial))
         if self._is_home(point):
             return dataclasses.replace(point, stop=stop)
-        stop = Stop("no convergence", f"{name} changed its sign, but no zero of it was found on the branch", _ADVICE)
-        return SpecialPoint(segment.step, "MX", "possible trivial branch", trial, stop)
+        stop = Stop(Reason.NO_CONVERGENCE, f"{name} changed its sign, but no zero of it was found on the branch", _ADVICE)
+        return SpecialPoint(segment.step, "MX", "trivial branch", trial, stop, is_located=False)
 
     def _is_home(self, point: SpecialPoint) -> bool:
         """Return whether the trivial quantity vanishes at a point on the branch."""
@@ -363,7 +363,7 @@ class Inspection:
         if np.sqrt(inner(state.system, off, off)) > _BACK * step:
             return None
         there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
-        return SpecialPoint(at, "EP", "closed", there, Stop("closed", "the branch closed on its first point"))
+        return SpecialPoint(at, "EP", "closed", there, Stop(Reason.CLOSED, "the branch closed on its first point"))
 
     def _same_place(self, fold: SpecialPoint, found: list[SpecialPoint]) -> bool:
         """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.

@@ -145,7 +145,7 @@ class Stability:
 
 def nullity_of(point: SpecialPoint) -> int:
     """Return the dimension of the kernel at a point: 1 at a fold, 1 or more at a branch point, else 0."""
-    if point.label not in ("LP", "BP", "CP") and point.name != "trivial branch":
+    if point.label not in ("LP", "BP", "CP") and not point.is_trivial:
         return 0
     return int(getattr(point.details, "dimension", 1))
 

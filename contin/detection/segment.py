@@ -17,7 +17,7 @@ from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton, correct
 from contin.stepping.settling import settled
 from contin.stepping.small import corrected_small
-from contin.stepping.state import State, Stop
+from contin.stepping.state import Reason, State, Stop
 from contin.stepping.step import located
 from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
 
@@ -44,7 +44,7 @@ class SpecialPoint:
     at : float
         Distance from the beginning of the step, along the tangent there.
     label, name : str
-        As in `TestFunction`; the name begins with "possible" where the location failed.
+        As in `TestFunction`.
     trial : Trial
     stop : Stop, optional
         The run ends here.
@@ -58,6 +58,8 @@ class SpecialPoint:
         Errors of the free parameters, where they are known from how the point was found.
     is_lost : bool
         It was looked for on a finer mesh, and is not there.
+    is_located : bool
+        It was found, and not only bracketed.
     """
 
     at: float
@@ -70,16 +72,27 @@ class SpecialPoint:
     same_as: SpecialPoint | None = None
     errors: Mapping[str, float] | None = None
     is_lost: bool = False
+    is_located: bool = True
 
     @property
-    def is_located(self) -> bool:
-        """The point was found, and not only bracketed."""
-        return not self.name.startswith("possible")
+    def full_name(self) -> str:
+        """The name, for users: a "possible" one of a point that was only bracketed."""
+        return self.name if self.is_located else f"possible {self.name}".strip()
+
+    @property
+    def closes(self) -> bool:
+        """The branch closes here: it is the first point once more."""
+        return self.stop is not None and self.stop.reason == Reason.CLOSED
+
+    @property
+    def is_trivial(self) -> bool:
+        """The branch ends here, on the trivial one."""
+        return self.stop is not None and self.stop.reason == Reason.TRIVIAL_BRANCH
 
     @property
     def turns_back(self) -> bool:
         """The curve ends here, on a symmetric solution: beyond, it is its own mirror image."""
-        return self.stop is not None and self.stop.reason == "pitchfork"
+        return self.stop is not None and self.stop.reason == Reason.PITCHFORK
 
 
 class Segment:
@@ -183,23 +196,23 @@ class Segment:
         return Trial(state.system, state.x, Linearization(state.tangent, state.sign))
 
     def locate(self, test: TestFunction, left: Place, right: Place, guess: float | None = None) -> SpecialPoint:
-        """Return the zero of a test function between two places; where location fails, the second one, named "possible"."""
+        """Return the zero of a test function between two places; where location fails, the second one, which is not located."""
         (a, first), (b, last) = left, right
-        ends, name = (first.value(test), last.value(test)), test.name
+        ends, is_located = (first.value(test), last.value(test)), True
         try:
             if test.holds_one_of(first.system.free) and ends[0] * ends[1] < 0:
                 held = self._held(test, left, right)
                 if held is not None:
-                    return SpecialPoint(held[0], test.label, name, held[1], stop_of(test), None, test)
+                    return SpecialPoint(held[0], test.label, test.name, held[1], stop_of(test), None, test)
             if np.sign(ends[0]) == np.sign(ends[1]) or ends[0] == 0:  # a limit that the run starts on
                 at, there = a, first
             else:
                 at = find_zero(lambda s: test.function(self.at(s)), (a, ends[0]), (b, ends[1]), self.precision, guess)
                 there = self.at(at)
         except ConvergenceError:
-            at, there, name = b, last, f"possible {test.name}"
+            at, there, is_located = b, last, False
         details = None if test.describe is None else test.describe(there)
-        return SpecialPoint(at, test.label, name, there, stop_of(test), details, test)
+        return SpecialPoint(at, test.label, test.name, there, stop_of(test), details, test, is_located=is_located)
 
     def _held(self, test: TestFunction, left: Place, right: Place) -> Place | None:
         """Return the place between two where a free parameter has a value, with that held; None if it is not found.
@@ -251,7 +264,9 @@ def stop_of(test: TestFunction) -> Stop | None:
     """Return the reason why a run ends at a zero of a test function; None where it goes on."""
     if not test.terminal:
         return None
-    return Stop("limit", f"reached {test.name}") if test.limit else Stop("event", f"met {test.name}")
+    if test.limit:
+        return Stop(Reason.LIMIT, f"reached {test.name}")
+    return Stop(Reason.EVENT, f"met {test.name}", event=test.name)
 
 
 def with_details(point: SpecialPoint, stop: Stop) -> SpecialPoint:

@@ -28,7 +28,7 @@ from contin.names import value_names
 from contin.problems.connection import TIME
 from contin.problems.cycle import PERIOD
 from contin.problems.variational import VariationalProblem
-from contin.stepping.state import Stop
+from contin.stepping.state import Reason, Stop
 from contin.stepping.trial import TestFunction, Trial
 
 #: A point lies outside a limit where it is further off than this part of the way from the point before: it was located there to
@@ -209,7 +209,7 @@ def _of_doubled_cycles(system: PeriodicCollocation | MapSystem, point: SpecialPo
     """Where a cycle comes to go twice round one of half its period the branch ends: beyond it is itself, half a period on."""
     if point.label != "BP" or point.name in ("start", "symmetry breaking") or not system.is_doubled(point.trial.x):
         return point
-    stop = Stop("period doubling", "the cycles come to go twice round cycles of half the period, at a period doubling")
+    stop = Stop(Reason.PERIOD_DOUBLING, "the cycles come to go twice round cycles of half the period, at a period doubling")
     return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)
 
 
@@ -218,7 +218,7 @@ def _of_shrunk_cycles(system: CycleCollocation, point: SpecialPoint) -> SpecialP
     """Where cycles shrink onto an equilibrium the branch ends: beyond the Hopf point it is itself, half a period later."""
     if not system.has_shrunk(point.trial.x):
         return _of_doubled_cycles(system, point)
-    stop = Stop("Hopf", "the cycles shrink onto an equilibrium, a Hopf point")
+    stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
     return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
 
 
@@ -234,9 +234,9 @@ def _of_vertical_families(system: CycleCollocation, trial: Trial, primary: str) 
     value = round(trial[primary], _DIGITS) + 0.0
     message = f"{primary} stays at {value:.10g}, up to errors of the mesh: a vertical family, as of a conservative system"
     if primary == PERIOD:
-        return Stop("standstill", message, "all its cycles have this period; follow another parameter")
+        return Stop(Reason.STANDSTILL, message, "all its cycles have this period; follow another parameter")
     advice = f'follow it with primary="{PERIOD}", where {primary} must be a parameter that breaks the conservation (unfolds it)'
-    return Stop("standstill", message, advice)
+    return Stop(Reason.STANDSTILL, message, advice)
 
 
 @functools.singledispatch

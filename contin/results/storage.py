@@ -99,7 +99,7 @@ def save(branch: Branch, path: str | Path) -> None:
     first = branch.points[0].system
     curves = [[system.kind, getattr(system, "kappa_size", 1.0)] for system in systems if isinstance(system, Extended)]
     further = first.size - first.base.size if isinstance(first, Extended) else 0  # unknowns that a curve adds
-    stop = branch.stop and [branch.stop.reason, branch.stop.message, branch.stop.advice]
+    stop = branch.stop and [str(branch.stop.reason), branch.stop.message, branch.stop.advice]
     head = {
         "format": _OF_CURVE if curves else _FORMAT, "points": rows, "stop": stop, "free": first.free,
         "degrees": [s.degree for s in systems], "states": first.problem.states, "names": list(first.problem.parameters),

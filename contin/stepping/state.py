@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -81,9 +82,38 @@ def standing_at(system: Discretization, x: Array, tangent: Array, step: float) -
     return State(system, x, tangent, None, 1.0, step, np.nan, 0.0, 0, False)
 
 
+class Reason(enum.StrEnum):
+    """Why a run ended, in short; each is a string, too. Whoever steers runs may have others.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1,), ["x"], {"a": 0.0})
+    >>> trace(solve(circle, [1.0]), free=["a"]).stop.reason == Reason.CLOSED
+    True
+    """
+
+    LIMIT = "limit"
+    EVENT = "event"
+    CLOSED = "closed"
+    MAX_POINTS = "max points"
+    NO_CONVERGENCE = "no convergence"
+    STANDSTILL = "standstill"
+    TRIVIAL_BRANCH = "trivial branch"
+    KNOWN_BRANCH = "known branch"
+    PITCHFORK = "pitchfork"
+    PERIOD_DOUBLING = "period doubling"
+    HOPF = "Hopf"
+    INTERRUPTED = "interrupted"
+
+    __repr__ = str.__repr__
+
+
 @dataclass(frozen=True)
 class Stop:
     """Why a run ended: a short ``reason``, a sentence, what could be changed, and numbers for the details of the last point.
+
+    ``event`` is the name of what was met, if the reason is an event.
 
     Examples
     --------
@@ -94,10 +124,11 @@ class Stop:
     ('limit', 'reached a = 4')
     """
 
-    reason: str
+    reason: Reason | str
     message: str
     advice: str = ""
     details: Mapping[str, float] = field(default_factory=dict)
+    event: str = ""
 
     def __str__(self) -> str:
         return f"{self.message}; {self.advice}" if self.advice else self.message
