@@ -9,11 +9,11 @@ import functools
 
 import numpy as np
 import pytest
+from conjugate_points import conjugate_index
 from scipy.optimize import brentq
 
 from contin import MeshControl, Settings, correct, follow, trace
 from ribbon_model import linear
-from ribbon_model.conjugate import conjugate_index
 from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON
