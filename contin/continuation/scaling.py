@@ -183,10 +183,10 @@ class _FirstPoint:
             self._others.append((x, self.system.linearize(x, (self.row,))[1], 1 + self._random.random()))
         return self._others[number]
 
-    def _error(self, found: Array, again: Callable[[int], Array]) -> Array:
+    def _error(self, found: Array, again: Callable[[int], Array], draws: int = _DRAWS) -> Array:
         """Return the round-off of what was found, by name, from computing it again; more often where it may be all there is."""
         size, error = self.system.largest(found), np.zeros(1)
-        for number in range(_DRAWS):
+        for number in range(draws):
             with np.errstate(all="ignore"):
                 error = np.fmax(error, UNITS * self.system.largest(found - again(number)))
             if not np.any((size > error) & ~((size > _CLEAR * error) & (error > 0))):
@@ -209,7 +209,7 @@ class _FirstPoint:
         for order in (2, 3):
             yield self._solved([self.tangent] * order) / math.factorial(order)
 
-    def _solved(self, directions: Sequence[Array]) -> Array:
+    def _solved(self, directions: Sequence[Array], draws: int = _DRAWS) -> Array:
         """Return F_x^-1 of the derivative of F along directions, zero in states where that is nothing but round-off."""
 
         def again(number: int) -> Array:
@@ -222,7 +222,7 @@ class _FirstPoint:
             found = self._factors.solve(np.append(self.system.along(self.x, directions), 0.0))
         if not np.isfinite(found).all():
             return np.zeros_like(found)
-        return self._kept(found, self.system.largest(found) > self._error(found, again))
+        return self._kept(found, self.system.largest(found) > self._error(found, again, draws))
 
     def _modes(self, known: Array) -> Iterator[_Mode]:
         """Return singular points along the branch: the nearest one, then those of states that take no part in it."""
@@ -273,8 +273,8 @@ class _FirstPoint:
         return found
 
     def _changed(self, v: Array, direction: Array, order: int) -> Array:
-        """Return F_x^-1 of the change of F_x v in a direction, of first or second order."""
-        return self._solved([*[direction] * order, v]) / math.factorial(order)
+        """Return F_x^-1 of the change of F_x v in a direction, of first or second order: one of many iterations."""
+        return self._solved([*[direction] * order, v], draws=1) / math.factorial(order)
 
     def _mode(self, v: Array, direction: Array, rate: float, order: int) -> _Mode:
         """Return the part of v that belongs to the eigenvalue ``rate`` or its negative; zeros for complex ones.
