@@ -127,7 +127,8 @@ def _moving(places: list[Place]) -> list[bool]:
     distances = np.where((sizes[1:] == 0) & (sizes[:-1] == 0), np.inf, np.minimum(sizes[1:], sizes[:-1]))
     distances = np.sort(distances, axis=1)[:, 1] if distances.shape[1] > 1 else np.full(len(distances), np.inf)
     lengths = np.diff([s for s, _ in places])
-    speeds = np.pad(np.abs(along[1:] - along[:-1]).max(axis=1) / lengths, 1)
+    speeds = np.zeros(len(lengths) + 2)
+    speeds[1:-1] = np.abs(along[1:] - along[:-1]).max(axis=1) / lengths
     fastest = np.maximum(np.maximum(speeds[:-2], speeds[2:]), speeds[1:-1])
     return [not far < distance for far, distance in zip(fastest * lengths, distances)]
 
