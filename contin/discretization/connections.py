@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ from contin.problems.connection import ConnectionProblem
 
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
 _MOVED = 1e-6
+#: Number of places whose subspaces are kept: a step asks for those of a few iterates.
+_KEPT = 8
 
 
 class ConnectionCollocation(Conditioned):
@@ -113,26 +116,44 @@ class ConnectionCollocation(Conditioned):
         unknown one, X, comes twice, X A P - L A Q^T X, and X Q^T = 0: X = Y N^T with the orthonormal N of the complement of Q
         leaves Sylvester's equation for Y.
         """
-        from scipy.linalg import null_space, solve_sylvester  # type: ignore[import-untyped]  # .1 s; only this needs it
-
         found: list[dict[Numbers, Array]] = []
-        n, numbers = self._n, subsets(len(directions))
-        for end in (0, 1):
-            field = self._jacobians_along(p, directions, end)
-            A, Q = field[()], self._bases[end]
-            left = _left_subspace(A, self.problem.conditions[end], stable=end == 0)
-            L = _normalized(left, Q)
+        numbers = subsets(len(directions))
+        for end, (Q, L, solve) in enumerate(self._subspaces(p)):
+            if not (len(Q) and directions):
+                found.append(dict.fromkeys(numbers, L))
+                continue
             known: dict[Numbers, Array] = {(): L}
-            N = null_space(Q) if len(Q) else np.eye(n)
-            inside, own = N.T @ (A - A @ Q.T @ L) @ N, L @ A @ Q.T
-            for chosen in numbers[1:] if len(Q) else ():
+            field = self._jacobians_along(p, directions, end)
+            for chosen in numbers[1:]:
                 right: Any = sum(known[u] @ field[v] for u, v in shares(chosen, 2) if u != chosen)
                 for u, v, w in shares(chosen, 3):
                     if chosen not in (u, w):
                         right = right - known[u] @ field[v] @ Q.T @ known[w]
-                known[chosen] = solve_sylvester(-own, inside, -right @ N) @ N.T
-            found.append(known if len(Q) else dict.fromkeys(numbers, L))
+                known[chosen] = solve(right)
+            found.append(known)
         return found
+
+    def _subspaces(self, p: Array) -> list[tuple[Array, Array, Callable[[Array], Array]]]:
+        """Return Q and L of both ends, and what solves X A P - L A Q^T X = -right for X, once for values of all parameters."""
+        key = p.tobytes()
+        if key not in self._known_subspaces:
+            if len(self._known_subspaces) > _KEPT:
+                self._known_subspaces.clear()
+            self._known_subspaces[key] = [self._subspace(p, end) for end in (0, 1)]
+        return self._known_subspaces[key]
+
+    @functools.cached_property
+    def _known_subspaces(self) -> dict[bytes, list[tuple[Array, Array, Callable[[Array], Array]]]]:
+        return {}
+
+    def _subspace(self, p: Array, end: int) -> tuple[Array, Array, Callable[[Array], Array]]:
+        from scipy.linalg import null_space  # type: ignore[import-untyped]  # .1 s; only this needs it
+
+        A, Q = self._jacobian_at(self._places(p[None])[end][0], p), self._bases[end]
+        L = _normalized(_left_subspace(A, self.problem.conditions[end], stable=end == 0), Q)
+        N = null_space(Q) if len(Q) else np.eye(self._n)
+        solve = _sylvester(-(L @ A @ Q.T), N.T @ (A - A @ Q.T @ L) @ N)
+        return Q, L, lambda right: solve(-right @ N) @ N.T
 
     def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
         """Return the Jacobian at the equilibrium of an end, and its derivatives along all subsets of the directions."""
@@ -381,6 +402,23 @@ def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:
     if found != count:
         raise ConvergenceError(f"the equilibrium has not {count} eigenvalues of one kind")
     return np.ascontiguousarray(vectors[:, :count].T)
+
+
+def _sylvester(a: Array, b: Array) -> Callable[[Array], Array]:
+    """Return what solves a X + X b = right for X, as SciPy's ``solve_sylvester`` does, with the Schur forms made once."""
+    from scipy.linalg import schur
+    from scipy.linalg.lapack import dtrsyl  # type: ignore[import-untyped]
+
+    if not (a.size and b.size):
+        return lambda right: np.zeros((len(a), len(b)))
+    (r, u), (s, v) = schur(a), schur(b.T)
+
+    def solve(right: Array) -> Array:
+        found, scale, _ = dtrsyl(r, s, u.T @ right @ v, tranb="C")
+        result: Array = u @ (scale * found) @ v.T
+        return result
+
+    return solve
 
 
 def _normalized(left: Array, basis: Array) -> Array:
