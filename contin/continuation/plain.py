@@ -101,7 +101,7 @@ def calm(quotient: Quotient) -> bool:
     for i in range(size):
         for j in range(size):
             quotient.copy[0, i, j] = quotient.quotient[i, j]
-    fill_eigenvalues(quotient.copy, quotient.real, quotient.imaginary)
+    fill_eigenvalues(quotient.copy, quotient.copy.shape[1], quotient.real, quotient.imaginary)
     for i in range(size):
         distance = math.hypot(quotient.real[0, i], quotient.imaginary[0, i])
         if not (quotient.real[0, i] > 0 and 1 / CALM < distance < CALM):

@@ -61,7 +61,7 @@ def fill_spectrum(equations: Equations, spectra: Spectra, number: int) -> bool:
     for i in range(n):
         for j in range(n):
             spectra.square[0, i, j] = equations.slopes_found[0, i, j] * equations.rates[i]
-    fill_eigenvalues(spectra.square, spectra.ones, spectra.others)
+    fill_eigenvalues(spectra.square, n, spectra.ones, spectra.others)
     one, other = spectra.ones[0], spectra.others[0]
     largest = 0.0
     for i in range(n):

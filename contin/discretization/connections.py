@@ -86,14 +86,21 @@ class ConnectionCollocation(Conditioned):
 
     def _places(self, p: Array) -> list[Array]:
         """Return the coordinates of the first and of the last equilibrium in the user's units, shape (m, n) each."""
-        n, names = self._n, list(self.problem.parameters)
-        first = names.index(self.problem.multipliers[0])
+        n, first = self._n, self._first_coordinate
         if not self.problem.homoclinic:
             return [p[:, place : place + n] for place in (first, first + n)]
-        here, gained = p[:, first : first + n], np.zeros((len(p), n))
+        here = p[:, first : first + n]
+        if not self.problem.angles:
+            return [here, here]
+        gained, names = np.zeros((len(p), n)), list(self.problem.parameters)
         for name, period in self.problem.angles.items():
             gained[:, self.problem.state_names.index(name)] = period * p[:, names.index(WINDING + name)]
         return [here, here + gained]
+
+    @functools.cached_property
+    def _first_coordinate(self) -> int:
+        """Where the coordinates of the equilibria begin among all parameters."""
+        return list(self.problem.parameters).index(self.problem.multipliers[0])
 
     def _jacobian_at(self, place: Array, p: Array) -> Array:
         """Return the derivatives of the field by the states at one place, scaled, for values of all parameters."""
@@ -193,9 +200,8 @@ class ConnectionCollocation(Conditioned):
         p, places = self.all_parameters(x), self._indices(names)
         values, by_states = [], np.zeros((self._further, self.state_size))
         by_parameters = np.zeros((self._further, len(names)))
-        for place, row in enumerate(self._unit_directions(places)):
-            moved = self._end_rows(x, self._subspaces_along(p, [row]), [np.zeros(self.state_size)], [row])
-            by_parameters[:-1, place] = np.append(moved, self._fold_along(p, [row])[0,])
+        if len(names):
+            by_parameters[:-1] = self._by_parameters(x, p, self._unit_directions(places))
         for end, (here, at, L) in enumerate(self._end_places(self._subspaces_along(p, []))):
             values.append(L[()] @ self.apart(x)[end])
             by_states[here, at : at + self._n] = L[()]
@@ -203,6 +209,20 @@ class ConnectionCollocation(Conditioned):
         values.append(np.array([self._phase @ x - self._target]))
         by_states[-1] = self._phase[: self.state_size]
         return np.concatenate(values), by_states, by_parameters
+
+    def _by_parameters(self, x: Array, p: Array, directions: Array) -> Array:
+        """Return the derivatives of projection and fold conditions along directions (m, all parameters), as columns."""
+        batch, n, sizes, count, found = self.problem.batch("vector field"), self._n, self._sizes, len(directions), []
+        for (Q, L, solve), here, moves, apart in zip(
+            self._subspaces(p), self._places(p[None]), self._places(directions), self.apart(x)
+        ):
+            given = np.zeros(count), np.repeat(here, count, axis=0), np.empty((0, n)), p, batch.columns([])
+            fields = batch.jacobian_along(*given, [np.hstack([moves, directions])])[:, :, :n] * sizes / sizes[:, None]
+            turned = [solve(each) for each in L @ fields @ (np.eye(n) - Q.T @ L)]
+            found.append(np.column_stack([each @ apart for each in turned]) - L @ (moves / sizes).T)
+        if self.problem.saddle_node:
+            found.append(np.column_stack([self._fold_along(p, [each])[0,] for each in directions]))
+        return np.vstack(found)
 
     def _unit_directions(self, places: Indices) -> Array:
         """Return directions of all parameters, one for each of some of them, shape (m, number of names)."""

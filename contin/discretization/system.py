@@ -57,9 +57,9 @@ class System(Discretization):
         self.free_scales: Array = self.scales.parameters[self._free]
 
     @property
-    @abstractmethod
     def _rows(self) -> tuple[tuple[str, int], ...]:
         """Names and numbers of the equations that have sizes of their own."""
+        return ()
 
     def __repr__(self) -> str:
         mesh = f"{self.intervals} interval{'s' * (self.intervals != 1)} of degree {self.degree}, " * bool(self.intervals)

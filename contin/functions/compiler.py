@@ -59,7 +59,7 @@ def machine_code(function: Callable[..., Any], reorder: bool, entry: str) -> Cod
     Raises
     ------
     TypeError
-        An annotation that is no type of a kernel's argument.
+        An annotation that is no type of a kernel's argument; or it calls a function of numba.
     numba.core.errors.NumbaError
         It cannot be compiled.
     """
@@ -378,6 +378,10 @@ class _Entry:
                 function.linkage = "internal"
         foreign = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
         foreign += [v.name for v in module.global_variables if v.is_declaration]
+        own = next((name for name in foreign if name.startswith(_NUMBAS)), None)
+        if own is not None:  # each process would make the code anew
+            name = self.done.fndesc.qualname
+            raise TypeError(f"{name}: its machine code calls {own}, which is there only where numba is loaded")
         return Code(self.name, tuple(foreign), _target().emit_object(module))
 
     def _write(self) -> None:
@@ -482,6 +486,8 @@ def _instructions(function: Any) -> int:
 _LONG = 30
 #: Instructions whose loops are not unrolled: long ones with many short loops. It takes a third of the time to compile.
 _SMALL = ("interpret",)
+#: What names of numba's own functions in C begin with.
+_NUMBAS = ("numba_", "NRT_")
 #: Places in the tuple ``self``, see `contin.functions.machine_code.loaded`.
 _ARRAY, _NONE, _WRONG = range(3)
 #: What TypeError says.

@@ -48,7 +48,7 @@ def eigenvalues(matrix: Array) -> ComplexArray:
         return np.linalg.eigvals(matrix).astype(complex, copy=False)
     count = math.prod(matrix.shape[:-2])
     real, imaginary = np.empty((2, count, n))
-    fill_eigenvalues(np.array(matrix, dtype=float, order="C").reshape(count, n, n), real, imaginary)
+    fill_eigenvalues(np.array(matrix, dtype=float, order="C").reshape(count, n, n), n, real, imaginary)
     return np.asarray(real + 1j * imaginary).reshape(matrix.shape[:-1])
 
 

@@ -66,7 +66,7 @@ class Product(NamedTuple):
     basis: Matrix
     iterates: Iterates
     groups: Groups
-    square: Vector
+    square: Stack
     parts: Matrix
 
 
@@ -93,7 +93,7 @@ def product_of(count: int, n: int) -> Product:
     first, last, coupling, product, vectors = np.empty((5, n, n))
     iterates = Iterates(first, last, np.empty((count, n, n)), coupling, product, vectors, np.empty(n))
     groups = Groups(np.empty(n + 1, np.int64), np.empty((n, n)), np.empty(n))
-    return Product(_first_basis(n), iterates, groups, np.empty(n * n), np.empty((2, n)))
+    return Product(_first_basis(n), iterates, groups, np.empty((1, n, n)), np.empty((2, n)))
 
 
 @functools.lru_cache(maxsize=32)
@@ -266,9 +266,8 @@ def _fill_of_block(room, start, end, real, imaginary):
     else:
         for i in range(m):
             for j in range(m):
-                room.square[i * m + j] = blocks[start + i, start + j]
-        found = room.square[: m * m].reshape((1, m, m))
-        fill_eigenvalues(found, room.parts[:1], room.parts[1:])
+                room.square[0, i, j] = blocks[start + i, start + j]
+        fill_eigenvalues(room.square, m, room.parts[:1], room.parts[1:])
         for i in range(m):
             real[i], imaginary[i] = room.parts[0, i], room.parts[1, i]
 

@@ -24,19 +24,20 @@ _STEPS, _EXCEPTIONAL = 60, 10
 
 
 @kernel(reorder=False, last=True)
-def fill_eigenvalues(matrices: Stack, real: Matrix, imaginary: Matrix) -> None:
+def fill_eigenvalues(matrices: Stack, n: int, real: Matrix, imaginary: Matrix) -> None:
     """Fill in the eigenvalues of matrices, which are overwritten: a row for each, NaN where a matrix is not finite.
 
-    The two of a complex pair stand side by side, the one above the real axis first.
+    A matrix has ``n`` rows; there may be room for more. The two of a complex pair stand side by side, the one above the real
+    axis first.
     """
     for number in range(matrices.shape[0]):
-        _fill(matrices[number], real[number], imaginary[number])
+        _fill(matrices[number], n, real[number], imaginary[number])
 
 
 @helper
-def _fill(a, real, imaginary):
-    """Fill in the eigenvalues of a matrix."""
-    n, total = a.shape[0], 0.0
+def _fill(a, n, real, imaginary):
+    """Fill in the eigenvalues of a matrix with n rows."""
+    total = 0.0
     for i in range(n):
         for j in range(n):
             total += abs(a[i, j])
@@ -44,29 +45,29 @@ def _fill(a, real, imaginary):
         for i in range(n):
             real[i] = imaginary[i] = math.nan
         return
-    first, end = _isolate(a)
+    first, end = _isolate(a, n)
     for i in range(n):
         if not first <= i < end:
             real[i], imaginary[i] = a[i, i], 0.0
     _balance(a, first, end)
-    _reduce(a, first, end)
+    _reduce(a, n, first, end)
     _iterate(a, first, end, real, imaginary)
 
 
 @helper
-def _isolate(a):
+def _isolate(a, n):
     """Exchange rows and columns so that the matrix is triangular but for a part of it; return where that begins and ends."""
-    first, end = 0, a.shape[0]
+    first, end = 0, n
     found = True
     while found:
         found = False
         for i in range(end - 1, first - 1, -1):
             if _alone(a, i, first, end, True):
                 end, found = end - 1, True
-                _exchange(a, i, end)
+                _exchange(a, n, i, end)
                 break
             if _alone(a, i, first, end, False):
-                _exchange(a, i, first)
+                _exchange(a, n, i, first)
                 first, found = first + 1, True
                 break
     return first, end
@@ -83,11 +84,11 @@ def _alone(a, i, first, end, row):
 
 
 @helper
-def _exchange(a, i, k):
+def _exchange(a, n, i, k):
     """Exchange two rows and the same columns."""
-    for j in range(a.shape[0]):
+    for j in range(n):
         a[i, j], a[k, j] = a[k, j], a[i, j]
-    for j in range(a.shape[0]):
+    for j in range(n):
         a[j, i], a[j, k] = a[j, k], a[j, i]
 
 
@@ -121,7 +122,7 @@ def _balance(a, first, end):
 
 
 @helper
-def _reduce(a, first, end):
+def _reduce(a, n, first, end):
     """Bring a part of a matrix to Hessenberg form, by elimination with exchanges."""
     for m in range(first + 1, end - 1):
         place = m
@@ -129,7 +130,7 @@ def _reduce(a, first, end):
             if abs(a[i, m - 1]) > abs(a[place, m - 1]):
                 place = i
         if place != m:
-            _exchange(a, place, m)
+            _exchange(a, n, place, m)
         pivot = a[m, m - 1]
         if pivot == 0.0:
             continue

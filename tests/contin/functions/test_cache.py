@@ -16,7 +16,7 @@ from contin import ContinError
 from contin.functions import cache, machine_code
 from contin.functions import kernel as kernels
 from contin.functions.kernel import Kernel
-from contin.functions.kernel_parts import Vector, helper
+from contin.functions.kernel_parts import Matrix, Vector, helper
 
 
 @helper
@@ -112,6 +112,16 @@ def test_code_that_calls_a_function_that_is_not_there_is_not_taken(kernel):
     head, code = machine_code._unpacked(path.read_bytes())
     machine_code.keep(key, machine_code.Code(head["entry"], ("no_such_function",), code))
     assert kernel().stored() is None
+
+
+def _flat(x: Matrix) -> float:
+    return x.reshape(x.size)[0]
+
+
+def test_code_that_only_a_process_with_numba_can_run_is_refused():
+    """It would be made again in every process."""
+    with pytest.raises(TypeError, match="calls numba_attempt_nocopy_reshape, which is there only where numba is loaded"):
+        Kernel(_flat, reorder=True)(np.eye(2))
 
 
 def test_the_key_depends_on_the_machine_and_on_versions(monkeypatch):
