@@ -104,7 +104,7 @@ class System(Discretization):
 
     def _between_scales(self, carry: Carrier, other: Any) -> Carrier:
         """Return a carrier of unknowns as they are, made one to a system that may have other scales."""
-        if other.scales is self.scales:
+        if other.scales is self.scales or (self.scales.are_one and other.scales.are_one):
             return carry
         ours, theirs = self.unscaled_factors, other.unscaled_factors
         return lambda x: carry(x * ours) / theirs
