@@ -61,6 +61,7 @@ def _one_sentence(call):
     return ""
 
 
+@pytest.mark.filterwarnings("ignore:pattern= has no effect:DeprecationWarning")
 @pytest.mark.parametrize(("kind", "field"), FIELDS)
 def test_every_field_of_every_statement(kind, field):
     @FEW
