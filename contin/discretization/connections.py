@@ -80,10 +80,6 @@ class ConnectionCollocation(Conditioned):
 
     # --- the conditions at the ends ------------------------------------------------------------------------------
 
-    @property
-    def _sizes(self) -> Array:
-        return self.scales.states
-
     def _places(self, p: Array) -> list[Array]:
         """Return the coordinates of the first and of the last equilibrium in the user's units, shape (m, n) each."""
         n, first = self._n, self._first_coordinate
@@ -104,7 +100,7 @@ class ConnectionCollocation(Conditioned):
 
     def _jacobian_at(self, place: Array, p: Array) -> Array:
         """Return the derivatives of the field by the states at one place, scaled, for values of all parameters."""
-        batch, n, sizes = self.problem.batch("vector field"), self._n, self._sizes
+        batch, n, sizes = self.problem.batch("vector field"), self._n, self.scales.states
         jacobian: Array = batch.jacobian(np.zeros(1), place[None], np.empty((0, n)), p, batch.columns([]))[1][0, :, :n]
         return jacobian * sizes / sizes[:, None]
 
@@ -164,7 +160,7 @@ class ConnectionCollocation(Conditioned):
 
     def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
         """Return the Jacobian at the equilibrium of an end, and its derivatives along all subsets of the directions."""
-        batch, sizes = self.problem.batch("vector field"), self._sizes
+        batch, sizes = self.problem.batch("vector field"), self.scales.states
         place = self._places(p[None])[end]
         moves = [np.append(self._places(v[None])[end][0], v)[None] for v in directions]
         given = np.zeros(1), place, np.empty((0, self._n)), p, batch.columns([])
@@ -212,7 +208,7 @@ class ConnectionCollocation(Conditioned):
 
     def _by_parameters(self, x: Array, p: Array, directions: Array) -> Array:
         """Return the derivatives of projection and fold conditions along directions (m, all parameters), as columns."""
-        batch, n, sizes, count, found = self.problem.batch("vector field"), self._n, self._sizes, len(directions), []
+        batch, n, sizes, count, found = self.problem.batch("vector field"), self._n, self.scales.states, len(directions), []
         for (Q, L, solve), here, moves, apart in zip(
             self._subspaces(p), self._places(p[None]), self._places(directions), self.apart(x)
         ):
@@ -243,7 +239,7 @@ class ConnectionCollocation(Conditioned):
         for end, (_, at, L) in enumerate(self._end_places(subspaces)):
             value = L[every] @ self.apart(x)[end]
             for i in every:
-                change = states[i][at : at + self._n] - self._places(parameters[i][None])[end][0] / self._sizes
+                change = states[i][at : at + self._n] - self._places(parameters[i][None])[end][0] / self.scales.states
                 value = value + L[every[:i] + every[i + 1 :]] @ change
             result.append(value)
         return np.concatenate(result)
@@ -342,12 +338,12 @@ class ConnectionCollocation(Conditioned):
         moved = np.zeros(len(self.parameters))
         names = self.problem.multipliers
         own = names[: self._n] if end == 0 or self.problem.homoclinic else names[self._n :]
-        moved[self._indices(own)] = direction * self._sizes
+        moved[self._indices(own)] = direction * self.scales.states
         return self._jacobians_along(p, [moved], end)[0,]
 
     def apart(self, x: Array) -> tuple[Array, Array]:
         """Return u(0) - e and u(1) - e', scaled."""
-        first, last = (place[0] / self._sizes for place in self._places(self.all_parameters(x)[None]))
+        first, last = (place[0] / self.scales.states for place in self._places(self.all_parameters(x)[None]))
         states = self._scaled_states(x)
         return states[0] - first, states[-1] - last
 
