@@ -16,7 +16,6 @@ from contin.continuation.progress import Progress
 from contin.continuation.run import Continuation
 from contin.detection.branch_point import BranchPoint
 from contin.detection.multiple_point import MultiplePoint
-from contin.detection.phase import in_phase
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.discretization.maps import MapSystem
@@ -310,7 +309,7 @@ class _Explorer:
         if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
             return None
         for symmetry in self.symmetries:
-            image, (turned,) = in_phase(a, _image(a, symmetry, here), (_image(a, symmetry, ahead),), there)
+            image, (turned,) = a.in_phase(_image(a, symmetry, here), (_image(a, symmetry, ahead),), there)
             gap = image - there
             if np.sqrt(inner(a, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(a, there, there))):
                 continue
@@ -324,7 +323,7 @@ class _Explorer:
         system, result = point.system, []
         here, direction = _seen(system, point.x), _seen(system, direction)
         for symmetry in self.symmetries:
-            image, (turned,) = in_phase(system, _image(system, symmetry, here), (_image(system, symmetry, direction),), here)
+            image, (turned,) = system.in_phase(_image(system, symmetry, here), (_image(system, symmetry, direction),), here)
             gap = image - here
             if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, here, here))):
                 continue

@@ -25,7 +25,6 @@ from contin.curves.map_curves import MapDoublingCurve, MapTorusCurve
 from contin.detection.branch_point import BranchPoint
 from contin.detection.homoclinic_points import own_test_of
 from contin.detection.lyapunov import critical_pair
-from contin.detection.test_functions import own_test_functions
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.connections import ConnectionCollocation
 from contin.discretization.cycles import PeriodicCollocation
@@ -255,7 +254,7 @@ def _value(start: Point, base: Any, x: Array) -> _First:
 
 def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
     """A point that a test function of its curve has labelled."""
-    for test in own_test_functions(start.system):
+    for test in start.system.events():
         if (test.label, test.name) == (start.label, start.name):
             return EventCurve(base, test.function), x
     return None

@@ -12,7 +12,7 @@ from contin.continuation.notes import Notes, why_lost
 from contin.detection.refinement import refined
 from contin.detection.second_variation import nullity_of
 from contin.detection.segment import Segment, SpecialPoint
-from contin.detection.test_functions import own_normal_form, with_normal_form
+from contin.detection.test_functions import with_normal_form
 from contin.stepping.settings import Settings
 from contin.stepping.trial import TestFunction
 
@@ -30,7 +30,7 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
     if not found.label:
         return found  # a regular point
     labelled = found.label != "MX" and not found.closes
-    first, coarse = found.trial, own_normal_form(found.trial.system, found)
+    first, coarse = found.trial, found.trial.system.coefficient(found)
     if found.errors is None and labelled and settings.errors:
         again = refined(found.same_as or found, settings)
         details, errors, is_lost = found.details if found.same_as else again.details, again.errors, again.is_lost
@@ -38,7 +38,7 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
             errors, is_lost = dict.fromkeys(errors, np.nan), True
         found = dataclasses.replace(found, trial=again.trial, details=details, errors=errors, is_lost=is_lost)
     if coarse is not None:
-        better = coarse if found.trial is first else own_normal_form(found.trial.system, found)
+        better = coarse if found.trial is first else found.trial.system.coefficient(found)
         found = with_normal_form(found, better or coarse, coarse)
     return found
 

@@ -50,7 +50,7 @@ from contin.continuation.rules import (
 )
 from contin.detection.homoclinic import STILL, homoclinic
 from contin.detection.inspection import Start, is_elsewhere
-from contin.detection.second_variation import index_of, stability_of
+from contin.detection.second_variation import stability_of
 from contin.detection.segment import SpecialPoint
 from contin.detection.spectra import spectra_of
 from contin.detection.trivial import crossed, jumped
@@ -131,7 +131,7 @@ class Lane(ABC):
     ) -> None:  # fmt: skip
         self.system, self.settings, self.noisy, self._start = system, settings, noisy, start
         self._handed: Handed | None = None
-        self._others, self._index = others, index_of(system)
+        self._others, self._index = others, system.index
         primary = system.parameter_index(settings.primary or system.free[0]) if settings.folds else -1
         newton, (angle, accuracy) = settings.newton, aims(settings, system)
         self._frame = Frame(system.weights, system.state_size, system.free_scales)

@@ -13,7 +13,6 @@ from contin.arrays import Array
 from contin.continuation.scaling import outgrown
 from contin.continuation.steps import Steps
 from contin.detection.accuracy import Accuracy, accuracy_of
-from contin.detection.hopf_end import collapsed
 from contin.detection.trivial import jumped
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization, inner
@@ -119,7 +118,7 @@ class MeshPolicy:
         except ConvergenceError:
             return None  # the old mesh still serves; the step control will notice if it does not
         before = here()
-        if collapsed(system, x, done.x) or self.steps.sense(before) * self.steps.sense(end) < 0:
+        if system.collapsed(x, done.x) or self.steps.sense(before) * self.steps.sense(end) < 0:
             return None
         if any(np.sign(before.value(test)) != np.sign(end.value(test)) for test in self.tests):
             return None  # the next point will do as well

@@ -103,7 +103,7 @@ def step_on_mesh(rooms: MeshRooms, path: Path, accepted: int, number: int, bend:
 
 @helper
 def _has_collapsed(amplitude: Array, x: Array, new: Array) -> bool:
-    """Return whether a cycle has become an equilibrium, as `contin.detection.hopf_end.collapsed`."""
+    """Return whether a cycle has become an equilibrium, as a system of cycles says in `collapsed`."""
     return amplitude.size > 0 and abs(_product(amplitude, new)) < COLLAPSED * abs(_product(amplitude, x))
 
 

@@ -30,15 +30,11 @@ from contin.continuation.steps import Steps
 from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.detection.extrema import extremum
 from contin.detection.inspection import Inspection, Start
-from contin.detection.second_variation import Stability, contradiction, index_of, stability_of
+from contin.detection.second_variation import Stability, contradiction, stability_of
 from contin.detection.segment import Segment, SpecialPoint, with_details
 from contin.detection.test_functions import (
     fold,
     limits,
-    own_end,
-    own_standstill,
-    own_stop,
-    own_test_functions,
     user_zeros,
     within_limits,
 )
@@ -141,7 +137,7 @@ class Continuation:
         self.primary = settings.primary or system.free[0]
         self._steps = Steps(settings, self.primary, fold(self.primary) if settings.folds else None)
         self._state: State | Callable[[], State] = state or self._first(system, np.asarray(x, dtype=float), tangent, singular)
-        self._own = [test for test in own_test_functions(self.state.system) if test.unless not in settings.limits]
+        self._own = [test for test in self.state.system.events() if test.unless not in settings.limits]
         self._limits = limits(settings.limits)
         general = [
             *user_zeros(settings.zeros), *self._limits, *map(extremum, settings.extrema),
@@ -150,7 +146,7 @@ class Continuation:
         self._tests = [*general, *self._own]
         self._ends = [test for test in self._tests if test.terminal and not test.limit]
         self._meshes = MeshPolicy(self._steps, general)
-        self._index = index_of(self.state.system)
+        self._index = self.state.system.index
         self._watch = watch_list(self.state.system, settings, self._tests, self._steps.fold, self._index)
         self._notes = Notes(self.primary, settings.mesh.tolerance, bool(settings.mesh.every))
         self._resumed = state is not None
@@ -202,7 +198,7 @@ class Continuation:
         if not self._resumed:
             trial = self._here()
             first = SpecialPoint(0.0, "BP" if self.state.singular else "EP", "start", trial)
-            located = located_again(dataclasses.replace(first, label=own_end(trial.system, first).label), self.settings)
+            located = located_again(dataclasses.replace(first, label=trial.system.judged(first).label), self.settings)
             self._notes.corners(trial)
             yield self._point(located, self.state, accuracy=at_branch_point(trial) if self.state.singular else None)
             self.stop = begins_outside(trial, self.settings, self._own, self.state.singular)
@@ -270,14 +266,14 @@ class Continuation:
         except ConvergenceError as error:
             here, first = self._here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
             failed = met(self._ends, here, first) or no_convergence(self.state, self.settings, error)
-            stop = own_stop(self.state.system, here, failed)
+            stop = self.state.system.explained(failed, here)
             if stop.reason == Reason.NO_CONVERGENCE and self._takes_shorter_steps():
                 return
             self.stop = stop
             label, name = ("EP", stop.event) if stop.event else ("MX", "no convergence")
             yield self._point(SpecialPoint(0.0, label, name, here), self.state, accuracy=self._accuracy)
             return
-        segment, special = step.segment, [own_end(step.segment.trial.system, point) for point in step.special]
+        segment, special = step.segment, [step.segment.trial.system.judged(point) for point in step.special]
         special = within_limits(segment, special, self._limits)
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
         found = [located_again(point, self.settings) for point in special[: end + 1]]
@@ -287,7 +283,7 @@ class Continuation:
             self._notes.doubts(self._index, segment, found, step.doubt if len(found) == len(special) else "")
         for point, change in zip(found, changes):
             if point.stop is not None:
-                self.stop = own_stop(point.trial.system, point.trial, point.stop)
+                self.stop = point.trial.system.explained(point.stop, point.trial)
                 point = with_details(point, self.stop)
             yield self._point(point, segment.state, change)
             if self.stop is not None:
@@ -298,7 +294,7 @@ class Continuation:
         if self.state.accepted >= self.settings.max_points:
             self.stop = Stop(Reason.MAX_POINTS, f"max_points = {self.settings.max_points} reached", "raise it to go on")
         elif self._steps.fold is not None and self.state.accepted == _STANDING and not self.state.sense:
-            self.stop = own_standstill(segment.trial.system, segment.trial, self.primary)
+            self.stop = segment.trial.system.standstill(segment.trial, self.primary)
             if self.stop is None and not segment.trial.system.intervals:
                 place = f"{self.primary} stays at {segment.trial[self.primary]:.10g}, as far as can be told"
                 self._notes.add(f"{place}: a vertical family, as of a linear or conservative system; folds are not told there")

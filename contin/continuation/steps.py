@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from contin.arrays import Array
-from contin.detection.hopf_end import collapsed
 from contin.detection.segment import Place, Segment
 from contin.detection.significance import STANDS, free_values, sense
 from contin.detection.trivial import crossed, jumped
@@ -61,7 +60,7 @@ class Steps:
         settings = self.settings
         guess = predict(state, step)
         trial = made or corrected(state, guess, step, settings.newton)
-        if collapsed(state.system, state.x, trial.x):
+        if state.system.collapsed(state.x, trial.x):
             raise ConvergenceError("the cycle at the corrected point is an equilibrium")
         judgement = judged(state, guess, trial)
         angle, accuracy = aims(settings, state.system)

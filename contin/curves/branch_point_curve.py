@@ -15,8 +15,6 @@ from contin.curves.extended import FITS, Borders, Extended, cosine
 from contin.curves.fold_curve import shrinking
 from contin.detection.bordered import BorderedMatrix
 from contin.detection.branch_point import locate_branch_point
-from contin.detection.test_functions import own_test_functions
-from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.trial import TestFunction
@@ -79,8 +77,6 @@ class BranchPointCurve(Extended):
         residual, factors = base.linearize(y, np.vstack([top, rows]), np.vstack([psi, columns[:, :-2]]))
         return np.concatenate([residual + x[-1] * psi, matrix.g]), factors
 
-
-@own_test_functions.register
-def _of_branch_point_curve(system: BranchPointCurve) -> list[TestFunction]:
-    """Cycles may shrink onto an equilibrium."""
-    return shrinking(system.base) if isinstance(system.base, PeriodicCollocation) else []
+    def events(self) -> list[TestFunction]:
+        """Return that of the end where cycles shrink onto an equilibrium."""
+        return shrinking(self.base)

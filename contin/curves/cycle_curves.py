@@ -19,7 +19,6 @@ from contin.curves.fold_curve import FoldCurve, shrinking
 from contin.curves.multipliers import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.detection.cycle_normal_forms import NormalForms
 from contin.detection.lyapunov import Coefficient
-from contin.detection.test_functions import own_test_functions
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.round import Round
 from contin.discretization.system import System
@@ -94,6 +93,13 @@ class DoublingCurve(Doubling, CycleCurve):
         """Return c."""
         return NormalForms(self.cycles, x).period_doubling()
 
+    def events(self) -> list[TestFunction]:
+        """Return those of a second multiplier -1, of generalized period doublings, and of folds."""
+        return [
+            *shrinking(self.cycles), second_doubling(), degenerate("GPD", "generalized period doubling"),
+            _at_fold("LPPD", "fold-flip"),
+        ]  # fmt: skip
+
 
 class TorusCurve(Pair, CycleCurve):
     """Torus bifurcations: the multipliers exp(-+ i theta); columns ``normal_form``, Re d, and ``angle``, theta."""
@@ -106,6 +112,10 @@ class TorusCurve(Pair, CycleCurve):
         if self.is_infinite(x):
             return Coefficient(math.nan, math.nan, math.nan)
         return NormalForms(self.cycles, x[: self.base.size]).torus(self.angle(x))
+
+    def events(self) -> list[TestFunction]:
+        """Return those of strong resonances, Chenciner points, and folds."""
+        return [*shrinking(self.cycles), *resonances(), degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
 
 def _curve(trial: Trial) -> CycleCurve:
@@ -123,20 +133,3 @@ def _at_fold(label: str, name: str) -> TestFunction:
         return len(exponents) > known and bool(np.sort(np.abs(exponents))[known] < _DOUBLE)
 
     return TestFunction(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)
-
-
-@own_test_functions.register
-def _of_torus_curve(system: TorusCurve) -> list[TestFunction]:
-    """Strong resonances, Chenciner points, and folds."""
-    return [*shrinking(system.cycles), *resonances(), degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
-
-
-@own_test_functions.register
-def _of_doubling_curve(system: DoublingCurve) -> list[TestFunction]:
-    """A second multiplier -1, generalized period doublings, and folds."""
-    return [
-        *shrinking(system.cycles),
-        second_doubling(),
-        degenerate("GPD", "generalized period doubling"),
-        _at_fold("LPPD", "fold-flip"),
-    ]

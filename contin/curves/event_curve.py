@@ -25,11 +25,7 @@ from contin.arrays import Array
 from contin.curves.extended import FITS, Borders, Extended
 from contin.curves.fold_curve import shrinking
 from contin.detection.extrema import orthonormal
-from contin.detection.homoclinic_points import homoclinic_points, own_names
 from contin.detection.segment import SpecialPoint
-from contin.detection.test_functions import own_end, own_test_functions
-from contin.discretization.connections import ConnectionCollocation
-from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.differences import derivative
 from contin.linalg.factors import Factors
 from contin.stepping.trial import TestFunction, Trial
@@ -126,21 +122,21 @@ class EventCurve(Extended):
         """Return F and e, and the factored bordered matrix; the row of e comes first among the border rows."""
         return self.with_own_rows(x, (self.gradient(x)[None], np.array([self._own_value(x)])), rows, columns)
 
+    def events(self) -> list[TestFunction]:
+        """Return that of the end where cycles shrink, and those of solutions that are special in another way, too."""
+        others = [test for test in self.base.events_on_curves() if test.label != self.label]
+        inside = [
+            dataclasses.replace(
+                test, function=partial(_inside, test.function), confirm=test.confirm and partial(_inside, test.confirm)
+            )
+            for test in others
+        ]
+        return [*shrinking(self.base), *inside]
 
-@own_test_functions.register
-def _of_event_curve(system: EventCurve) -> list[TestFunction]:
-    """Cycles may shrink onto an equilibrium. Codimension three: homoclinic orbits that are special in another way, too."""
-    if isinstance(system.base, PeriodicCollocation):
-        return shrinking(system.base)
-    if not isinstance(system.base, ConnectionCollocation):
-        return []
-    others = [test for test in homoclinic_points(system.base) if test.label != system.label]
-    return [
-        dataclasses.replace(
-            test, function=partial(_inside, test.function), confirm=test.confirm and partial(_inside, test.confirm)
-        )
-        for test in others
-    ]
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return a special point, by the label and name that the kind knows it by."""
+        found: SpecialPoint = self.base.judged_on_curve(point, _solution(point.trial))
+        return found
 
 
 def _inside(function: Callable[[Trial], Any], trial: Trial) -> Any:
@@ -151,12 +147,3 @@ def _inside(function: Callable[[Trial], Any], trial: Trial) -> Any:
 def _solution(trial: Trial) -> Trial:
     system: Any = trial.system
     return Trial.without_tangent(system.base, trial.x[: system.base.size])
-
-
-@own_end.register
-def _of_points_of_homoclinic_orbits(system: EventCurve, point: SpecialPoint) -> SpecialPoint:
-    """Neutral saddles and the like, by which of the leading eigenvalues are complex."""
-    if not isinstance(system.base, ConnectionCollocation) or not point.is_located:
-        return point
-    names = own_names(dataclasses.replace(point, trial=_solution(point.trial)))
-    return point if names is None else dataclasses.replace(point, label=names[0], name=names[1])

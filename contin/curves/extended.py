@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Function
-from contin.detection.hopf_end import collapsed
-from contin.detection.phase import in_phase
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
 from contin.discretization.switching import Switching
@@ -188,6 +186,23 @@ class Extended(Discretization):
         other = self.on(changed[0])
         return other, self.carrier(other)
 
+    # --- what is known of the solutions themselves: the unknowns that the curve adds are their own -----------------------
+
+    @property
+    def solution(self) -> Discretization:
+        """The problem whose solutions are followed."""
+        return self.base.solution
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return the solution itself, and vectors, in phase."""
+        size = self.base.size
+        inside, others = self.base.in_phase(x[:size], [vector[:size] for vector in vectors], reference[:size])
+        return np.append(inside, x[size:]), [np.append(other, vector[size:]) for other, vector in zip(others, vectors)]
+
+    def collapsed(self, x: Array, z: Array) -> bool:
+        """Return whether the solution itself has no size."""
+        return self.base.collapsed(x[: self.base.size], z[: self.base.size])
+
 
 class _Inside:
     """Factors of an extended system for right-hand sides of the underlying one: its own equations hold."""
@@ -245,17 +260,3 @@ class _ExtendedStatement:
     def batch(self, name: str) -> Batch:
         """Return functions of the problem, compiled."""
         return self.problem.batch(name)
-
-
-@in_phase.register
-def _of_curves(system: Extended, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
-    """The solution itself shifted; the unknowns that the curve adds stay."""
-    size = system.base.size
-    inside, others = in_phase(system.base, x[:size], [vector[:size] for vector in vectors], reference[:size])
-    return np.append(inside, x[size:]), [np.append(other, vector[size:]) for other, vector in zip(others, vectors)]
-
-
-@collapsed.register
-def _of_curves_of_cycles(system: Extended, x: Array, z: Array) -> bool:
-    """The solution itself has no size."""
-    return collapsed(system.base, x[: system.base.size], z[: system.base.size])

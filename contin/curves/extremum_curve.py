@@ -16,8 +16,6 @@ from contin.arrays import Array
 from contin.curves.extended import FITS, Borders, Extended
 from contin.curves.fold_curve import shrinking
 from contin.detection.extrema import Stationarity, curvatures
-from contin.detection.test_functions import own_test_functions
-from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.trial import TestFunction, Trial
@@ -76,18 +74,16 @@ class ExtremumCurve(Extended):
         found = self.stationarity(x)
         return self.with_own_rows(x, (found.gradients(), found.g), rows, columns)
 
+    def events(self) -> list[TestFunction]:
+        """Return those of extrema in one parameter more: the derivative by the held parameter vanishes, too.
 
-@own_test_functions.register
-def _of_extremum_curve(system: ExtremumCurve) -> list[TestFunction]:
-    """Extrema in one parameter more: the derivative of G by the held parameter vanishes, not only that along the curve.
+        That along the curve vanishes where the curve turns, as well.
+        """
 
-    That along the curve vanishes where the curve turns, too.
-    """
+        def slope(trial: Trial) -> float:
+            system: Any = trial.system
+            return float(system.stationarity(trial.x).by_held[0])
 
-    def slope(trial: Trial) -> float:
-        system: Any = trial.system
-        return float(system.stationarity(trial.x).by_held[0])
-
-    objective = system.objective
-    found = [TestFunction("EX", objective, slope, describe=lambda trial: curvatures(trial, objective), column=objective)]
-    return [*found, *shrinking(system.base)] if isinstance(system.base, PeriodicCollocation) else found
+        name = self.objective
+        found = TestFunction("EX", name, slope, describe=lambda trial: curvatures(trial, name), column=name)
+        return [found, *shrinking(self.base)]

@@ -19,14 +19,10 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.curves.critical_curve import other_pairs, signed_smallest
 from contin.curves.extended import FITS, Borders, Extended, cosine
 from contin.detection.interpolated import interpolated_zero
 from contin.detection.segment import Segment, SpecialPoint
-from contin.detection.test_functions import own_test_functions
-from contin.discretization.algebraic import Algebraic
-from contin.discretization.cycles import PeriodicCollocation
-from contin.discretization.maps import MapSystem
+from contin.discretization.protocol import Discretization
 from contin.discretization.system import System
 from contin.linalg.factors import Factors
 from contin.stepping.state import Reason, Stop
@@ -35,17 +31,13 @@ from contin.stepping.trial import TestFunction, Trial
 #: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
 #: from those of the equilibrium by the square of the size. With 1e-3 Newton's method fails: the equations are nearly singular.
 _SHRUNK = 0.1
-#: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
-_REAL = 1e-12
 #: w.F_mu is interpolated to the zero of w.F_lambda only where its first estimate there is below this part of its values at the
 #: ends of the step; the location decides. Ten times smaller, long steps miss the zero.
 _SMALL = 0.3
 #: Parameters turn at a point where their part of the unit tangent is below this: interpolated tangents are better known.
 _TURNS = 1e-4
 #: Vectors are normal to each other where the cosine between them is smaller: their round-off.
-_NORMAL = 1e-10
-#: The same of cycles of maps, without a mesh: a point is located to this part of the way on which the cosine is of order one.
-_NORMAL_OF_MAPS = 1e-14
+NORMAL = 1e-10
 #: Rounds of inverse iteration that make borders of random vectors; each is closer by the ratio of the smallest singular values.
 _ROUNDS = 3
 
@@ -112,25 +104,17 @@ class FoldCurve(Extended):
         v, w, g = self.null_vectors(x)
         return self.with_own_rows(x, (self.gradient(x, v, w)[None], np.array([g])), rows, columns)
 
+    def events(self) -> list[TestFunction]:
+        """Return those of cusps (w.F_zz v v = 0), of folds that meet a branch point (w.F_lambda = 0), and of the kind."""
+        cusp = TestFunction("CP", "cusp", _bend, search=lambda segment, _: None if _may_be_cusp(segment) else [])
+        return [cusp, _MEETS, *self.base.events_on_folds()]
 
-@own_test_functions.register
-def _of_fold_curve(system: FoldCurve) -> list[TestFunction]:
-    """Codimension two: cusps (w.F_zz v v = 0), and where the fold meets a branch point (w.F_lambda = 0)."""
 
-    def cusp(trial: Trial) -> float:
-        system: Any = trial.system
-        v, w, _ = system.null_vectors(trial.x)
-        return float(system.gradient(trial.x, v, w) @ v)
-
-    found = [
-        TestFunction("CP", "cusp", cusp, search=lambda segment, _: None if _may_be_cusp(segment) else []),
-        _MEETS,
-    ]
-    if isinstance(system.base, Algebraic) and system.base.problem.dynamics:
-        found += _of_equilibria()
-    if isinstance(system.base, PeriodicCollocation | MapSystem):
-        found += _of_cycles(system.base)
-    return found
+def _bend(trial: Trial) -> float:
+    """Return w.F_zz v v."""
+    system: Any = trial.system
+    v, w, _ = system.null_vectors(trial.x)
+    return float(system.gradient(trial.x, v, w) @ v)
 
 
 def _may_be_cusp(segment: Segment) -> bool:
@@ -191,10 +175,10 @@ def turns_back(trial: Trial, parameters: Any) -> bool:
 _MEETS = TestFunction("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment))
 
 
-def shrinking(cycles: PeriodicCollocation) -> list[TestFunction]:
+def shrinking(base: Discretization) -> list[TestFunction]:
     """Return the test function of the end of a curve where cycles shrink onto an equilibrium; beyond it is itself.
 
-    At the equilibrium the equations of the curve are singular, so the run ends a little before. With a forcing there is none.
+    At the equilibrium the equations of the curve are singular, so the run ends a little before. Other solutions do not shrink.
     """
 
     def amplitude(trial: Trial) -> float:
@@ -202,55 +186,10 @@ def shrinking(cycles: PeriodicCollocation) -> list[TestFunction]:
         return float(system.base.amplitude(trial.x[: system.base.size])) - _SHRUNK
 
     name = "the end, near a Hopf point where the cycles have no size"
-    return [TestFunction("EP", name, amplitude, terminal=True)] if cycles.autonomous else []
+    return [TestFunction("EP", name, amplitude, terminal=True)] if base.size_of_solutions is not None else []
 
 
-def normal_product(v: Array, w: Array, noise: float = _NORMAL) -> float:
+def normal_product(v: Array, w: Array, noise: float = NORMAL) -> float:
     """Return the cosine between two vectors; 0 where it is round-off, as all along a curve of a conservative system."""
     cosine = float(v @ w) / float(np.linalg.norm(v) * np.linalg.norm(w))
     return cosine if abs(cosine) > noise else 0.0
-
-
-def _of_cycles(cycles: PeriodicCollocation | MapSystem) -> list[TestFunction]:
-    """Where a further multiplier of a cycle is one (the change of g with the multiplier vanishes), or another is -1."""
-    autonomous = isinstance(cycles, PeriodicCollocation) and cycles.autonomous
-    critical = 1 + autonomous
-    ends, noise = ([], _NORMAL_OF_MAPS) if isinstance(cycles, MapSystem) else (shrinking(cycles), _NORMAL)
-
-    def further(trial: Trial) -> float:
-        system: Any = trial.system
-        v, w, _ = system.null_vectors(trial.x)
-        n = len(system.problem.states)
-        return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:], noise)
-
-    def flip(trial: Trial) -> float:
-        system: Any = trial.system
-        exponents = system.base.eigenvalues(trial.x)
-        others = exponents[np.argsort(np.abs(exponents))[critical:]]
-        size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
-        multipliers = np.exp(others - size)
-        multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
-        return signed_smallest(np.exp(-size) + multipliers)
-
-    return [*ends, TestFunction("R1", "resonance 1:1", further), TestFunction("LPPD", "fold-flip", flip)]
-
-
-def _of_equilibria() -> list[TestFunction]:
-    """Where a second eigenvalue of an equilibrium is zero (Bogdanov-Takens), or a pair is imaginary (zero-Hopf)."""
-
-    def double_zero(trial: Trial) -> float:
-        system: Any = trial.system
-        v, w, _ = system.null_vectors(trial.x)
-        base, scales = system.base, system.base.scales
-        v, w = v[: base.state_size] * scales.states, w / scales.rows["residual"]
-        return float(w @ v) / float(np.linalg.norm(v) * np.linalg.norm(w))
-
-    def others(trial: Trial) -> tuple[float, bool]:
-        system: Any = trial.system
-        values = system.base.eigenvalues(trial.x)
-        return other_pairs(np.delete(values, np.argmin(np.abs(values))))
-
-    return [
-        TestFunction("BT", "Bogdanov-Takens", double_zero),
-        TestFunction("ZH", "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
-    ]

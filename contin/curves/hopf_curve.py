@@ -17,7 +17,6 @@ from contin.arrays import Array, ComplexArray
 from contin.curves.critical_curve import CriticalCurve, other_pairs, signed_smallest
 from contin.curves.extended import Borders
 from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
-from contin.detection.test_functions import own_test_functions
 from contin.discretization.system import System
 from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.stepping.trial import TestFunction, Trial
@@ -79,36 +78,34 @@ class HopfCurve(CriticalCurve):
         values = eigenvalues(self.matrix(x))
         return values[np.argsort(np.abs(values**2 + self.kappa(x)))[2:]]
 
+    def events(self) -> list[TestFunction]:
+        """Return those of Bogdanov-Takens, generalized Hopf (Bautin), zero-Hopf (fold-Hopf) and double Hopf points."""
 
-@own_test_functions.register
-def _of_hopf_curve(system: HopfCurve) -> list[TestFunction]:
-    """Codimension two: Bogdanov-Takens, Bautin (generalized Hopf), fold-Hopf (zero-Hopf) and double Hopf points."""
+        def curve(trial: Trial) -> HopfCurve:
+            return cast(HopfCurve, trial.system)
 
-    def curve(trial: Trial) -> HopfCurve:
-        return cast(HopfCurve, trial.system)
+        def kappa(trial: Trial) -> float:
+            return curve(trial).kappa(trial.x) / curve(trial).kappa_size
 
-    def kappa(trial: Trial) -> float:
-        return curve(trial).kappa(trial.x) / curve(trial).kappa_size
+        def lyapunov(trial: Trial) -> float:
+            return curve(trial).lyapunov(trial.x).signed
 
-    def lyapunov(trial: Trial) -> float:
-        return curve(trial).lyapunov(trial.x).signed
+        def is_zero(trial: Trial) -> bool:
+            return curve(trial).lyapunov(trial.x).vanishes
 
-    def is_zero(trial: Trial) -> bool:
-        return curve(trial).lyapunov(trial.x).vanishes
+        def zero(trial: Trial) -> float:
+            return signed_smallest(curve(trial).others(trial.x))
 
-    def zero(trial: Trial) -> float:
-        return signed_smallest(curve(trial).others(trial.x))
+        def pairs(trial: Trial) -> float:
+            return other_pairs(curve(trial).others(trial.x))[0]
 
-    def pairs(trial: Trial) -> float:
-        return other_pairs(curve(trial).others(trial.x))[0]
+        def has_pair(trial: Trial) -> bool:
+            return other_pairs(curve(trial).others(trial.x))[1]
 
-    def has_pair(trial: Trial) -> bool:
-        return other_pairs(curve(trial).others(trial.x))[1]
-
-    found = [
-        TestFunction("BT", "Bogdanov-Takens", kappa, terminal=True),
-        TestFunction("GH", "generalized Hopf", lyapunov, confirm=is_zero),
-    ]
-    if system.base.state_size > 2:
-        found += [TestFunction("ZH", "zero-Hopf", zero), TestFunction("HH", "double Hopf", pairs, confirm=has_pair)]
-    return found
+        found = [
+            TestFunction("BT", "Bogdanov-Takens", kappa, terminal=True),
+            TestFunction("GH", "generalized Hopf", lyapunov, confirm=is_zero),
+        ]
+        if self.base.state_size > 2:
+            found += [TestFunction("ZH", "zero-Hopf", zero), TestFunction("HH", "double Hopf", pairs, confirm=has_pair)]
+        return found

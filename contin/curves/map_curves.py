@@ -21,7 +21,6 @@ from contin.curves.extended import Borders
 from contin.curves.multipliers import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.detection.lyapunov import Coefficient
 from contin.detection.map_normal_forms import period_doubling, torus
-from contin.detection.test_functions import own_test_functions
 from contin.discretization.maps import MapSystem
 from contin.discretization.system import System
 from contin.linalg.dense import DenseFactors
@@ -79,6 +78,10 @@ class MapDoublingCurve(Doubling, MapCurve):
         """Return those of the underlying problem, and c."""
         return np.append(super().functionals(x), self.normal_form(x).value)
 
+    def events(self) -> list[TestFunction]:
+        """Return those of a second multiplier -1, and of generalized period doublings."""
+        return [second_doubling(), degenerate("GPD", "generalized period doubling")]
+
 
 class MapTorusCurve(Pair, MapCurve):
     """Torus bifurcations; columns ``normal_form``, Re d, and ``angle``, theta."""
@@ -96,16 +99,10 @@ class MapTorusCurve(Pair, MapCurve):
         *known, angle = super().functionals(x)
         return np.array([*known, self.normal_form(x).value, angle])
 
+    def events(self) -> list[TestFunction]:
+        """Return those of strong resonances and Chenciner points."""
+        return [*resonances(), degenerate("CH", "Chenciner")]
+
 
 #: Of long cycles, and where it is infinite.
 _UNKNOWN = Coefficient(math.nan, math.nan, math.nan)
-
-
-@own_test_functions.register
-def _of_torus_curve(system: MapTorusCurve) -> list[TestFunction]:
-    return [*resonances(), degenerate("CH", "Chenciner")]
-
-
-@own_test_functions.register
-def _of_doubling_curve(system: MapDoublingCurve) -> list[TestFunction]:
-    return [second_doubling(), degenerate("GPD", "generalized period doubling")]

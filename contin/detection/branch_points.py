@@ -15,7 +15,6 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.detection.branch_point import locate_branch_point
 from contin.detection.crossings import calm, crossings, passed, quotients
-from contin.detection.floquet import keep_off_one
 from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
 from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.protocol import inner
@@ -61,7 +60,9 @@ class BranchPointSearch:
         row, size = state.row, state.system.size
         if before.factors is None:
             before.refactor(row)
-        if before.sign == trial.sign and (keep_off_one(self.segment) or calm(before.factors, trial.factors, size)):
+        if before.sign == trial.sign and (
+            state.system.cannot_branch(self.segment) or calm(before.factors, trial.factors, size)
+        ):
             return 0, True
         before.refactor(row)
         values = quotients(before.factors, trial.factors, size)

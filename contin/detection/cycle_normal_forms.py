@@ -29,16 +29,20 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array
+from contin.detection.floquet import has_double_one
 from contin.detection.lyapunov import Coefficient
-from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
+from contin.detection.segment import SpecialPoint
 from contin.discretization.multilinear import of_complex
 from contin.discretization.round import Round, Solver
 from contin.problems.cycle import PERIOD
+
+if TYPE_CHECKING:
+    from contin.discretization.cycles import PeriodicCollocation
 
 #: Rounds of inverse iteration for null vectors, from random borders; the first leaves an error of the size of the multiplier's.
 _ROUNDS = 3
@@ -85,9 +89,10 @@ class NormalForms:
 
     def _of_fold(self) -> Array:
         v, w = self._null_vectors(self.phased, 1.0)
-        if isinstance(self.system, CycleCollocation):
-            states = np.ascontiguousarray(self.x[: self.system.state_size].reshape(self.system.nodes.size, -1))
-            along = self.system.rates(self.x, states).ravel()
+        system: Any = self.system
+        if system.autonomous:
+            states = np.ascontiguousarray(self.x[: system.state_size].reshape(system.nodes.size, -1))
+            along = system.rates(self.x, states).ravel()
             v[: along.size] -= self._mean(v, along) / self._mean(along, along) * along
         v = v / np.sqrt(self._mean(v, v))
         u, alpha = self._at_points(v), (v[-1] / self.period if self.system.autonomous else 0.0)
@@ -177,3 +182,18 @@ class NormalForms:
         """Return J v."""
         result: Array = np.einsum("kij,kj->ki", self.jacobian, v)
         return result
+
+
+def at_special_point(system: PeriodicCollocation, point: SpecialPoint) -> Coefficient | None:
+    """Return the coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses.
+
+    These have none where a multiplier is 1, too: the cycle is not isolated, as in conservative systems.
+    """
+    with np.errstate(all="ignore"):
+        if point.label == "LP" and point.details is None and point.is_located:
+            return NormalForms(system, point.trial.x).fold()
+        if point.label not in ("PD", "BP", "TR") or not point.is_simple or has_double_one(system, point.trial.x):
+            return None
+        if point.label in ("PD", "BP"):
+            return NormalForms(system, point.trial.x).period_doubling()
+        return NormalForms(system, point.trial.x).torus(point.details["frequency"])

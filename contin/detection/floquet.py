@@ -14,7 +14,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,13 +23,16 @@ from contin.detection.hopf import hopf, hopf_points, passes
 from contin.detection.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.detection.significance import on_finer_mesh
-from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
-from contin.discretization.maps import MapSystem
 from contin.discretization.protocol import Discretization
 from contin.discretization.rounding import changes_of_multipliers
 from contin.errors import ConvergenceError
 from contin.stepping.newton import Newton, correct
+from contin.stepping.state import Reason, Stop
 from contin.stepping.trial import TestFunction, Trial, sign_changed
+
+if TYPE_CHECKING:
+    from contin.discretization.cycles import PeriodicCollocation
+    from contin.discretization.maps import MapSystem
 
 #: Where a step is looked at inside, on the cubic, as parts of it: also beside its ends, where a dip towards zero would show at
 #: no other place. Without those two of Mathieu's doublings, a part of .03 and .04 behind the beginning of a step, are passed.
@@ -92,29 +95,23 @@ def floquet(
     The tangent is NaN where it is not known. ``errors`` are those of the free parameters at a located point: how far it may lie
     from its place, and how much the multipliers change over that distance. At a ``fold`` one of them is 1 besides.
     """
-    cycles, x_of = _cycles(system), slice(0, _cycles(system).size)
+    cycles: Any = system.solution
+    x_of = slice(0, cycles.size)
     values, trivial = cycles.eigenvalues(x[x_of]), _trivial(cycles, x[x_of])
-    if isinstance(cycles, MapSystem):
+    if not cycles.intervals:  # of a map
         found = changes_of_multipliers(cycles.eigenvalues, x[x_of], values)
         return Floquet(values, found, unstable(cycles, x[x_of]))
     finer: Any
     finer, carry = system.refined()  # type: ignore[misc]  # there is a mesh
     try:
         again = _corrected(finer, carry(x), carry(tangent))
-        found = _apart(values, _cycles(finer).eigenvalues(again[: _cycles(finer).size]))
+        found = _apart(values, finer.solution.eigenvalues(again[: finer.solution.size]))
     except ConvergenceError:
         found = np.full(values.shape, np.nan)
     found += _by_place(system, x, tangent, errors or {}, fold)
     if trivial is not None:
         found[trivial] = abs(values[trivial])
     return Floquet(cycles.whole_round(values), cycles.order * found, unstable(cycles, x[x_of]))
-
-
-def _cycles(system: Any) -> PeriodicCollocation | MapSystem:
-    """Return the system of cycles, of one that may be an extended system of theirs."""
-    while not isinstance(system, (PeriodicCollocation, MapSystem)):
-        system = system.base
-    return system
 
 
 def _by_place(system: Any, x: Array, tangent: Array, errors: Mapping[str, float], fold: bool) -> Array | float:
@@ -128,7 +125,8 @@ def _by_place(system: Any, x: Array, tangent: Array, errors: Mapping[str, float]
     if not known or not np.isfinite(known).all():
         return 0.0
     error, rate = np.linalg.norm(known, axis=0)
-    cycles, beside = _cycles(system), x + _ASIDE * tangent
+    cycles: Any = system.solution
+    beside = x + _ASIDE * tangent
     values, trivial = cycles.eigenvalues(x[: cycles.size]), _trivial(cycles, x[: cycles.size])
     changes: Array = _apart(values, cycles.eigenvalues(beside[: cycles.size])) / _ASIDE
     distance = error / rate if rate > 0 else 0.0
@@ -160,7 +158,7 @@ def _apart(values: ComplexArray, others: ComplexArray) -> Array:
 
 def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
     """Return the place of the multiplier that is 1 along every autonomous cycle; None of a forced one."""
-    return int(np.abs(system.eigenvalues(x)).argmin()) if isinstance(system, CycleCollocation) else None
+    return int(np.abs(system.eigenvalues(x)).argmin()) if system.autonomous else None
 
 
 def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = _NEARLY_ONE) -> int:
@@ -212,6 +210,17 @@ def _of_doubling(trial: Trial) -> dict[str, float]:
     return {"frequency": math.pi, "pairs": 1}
 
 
+def doubled(system: PeriodicCollocation | MapSystem, point: SpecialPoint) -> SpecialPoint:
+    """Return a special point, as the end of the branch where a cycle comes to go twice round one of half its period.
+
+    Beyond it the branch is itself, half a period on.
+    """
+    if point.label != "BP" or point.name in ("start", "symmetry breaking") or not system.is_doubled(point.trial.x):
+        return point
+    stop = Stop(Reason.PERIOD_DOUBLING, "the cycles come to go twice round cycles of half the period, at a period doubling")
+    return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)
+
+
 def _may_double(segment: Segment) -> bool:
     """Return whether there may be period doublings inside a step."""
     test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
@@ -241,7 +250,7 @@ def _comes_near(segment: Segment, what: int) -> bool:
     """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
     ends = np.array([_without_trivial(segment.before), _without_trivial(segment.trial)])
     real, imaginary = np.ascontiguousarray(ends.real), np.ascontiguousarray(ends.imag)
-    return bool(comes_near(real, imaginary, what, int(isinstance(segment.trial.system, MapSystem))))
+    return bool(comes_near(real, imaginary, what, int(not segment.trial.system.intervals)))
 
 
 @functools.lru_cache(maxsize=4)
@@ -258,7 +267,7 @@ def keep_off_one(segment: Segment) -> bool:
 
     That is where cycles branch.
     """
-    return isinstance(segment.trial.system, PeriodicCollocation) and not _comes_near(segment, ONE)
+    return not _comes_near(segment, ONE)
 
 
 def _changes_on_finer_mesh(left: Trial, right: Trial, test: TestFunction, newton: Newton) -> bool:

@@ -7,21 +7,25 @@ longer cycles mean nothing.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
-from contin.discretization.cycles import CycleCollocation
 from contin.errors import ConvergenceError
 from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
 from contin.problems.angles import whole_rounds
 from contin.problems.cycle import PERIOD
 from contin.stepping.newton import correct
+from contin.stepping.state import Stop
 from contin.stepping.trial import TestFunction, Trial, linearization
+
+if TYPE_CHECKING:
+    from contin.discretization.cycles import CycleCollocation
 
 #: A branch ends where the least speed of a cycle is below this part of the largest: the square root of round-off. Ten times
 #: larger, homoclinic points are known to 1e-14 and not to the last digit.
@@ -221,6 +225,22 @@ def limit_of_parameter(system: CycleCollocation, x: Array, place: RestingPlace) 
         return None
     error = abs(value - shorter) + abs(value - better) + np.finfo(float).eps * abs(value)
     return Limit(name, better, float(error)) if np.isfinite(error) else None
+
+
+def explained(system: CycleCollocation, stop: Stop, x: Array) -> Stop:
+    """Return the end of a branch, where the period runs away with the equilibrium near which the cycle spends its time.
+
+    With the limit of the parameter, if it is known.
+    """
+    place = None if system.has_shrunk(x) else resting_place(system, x)
+    if place is None:
+        return stop
+    message = f"{stop.message}; {place.describe(system.problem.state_names)}"
+    limit = limit_of_parameter(system, x, place)
+    if limit is None:
+        return dataclasses.replace(stop, message=message)
+    details = {f"limit_{limit.name}": limit.value, f"limit_{limit.name}_error": limit.error}
+    return dataclasses.replace(stop, message=f"{message}; {limit.describe()}", details=details)
 
 
 def _extrapolated(system: CycleCollocation, x: Array, law: tuple[str, float], less: float) -> float:

@@ -23,16 +23,19 @@ at the reference of the discretization.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.detection.segment import SpecialPoint
-from contin.discretization.connections import ConnectionCollocation
 from contin.linalg.orientation import oriented
 from contin.stepping.trial import TestFunction, Trial
+
+if TYPE_CHECKING:
+    from contin.discretization.connections import ConnectionCollocation
 
 #: A null vector's part at an end below this part of its length is round-off: the orbit is long. So is the component of a vector
 #: along another one, below this part of both lengths: where equations separate it is that everywhere, with any sign.
@@ -46,7 +49,7 @@ _TOO_NEAR = 1e-8
 _FAR = 0.2
 #: An eigenvalue whose real part is below this part of the largest one lies on the axis; a double zero is known to 1e-5.
 _ON_AXIS = 1e-3
-#: The labels of the test functions whose points `own_names` calls otherwise.
+#: The labels of the test functions whose points `named` calls otherwise.
 _LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
 #: An eigenvalue with a smaller imaginary part, relative to its size, is real.
 _REAL = 1e-8
@@ -75,7 +78,7 @@ def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
 def own_test_of(label: str, system: ConnectionCollocation, x: Array) -> TestFunction | None:
     """Return the test function that labels a special point x of a curve of homoclinic orbits so; None where none does.
 
-    Labels of `own_names` are those of the function that was located. Where two have the same label it is the one that vanishes.
+    Labels of `named` are those of the function that was located. Where two have the same label it is the one that vanishes.
     """
     trial, located = Trial.without_tangent(system, x), _LOCATED_AS.get(label, label)
     if label in ("IFS", "IFU"):
@@ -144,7 +147,16 @@ def ending(system: ConnectionCollocation, side: int) -> TestFunction:
     return _NON_CENTRAL[side] if system.problem.saddle_node else _ends(side)
 
 
-def own_names(point: SpecialPoint) -> tuple[str, str] | None:
+def named(point: SpecialPoint, solution: Trial | None = None) -> SpecialPoint:
+    """Return a neutral saddle, or the end of a curve, with label and name by which leading eigenvalues are complex.
+
+    ``solution`` is the orbit, where the point is one of a curve in two parameters.
+    """
+    names = _own_names(point if solution is None else dataclasses.replace(point, trial=solution))
+    return point if names is None else dataclasses.replace(point, label=names[0], name=names[1])
+
+
+def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
     """Return label and name of a neutral saddle, or of the end of a curve, whose leading eigenvalue is complex; else None."""
     if point.label not in ("NSS", "NCH", "BT") or not point.is_located:
         return None

@@ -12,21 +12,22 @@ cubic through both ends of a step, and the point from its own equations, which a
 
 from __future__ import annotations
 
-import functools
+import dataclasses
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.detection.root import find_zero
 from contin.detection.segment import Segment, SpecialPoint
-from contin.discretization.cycles import CycleCollocation
-from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.problems.cycle import PERIOD
 from contin.stepping.state import Reason, Stop
 from contin.stepping.trial import TestFunction, Trial
+
+if TYPE_CHECKING:
+    from contin.discretization.cycles import CycleCollocation
 
 #: Smallest size of a cycle as a part of that before the step. A branch that ends at a Hopf point is this near to it at the end
 #: of a step by chance only, and the step is halved then; Newton's method that falls onto an equilibrium is nearer by far.
@@ -46,20 +47,8 @@ _ON_AXIS = 1e-9
 AMPLITUDE = TestFunction("HB", "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
 
 
-def shrinks(system: Discretization) -> bool:
-    """Return whether solutions of a kind of problem can shrink onto others: whether it has an amplitude."""
-    return isinstance(system, CycleCollocation)
-
-
-@functools.singledispatch
-def own_home(system: Discretization, segment: Segment) -> SpecialPoint | None:
-    """Return the end of a branch inside a step that a kind of problem knows, or None. Each kind registers its own."""
-    return None
-
-
-@own_home.register
-def _of_cycles(system: CycleCollocation, segment: Segment) -> SpecialPoint | None:
-    """The Hopf point inside a step of a branch of cycles."""
+def hopf_point_inside(system: CycleCollocation, segment: Segment) -> SpecialPoint | None:
+    """Return the Hopf point inside a step of a branch of cycles, or None."""
     before, trial = segment.before.value(AMPLITUDE), segment.trial.value(AMPLITUDE)
     if not before > 0 > trial:
         return None
@@ -78,16 +67,15 @@ def _of_cycles(system: CycleCollocation, segment: Segment) -> SpecialPoint | Non
     return SpecialPoint(at, "HB", "Hopf", there, stop, details, errors=sizes)
 
 
-@functools.singledispatch
-def collapsed(system: Discretization, x: Array, z: Array) -> bool:
-    """Return whether a step from x to z has left its branch for solutions of no size. Each kind registers its own."""
-    return False
+def shrunk(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
+    """Return a special point, as the end of the branch where cycles have shrunk onto an equilibrium.
 
-
-@collapsed.register
-def _of_equilibria_as_cycles(system: CycleCollocation, x: Array, z: Array) -> bool:
-    """An equilibrium solves the equations of cycles with any period, and those of curves of them with some."""
-    return abs(system.amplitude(z)) < COLLAPSED * abs(system.amplitude(x))
+    Beyond the Hopf point the branch is itself, half a period later.
+    """
+    if not system.has_shrunk(point.trial.x):
+        return point
+    stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
+    return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
 
 
 def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, Array]:

@@ -19,8 +19,6 @@ from contin.arrays import Array
 from contin.detection.branch_point import BranchPoint
 from contin.detection.branch_points import BranchPointSearch
 from contin.detection.folds import FoldSearch
-from contin.detection.hopf_end import own_home
-from contin.detection.phase import in_phase, lasting
 from contin.detection.segment import Place, Segment, SpecialPoint, stop_of
 from contin.detection.trivial import crossed, round_off
 from contin.discretization.protocol import Discretization, inner
@@ -291,7 +289,7 @@ class Inspection:
     @functools.cached_property
     def _own_home(self) -> SpecialPoint | None:
         """The end of the branch that the kind of problem knows."""
-        return own_home(self.segment.trial.system, self.segment)
+        return self.segment.trial.system.home(self.segment)
 
     @functools.cached_property
     def _home(self) -> SpecialPoint | None:
@@ -354,7 +352,7 @@ class Inspection:
         if np.max(np.abs(x[size:] - trial.x[size:])) > REACH * step:
             return None
         x = state.system.lifted(x, trial.x)
-        first, (leaving,) = in_phase(state.system, x, (tangent,), trial.x)
+        first, (leaving,) = state.system.in_phase(x, (tangent,), trial.x)
         passed = [inner(state.system, end - first, leaving) for end in (state.x, trial.x)]
         if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, leaving) < _SAME_WAY:
             return None
@@ -405,7 +403,7 @@ def is_elsewhere(start: Start, before: Trial, trial: Trial, step: float) -> bool
     first, size = x[home.state_size :].tolist(), system.state_size
     if sum(math.dist(first, end.x[size:].tolist()) for end in (before, trial)) > REACH * step:
         return True  # the free parameters are
-    kept, ends = lasting(home, x), (lasting(system, end.x) for end in (before, trial))
+    kept, ends = home.lasting(x), (system.lasting(end.x) for end in (before, trial))
     return sum(math.dist(kept, end) for end in ends) > REACH * step
 
 

@@ -12,14 +12,17 @@ the centre manifold. Where it is positive the bifurcation is subcritical.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
-from contin.discretization.algebraic import Algebraic
+from contin.detection.segment import SpecialPoint
 from contin.discretization.multilinear import of_complex
 from contin.linalg.orientation import oriented
+
+if TYPE_CHECKING:
+    from contin.discretization.algebraic import Algebraic
 
 #: A coefficient is computed again at a point moved by so much, relative to 1 + |x|: points are located to 1e-14 at best.
 #: Ten times larger, errors are ten times as large.
@@ -84,11 +87,15 @@ _ASIDE, _ITERATIONS = 1e-8, 4
 
 
 class Coefficient(NamedTuple):
-    """A coefficient of a normal form, its estimated error, and the sum of the absolute values of its terms."""
+    """A coefficient of a normal form, its estimated error, and the sum of the absolute values of its terms.
+
+    The bifurcation is supercritical where ``side * value`` is negative.
+    """
 
     value: float
     error: float
     size: float
+    side: int = 1
 
     @classmethod
     def of(cls, terms: Callable[[Array], Array], x: Array, system: Any) -> Coefficient:
@@ -121,6 +128,14 @@ class Coefficient(NamedTuple):
         Where a coefficient is round-off of large terms, or infinite, its sign changes without a zero.
         """
         return abs(self.value) < _CANCELLED * self.size + _ZERO
+
+
+def at_hopf_point(system: Algebraic, point: SpecialPoint) -> Coefficient | None:
+    """Return the first Lyapunov coefficient where one pair crosses the axis; None at other special points."""
+    if point.label != "HB" or not point.is_simple:
+        return None
+    pair = critical_pair(system.jacobian(point.trial.x), point.details["frequency"])
+    return first_lyapunov(system, point.trial.x, pair)
 
 
 def first_lyapunov(system: Algebraic, x: Array, pair: CriticalPair) -> Coefficient:

@@ -26,19 +26,33 @@ supercritical. The sign of b depends on that of v, and its absolute value is giv
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.detection.lyapunov import Coefficient
-from contin.discretization.maps import MapSystem
+from contin.detection.segment import SpecialPoint
 from contin.discretization.multilinear import of_complex
+
+if TYPE_CHECKING:
+    from contin.discretization.maps import MapSystem
 
 #: Rounds of inverse iteration for null vectors, from random borders of this seed, as for cycles of vector fields.
 _ROUNDS, _SEED = 3, 11
 #: Largest number of unknown states: with twice as many, dense factors take eight times as long, a minute.
 _MOST = 2000
+
+
+def at_special_point(system: MapSystem, point: SpecialPoint) -> Coefficient | None:
+    """Return the coefficients of folds, and of period doublings and torus bifurcations where one multiplier or pair crosses."""
+    x = point.trial.x
+    with np.errstate(all="ignore"):
+        if point.label == "LP" and point.details is None and point.is_located:
+            return fold(system, x)
+        if point.label not in ("PD", "TR") or not point.is_simple:
+            return None
+        return period_doubling(system, x) if point.label == "PD" else torus(system, x, point.details["frequency"])
 
 
 def fold(system: MapSystem, x: Array) -> Coefficient | None:
@@ -48,8 +62,9 @@ def fold(system: MapSystem, x: Array) -> Coefficient | None:
 
 
 def period_doubling(system: MapSystem, x: Array) -> Coefficient | None:
-    """Return c."""
-    return _coefficient(system, x, _of_period_doubling)
+    """Return c, which is positive where they are supercritical."""
+    found = _coefficient(system, x, _of_period_doubling)
+    return None if found is None else found._replace(side=-1)
 
 
 def torus(system: MapSystem, x: Array, angle: float) -> Coefficient | None:

@@ -14,14 +14,12 @@ are tangents.
 
 from __future__ import annotations
 
-import functools
 import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.discretization.cycles import CycleCollocation
 from contin.discretization.protocol import Discretization, inner
 from contin.errors import ConvergenceError
 from contin.linalg.orientation import canonical_basis, ordered, oriented, oriented_along
@@ -235,7 +233,7 @@ def _described(manifold: _Manifold, s: Array, row: Array, slopes: Array) -> Mult
     home = row / system.weights
     along = np.array([inner(system, vector, home) for vector in basis])
     ours = along @ basis / np.linalg.norm(along)
-    directions, continuum = _branch_directions(manifold, s) if may_branch(system, x) else ([], False)
+    directions, continuum = _branch_directions(manifold, s) if system.may_branch(x) else ([], False)
     tangents = []
     for a in [] if continuum else directions:
         tangent = a @ vectors
@@ -293,18 +291,6 @@ def _spread_on_branch(manifold: _Manifold, s: Array, a: Array) -> float:
         if 0.5 < away / before < 2:
             return found
     return found
-
-
-@functools.singledispatch
-def may_branch(system: Discretization, x: Array) -> bool:
-    """Return whether other branches are looked for at a multiple point. Each kind of problem registers its own answer."""
-    return True
-
-
-@may_branch.register
-def _of_cycles(system: CycleCollocation, x: Array) -> bool:
-    """Not where cycles shrink onto an equilibrium: there the branch ends, and the search would take longer than the run."""
-    return not system.has_shrunk(x)
 
 
 def _branch_directions(manifold: _Manifold, s: Array) -> tuple[list[Array], bool]:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.discretization.cycles import CycleCollocation, ForcedCollocation
-from contin.discretization.maps import MapSystem
-from contin.discretization.protocol import Discretization
 from contin.problems.angles import whole_rounds
+
+if TYPE_CHECKING:
+    from contin.discretization.cycles import CycleCollocation, ForcedCollocation
+    from contin.discretization.maps import MapSystem
 
 #: Places at which two cycles are compared: a power of two for the Fourier transform, more than any cycle needs.
 _PLACES = 2048
@@ -23,15 +23,8 @@ _SAME = 1e-4
 _STEPS = 5
 
 
-@functools.singledispatch
-def lasting(system: Discretization, x: Array) -> Array:
-    """Return quantities that no shift in time changes; two solutions are as far from each other as theirs, at least."""
-    return x[system.state_size :]
-
-
-@lasting.register
-def _of_one_cycle(system: CycleCollocation, x: Array) -> Array:
-    """Free parameters, means of the states that are no angles, and the norm of the cycle without its mean."""
+def lasting(system: CycleCollocation, x: Array) -> Array:
+    """Return what a shift in time leaves as it is, as `CycleCollocation.lasting` does."""
     size, n = system.state_size, len(system.problem.state_names)
     states = x[:size].reshape(-1, n)[:, system.circles == 0]
     weights = system.weights[:size:n]
@@ -40,17 +33,8 @@ def _of_one_cycle(system: CycleCollocation, x: Array) -> Array:
     return np.concatenate([x[size:], means, [np.sqrt(max(square, 0.0))]])
 
 
-@functools.singledispatch
-def in_phase(system: Discretization, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
-    """Return a solution and vectors at it, the solution with angles nearest to those of another one.
-
-    An autonomous cycle is shifted in time to lie closest to that.
-    """
-    return system.lifted(x, reference), list(vectors)
-
-
-@in_phase.register
-def _of_cycles(system: CycleCollocation, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+def cycle_in_phase(system: CycleCollocation, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+    """Return a cycle, and vectors at it, shifted in time to lie closest to another one."""
     shift, size = _shift(system, x, reference), system.state_size
     times = (system.nodes + shift) % system.order
 
@@ -60,11 +44,13 @@ def _of_cycles(system: CycleCollocation, x: Array, vectors: Sequence[Array], ref
     return system.lifted(system.moved(x, shift), reference), [moved(vector) for vector in vectors]
 
 
-@in_phase.register
-def _of_forced_cycles(
+def forced_cycle_in_phase(
     system: ForcedCollocation, x: Array, vectors: Sequence[Array], reference: Array
 ) -> tuple[Array, list[Array]]:
-    """A cycle of several rounds may begin with any of them; one of a field that is odd after half a period has an image."""
+    """Return a forced cycle, and vectors at it, so that it lies closest to another one.
+
+    One of several rounds may begin with any of them; one of a field that is odd after half a period has an image.
+    """
     size, rounds = system.state_size, system.rounds
     places = [(number / rounds, 1.0) for number in range(rounds)]
     if _is_odd(system, x):
@@ -90,9 +76,8 @@ def _of_forced_cycles(
     return orbit(nearest), [moved(vector, nearest) for vector in vectors]
 
 
-@in_phase.register
-def _of_maps(system: MapSystem, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
-    """A cycle of several points may begin with any of them."""
+def map_in_phase(system: MapSystem, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+    """Return a cycle of a map, which may begin with any of its points, and vectors at it, to lie closest to another one."""
 
     def apart(shift: int) -> float:
         gap = system.lifted(system.moved(x, shift), reference) - reference

@@ -23,22 +23,22 @@ intervals are joined in the same way, as long as that holds. What is left is a s
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.basis import interpolation
-from contin.discretization.collocation import Collocation
-from contin.discretization.protocol import Discretization
 from contin.errors import ProblemError
 from contin.linalg.orientation import canonical_basis
-from contin.problems.variational import Symmetry, VariationalProblem
 from contin.stepping.trial import TestFunction, Trial
+
+if TYPE_CHECKING:
+    from contin.discretization.collocation import Collocation
+    from contin.problems.variational import Symmetry
 
 #: What is eliminated when intervals are joined has no smaller eigenvalue than this, of 1 where dx does not count: far from
 #: zero, so that elimination loses no digits.
@@ -99,25 +99,14 @@ class SecondVariation:
         )  # fmt: skip
 
 
-@functools.singledispatch
-def index_of(system: Discretization) -> TestFunction | None:
-    """Return the test function whose value is the index of a point; None for a kind of problem without one."""
-    return None
-
-
-@index_of.register
-def _of_boundary_value(system: Collocation) -> TestFunction | None:
-    return _INDEX if isinstance(system.problem, VariationalProblem) else None
-
-
 def _index(trial: Trial) -> float:
     system: Any = trial.system
     found = second_variation(system, trial.x)
     return np.nan if found is None else float(found.index())
 
 
-#: One object, so that a trial computes its index once.
-_INDEX = TestFunction("", "index", _index)
+#: The index of a state with an energy. One object, so that a trial computes it once.
+INDEX = TestFunction("", "index", _index)
 
 
 def contradiction(index: TestFunction | None, segment: Segment, special: Iterable[SpecialPoint]) -> str:
@@ -154,7 +143,7 @@ def stability_of(point: SpecialPoint) -> Stability:
     """Return what the second variation says of a point; at a special one, what vanishes there does not count."""
     trial, nullity = point.trial, nullity_of(point)
     if not nullity:
-        index = trial.value(_INDEX)
+        index = trial.value(INDEX)
         return Stability() if np.isnan(index) else Stability(int(index))
     system: Any = trial.system
     found = second_variation(system, trial.x)
@@ -295,8 +284,6 @@ def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
     ProblemError
         End conditions that repeat or contradict each other there.
     """
-    problem = system.problem
-    assert isinstance(problem, VariationalProblem)
     local = _intervals(system, x)
     if local is None:
         return None
@@ -476,8 +463,7 @@ def _reduced(system: Collocation, x: Array, pieces: _Pieces) -> tuple[Array, Arr
 
 def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:
     """Return the derivatives of e by (x0, x1), shape (conditions, 2n), and the second ones of Phi + sigma.e, shape (2n, 2n)."""
-    problem = system.problem
-    assert isinstance(problem, VariationalProblem)
+    problem: Any = system.problem
     n, batch, states = problem.dimension, problem.batch("boundary"), system.states(x)
     columns = batch.columns([])
     jacobian = batch.jacobian(np.zeros(1), states[:1], states[-1:], system.all_parameters(x), columns)[1][0]

@@ -80,6 +80,11 @@ class SpecialPoint:
         return self.name if self.is_located else f"possible {self.name}".strip()
 
     @property
+    def is_simple(self) -> bool:
+        """It was located, and one eigenvalue or pair is critical there."""
+        return self.is_located and isinstance(self.details, dict) and self.details.get("pairs") == 1
+
+    @property
     def closes(self) -> bool:
         """The branch closes here: it is the first point once more."""
         return self.stop is not None and self.stop.reason == Reason.CLOSED

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from contin.detection.folds import may_turn
-from contin.detection.hopf_end import AMPLITUDE, shrinks
 from contin.detection.inspection import Inspection
 from contin.detection.trivial import crossed
 from contin.discretization.protocol import Discretization
@@ -49,8 +48,8 @@ def watch_list(
         entries.append(_trivial(settings.trivial))
     if index is not None:
         entries.append(_changed(index))
-    if shrinks(system):
-        entries.append(_sign(AMPLITUDE))
+    if system.size_of_solutions is not None:
+        entries.append(_sign(system.size_of_solutions))
     return entries
 
 

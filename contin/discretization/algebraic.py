@@ -9,6 +9,10 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
+from contin.curves.folds_of_equilibria import events_on_folds
+from contin.detection.hopf import hopf
+from contin.detection.lyapunov import Coefficient, at_hopf_point
+from contin.detection.segment import SpecialPoint
 from contin.discretization.given import check_given
 from contin.discretization.mesh import MeshControl
 from contin.discretization.protocol import Carrier, Discretization
@@ -22,6 +26,7 @@ from contin.linalg.rightmost import nearest, rightmost
 from contin.linalg.sparse import SparseFactors
 from contin.problems.algebraic import AlgebraicProblem
 from contin.problems.angles import whole_rounds
+from contin.stepping.trial import TestFunction
 
 
 class Algebraic(System):
@@ -46,6 +51,8 @@ class Algebraic(System):
     intervals = 0
     degree = 0
     problem: AlgebraicProblem
+    #: What angles of a map gain over a cycle.
+    gain: Array | None = None
 
     def __init__(
         self,
@@ -383,6 +390,26 @@ class Algebraic(System):
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
         other = self._with(free=free, parameters=values)
         return other, other.pack(self.states(x), values)
+
+    # --- what the kind knows of its branches --------------------------------------------------------------------------
+
+    def events(self) -> list[TestFunction]:
+        """Return the test function of Hopf points, where the states move in time."""
+        return [hopf()] if self.problem.dynamics and self.state_size > 1 else []
+
+    @property
+    def small_equations(self) -> Batch | None:
+        """The residual; None of kinds that are made of this one, whose equations may be others, and with a given Jacobian."""
+        known: Batch = self._residual
+        return known if type(self) is Algebraic and self.problem.jacobian is None else None
+
+    def events_on_folds(self) -> list[TestFunction]:
+        """Return those of a second eigenvalue zero, or a pair on the imaginary axis."""
+        return events_on_folds() if self.problem.dynamics else []
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return the first Lyapunov coefficient at a Hopf point."""
+        return at_hopf_point(self, point)
 
 
 #: Smallest number of states for which a sparse matrix is considered. Below, a dense factorization takes no longer.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from contin.linalg.factors import Factors
 from contin.linalg.layout import Blocks, Layout, layout
 from contin.linalg.segments import run, share
 from contin.problems.boundary_value import BoundaryValueProblem
+
+if TYPE_CHECKING:
+    from contin.stepping.trial import TestFunction
 
 
 class Collocation(System):
@@ -603,6 +606,17 @@ class Collocation(System):
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
         other = self._with(free=free, parameters=values)
         return other, other.pack(self.states(x), values)
+
+    # --- what the kind knows of its branches --------------------------------------------------------------------------
+
+    def events(self) -> list[TestFunction]:
+        """Return those of the statement."""
+        return self.problem.events()
+
+    @property
+    def index(self) -> TestFunction | None:
+        """That of the statement."""
+        return self.problem.index
 
 
 #: Distance of a switch from a mesh point, as a part of the domain, up to which it lies there. Special points are off by about

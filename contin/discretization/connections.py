@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Indices
+from contin.detection.homoclinic_points import homoclinic_points, named
+from contin.detection.segment import SpecialPoint
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
 from contin.discretization.mesh import MeshControl
@@ -18,7 +20,8 @@ from contin.discretization.scales import Scales
 from contin.errors import ConvergenceError
 from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
-from contin.problems.connection import ConnectionProblem
+from contin.problems.connection import TIME, ConnectionProblem
+from contin.stepping.trial import TestFunction, Trial
 
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
 _MOVED = 1e-6
@@ -392,6 +395,24 @@ class ConnectionCollocation(Conditioned):
             return renewed, self.carrier(renewed)
         other = renewed._with(mesh=mesh)
         return other, self.carrier(other)
+
+    # --- what the kind knows of its branches --------------------------------------------------------------------------
+
+    def events(self) -> list[TestFunction]:
+        """Return those of special homoclinic orbits; those of a given time, and orbits between two equilibria, have none."""
+        return homoclinic_points(self) if self.problem.homoclinic and TIME not in self.free else []
+
+    def events_on_curves(self) -> list[TestFunction]:
+        """Return those of homoclinic orbits that are special in another way, too."""
+        return homoclinic_points(self)
+
+    def judged_on_curve(self, point: SpecialPoint, solution: Trial) -> SpecialPoint:
+        """Return neutral saddles and the like, by which of the leading eigenvalues are complex."""
+        return named(point, solution)
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return neutral saddles, and the end of a curve, by which of the leading eigenvalues are complex."""
+        return named(point)
 
 
 def _left_subspace(jacobian: Array, count: int, stable: bool) -> Array:

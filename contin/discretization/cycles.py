@@ -12,6 +12,14 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices, Mask
+from contin.curves.folds_of_cycles import events_on_folds
+from contin.detection.cycle_normal_forms import at_special_point
+from contin.detection.floquet import doubled, doubling, keep_off_one, torus
+from contin.detection.homoclinic import explained, homoclinic
+from contin.detection.hopf_end import AMPLITUDE, COLLAPSED, hopf_point_inside, shrunk
+from contin.detection.lyapunov import Coefficient
+from contin.detection.phase import cycle_in_phase, forced_cycle_in_phase, lasting
+from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.collocation import Collocation
 from contin.discretization.conditions import Conditioned
 from contin.discretization.extremes import extremes
@@ -29,6 +37,8 @@ from contin.linalg.periodic import log_eigenvalues_along
 from contin.linalg.transitions import interval_matrices
 from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
 from contin.problems.cycle import PERIOD, CycleProblem, rounds_of
+from contin.stepping.state import Reason, Stop
+from contin.stepping.trial import TestFunction, Trial
 
 #: A pair on the unit circle that is this near to -1, as an angle, is no torus bifurcation: round-off of a double one is its
 #: square root.
@@ -47,6 +57,8 @@ _PERIOD_SHARE = 0.1
 _MOVED = 1e-6
 
 
+#: Decimal places of a parameter that stands still: it does up to errors of meshes with the tolerance 1e-12.
+_DIGITS = 9
 #: Free parameters are multiplied by this to see whether a break of the forcing moves; it stands still within so much.
 _OTHERWISE, _STILL = 1.01, 1e-9
 
@@ -297,6 +309,28 @@ class PeriodicCollocation(Collocation):
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle; None where none do."""
 
+    # --- what the kind knows of its branches --------------------------------------------------------------------------
+
+    def events(self) -> list[TestFunction]:
+        """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
+        return [doubling(self.order), torus()]
+
+    def cannot_branch(self, segment: Segment) -> bool:
+        """Return whether no multiplier but the one that is 1 comes near 1: that is where cycles branch."""
+        return keep_off_one(segment)
+
+    def events_on_folds(self) -> list[TestFunction]:
+        """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
+        return events_on_folds(self)
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return a special point, as the end where cycles go twice round ones of half the period."""
+        return doubled(self, point)
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return those of folds, period doublings and torus bifurcations."""
+        return at_special_point(self, point)
+
 
 class ForcedCollocation(PeriodicCollocation):
     """A `CycleProblem` with a forcing, on a mesh. There is no phase condition, and no multiplier is 1 by itself.
@@ -338,6 +372,10 @@ class ForcedCollocation(PeriodicCollocation):
     def crossing(self, x: Array, frequency: float) -> tuple[str, str] | None:
         """Return label and name of a torus bifurcation; None near a double multiplier -1."""
         return None if is_opposite(frequency) else ("TR", "torus")
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return a cycle of several rounds, or one with an image, and vectors at it, to lie closest to another one."""
+        return forced_cycle_in_phase(self, x, vectors, reference)
 
 
 class CycleCollocation(Conditioned, PeriodicCollocation):
@@ -513,6 +551,55 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         other = self._with(mesh=mesh)
         other._set_reference(self._between(self.states(x), other.nodes))
         return other, self.carrier(other)
+
+    # --- what the kind knows of its branches --------------------------------------------------------------------------
+
+    def events(self) -> list[TestFunction]:
+        """Return also that of homoclinic orbits."""
+        return [*super().events(), homoclinic()]
+
+    @property
+    def size_of_solutions(self) -> TestFunction:
+        """The amplitude: cycles can shrink onto an equilibrium."""
+        return AMPLITUDE
+
+    def home(self, segment: Segment) -> SpecialPoint | None:
+        """Return the Hopf point inside a step."""
+        return hopf_point_inside(self, segment)
+
+    def collapsed(self, x: Array, z: Array) -> bool:
+        """Return whether z is an equilibrium, which solves the equations with any period, and curves of them with some."""
+        return abs(self.amplitude(z)) < COLLAPSED * abs(self.amplitude(x))
+
+    def may_branch(self, x: Array) -> bool:
+        """Return False where cycles shrink onto an equilibrium: there the branch ends, and the search takes long."""
+        return not self.has_shrunk(x)
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return a special point, as the end where cycles shrink, or go twice round ones of half the period."""
+        found = shrunk(self, point)
+        return super().judged(point) if found is point else found
+
+    def standstill(self, trial: Trial, primary: str) -> Stop:
+        """Return the end of a family at one value of the parameter: cycles of a Hamiltonian or linear system fill an area."""
+        value = round(trial[primary], _DIGITS) + 0.0
+        message = f"{primary} stays at {value:.10g}, up to errors of the mesh: a vertical family, as of a conservative system"
+        if primary == PERIOD:
+            return Stop(Reason.STANDSTILL, message, "all its cycles have this period; follow another parameter")
+        unfolds = f"where {primary} must be a parameter that breaks the conservation (unfolds it)"
+        return Stop(Reason.STANDSTILL, message, f'follow it with primary="{PERIOD}", {unfolds}')
+
+    def explained(self, stop: Stop, trial: Trial) -> Stop:
+        """Return the end where the period runs away with the equilibrium, and with the limit of the parameter."""
+        return explained(self, stop, trial.x)
+
+    def lasting(self, x: Array) -> Array:
+        """Return free parameters, means of the states that are no angles, and the norm of the cycle without its mean."""
+        return lasting(self, x)
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return a cycle, and vectors at it, shifted in time to lie closest to another one."""
+        return cycle_in_phase(self, x, vectors, reference)
 
 
 def _turns(times: Array) -> Indices:

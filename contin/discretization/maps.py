@@ -8,6 +8,12 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Mask
+from contin.curves.folds_of_cycles import events_on_folds
+from contin.detection.floquet import doubled, doubling, torus
+from contin.detection.lyapunov import Coefficient
+from contin.detection.map_normal_forms import at_special_point
+from contin.detection.phase import map_in_phase
+from contin.detection.segment import SpecialPoint
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import is_opposite, is_pair
 from contin.discretization.rounding import on_circle
@@ -17,6 +23,7 @@ from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.cycle import ROUNDS, rounds_of
 from contin.problems.map import MapProblem
+from contin.stepping.trial import TestFunction
 
 #: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
 _SHRUNK = 1e-7
@@ -49,8 +56,9 @@ class MapSystem(Algebraic):
     """
 
     problem: MapProblem
-    #: As of cycles: no symmetry is declared, and the multipliers are those of all rounds.
-    order = 1
+    gain: Array
+    #: As of cycles: no symmetry is declared, and the multipliers are those of all rounds; none of them is always 1.
+    order, autonomous = 1, False
 
     def __init__(
         self, problem: MapProblem, free: Sequence[str], parameters: Mapping[str, float] | None = None,
@@ -320,3 +328,31 @@ class MapSystem(Algebraic):
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapSystem, Array]:
         """Return the same."""
         return self, x
+
+    # --- what the kind knows of its branches --------------------------------------------------------------------------
+
+    def events(self) -> list[TestFunction]:
+        """Return those of period doublings and torus bifurcations."""
+        return [doubling(), torus()]
+
+    @property
+    def small_equations(self) -> Batch | None:
+        """The map, of fixed points."""
+        known: Batch = self.problem.batch("map")
+        return known if type(self) is MapSystem and self.rounds == 1 else None
+
+    def events_on_folds(self) -> list[TestFunction]:
+        """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
+        return events_on_folds(self)
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return a special point, as the end where cycles go twice round ones of half their length."""
+        return doubled(self, point)
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return those of folds, period doublings and torus bifurcations."""
+        return at_special_point(self, point)
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return a cycle, which may begin with any of its points, and vectors at it, to lie closest to another one."""
+        return map_in_phase(self, x, vectors, reference)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -18,6 +18,13 @@ from contin.discretization.multilinear import of_lines
 from contin.discretization.switching import NOWHERE, Switching
 from contin.linalg.factors import Factors
 from contin.problems.statement import Statement
+
+if TYPE_CHECKING:
+    from contin.detection.lyapunov import Coefficient
+    from contin.detection.segment import Segment, SpecialPoint
+    from contin.functions.batch import Batch
+    from contin.stepping.state import Stop
+    from contin.stepping.trial import TestFunction, Trial
 
 #: Takes vectors of unknowns from one discretization of a problem to another.
 Carrier = Callable[[Array], Array]
@@ -169,6 +176,87 @@ class Discretization(Equations, Protocol):
     def bends(self, x: Array) -> Array | None:
         """Return errors of second derivatives at mesh points that show corners of functions in Python; None if not known."""
         return None
+
+    # --- what a kind of problem knows of its branches; the answers here are those of a kind that knows nothing -----------
+
+    @property
+    def solution(self) -> Discretization:
+        """The problem whose solutions are followed: of a curve in two parameters the one that it is made of, else itself."""
+        return self
+
+    def events(self) -> list[TestFunction]:
+        """Return the test functions that the kind brings, beyond folds and branch points.
+
+        Their signs may differ between meshes. They ask ``trial.system``: the mesh changes along a branch.
+        """
+        return []
+
+    @property
+    def index(self) -> TestFunction | None:
+        """The test function whose value is the index of a point, of a problem with an energy."""
+        return None
+
+    @property
+    def size_of_solutions(self) -> TestFunction | None:
+        """The test function of the size of a solution, with a sign, where solutions can shrink onto others."""
+        return None
+
+    @property
+    def small_equations(self) -> Batch | None:
+        """The functions of a problem without a mesh whose steps kernels may make; ``gain`` is what angles of a map gain."""
+        return None
+
+    def home(self, segment: Segment) -> SpecialPoint | None:
+        """Return the end of the branch inside a step, where solutions become those of another kind."""
+        return None
+
+    def collapsed(self, x: Array, z: Array) -> bool:
+        """Return whether a step from x to z has left its branch for solutions of no size."""
+        return False
+
+    def cannot_branch(self, segment: Segment) -> bool:
+        """Return whether both ends of a step of a branch say that no other branch crosses it there."""
+        return False
+
+    def may_branch(self, x: Array) -> bool:
+        """Return whether other branches are looked for at a multiple point."""
+        return True
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return a special point, with the label and name, or as the end of the branch, that the kind knows it by."""
+        return point
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return the coefficient of the normal form at a special point."""
+        return None
+
+    def events_on_folds(self) -> list[TestFunction]:
+        """Return the test functions of a curve of folds, beyond cusps and branch points."""
+        return []
+
+    def events_on_curves(self) -> list[TestFunction]:
+        """Return the test functions of a curve along which one of `events` stays zero."""
+        return []
+
+    def judged_on_curve(self, point: SpecialPoint, solution: Trial) -> SpecialPoint:
+        """Return a special point of such a curve, with ``solution`` there, by the label and name that the kind knows it by."""
+        return point
+
+    def standstill(self, trial: Trial, primary: str) -> Stop | None:
+        """Return the reason to end a run whose primary parameter has not moved; None to go on."""
+        return None
+
+    def explained(self, stop: Stop, trial: Trial) -> Stop:
+        """Return the reason why a run ends, with what the kind knows of its last point."""
+        return stop
+
+    def lasting(self, x: Array) -> Array:
+        """Return quantities that no shift in time changes; two solutions are as far from each other as theirs, at least."""
+        return x[self.state_size :]
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return a solution, and vectors at it, shifted in time to lie closest to another one; angles, by whole rounds."""
+        return self.lifted(x, reference), list(vectors)
 
 
 def inner(system: Discretization, a: Array, b: Array) -> float:

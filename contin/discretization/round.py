@@ -33,13 +33,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.discretization.cycles import CycleCollocation, PeriodicCollocation
 from contin.problems.cycle import PERIOD
+
+if TYPE_CHECKING:
+    from contin.discretization.cycles import PeriodicCollocation
 
 #: The seed of the rows H, which are random and orthonormal: thus they are in general position to the states at both ends that
 #: the collocation equations admit. With ten other seeds, a normal form at 16 states changes by 1e-13 of its value.
@@ -197,8 +199,9 @@ class Round:
     @functools.cached_property
     def direction(self) -> Array:
         """The row e, by the states at t = 0."""
-        assert isinstance(self.system, CycleCollocation)
-        return self.system.start_direction
+        system: Any = self.system
+        found: Array = system.start_direction
+        return found
 
     @functools.cached_property
     def free_by_period(self) -> Array:

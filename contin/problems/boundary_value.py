@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from contin import checks
 from contin.arrays import Function
@@ -14,6 +14,9 @@ from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
+
+if TYPE_CHECKING:
+    from contin.stepping.trial import TestFunction
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,6 +94,15 @@ class BoundaryValueProblem(Restated):
             raise ProblemError(f"rhs returns {self._counts['rhs']} values for the {len(self.state_names)} states {given}")
         known = (*self.parameters, *self.state_names)
         object.__setattr__(self, "phases", checks.chosen("phases", self.phases, known))
+
+    def events(self) -> list[TestFunction]:
+        """Return the test functions that the statement brings."""
+        return []
+
+    @property
+    def index(self) -> TestFunction | None:
+        """The test function whose value is the index of a solution; None without an energy."""
+        return None
 
     @property
     def state_names(self) -> tuple[str, ...]:

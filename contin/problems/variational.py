@@ -9,12 +9,14 @@ from typing import Any
 
 from contin import checks
 from contin.arrays import Array, Function
+from contin.detection.second_variation import INDEX, legendre
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.canonical import Canonical, Variation, canonical
 from contin.functions.signature import Arguments, argument_count
 from contin.problems.boundary_value import BoundaryValueProblem
 from contin.problems.statement import check_statement
+from contin.stepping.trial import TestFunction
 
 #: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
 Symmetry = Callable[[Array, Array], Array]
@@ -152,6 +154,15 @@ class VariationalProblem(BoundaryValueProblem):
             **dict.fromkeys(("energy", "kinematics", "integrals", "functionals"), inside), "ends": ends, "end_energy": ends,
             "hamiltonian": [None, v.states, v.states, v.parameters],
         }  # fmt: skip
+
+    def events(self) -> list[TestFunction]:
+        """Return that of Legendre's condition: where it fails, the energy is not convex in the controls."""
+        return [legendre()]
+
+    @property
+    def index(self) -> TestFunction:
+        """The number of independent ways to lower the energy."""
+        return INDEX
 
     @property
     def multipliers(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from contin.arrays import Array
 from contin.curves.extended import Extended
 from contin.detection.floquet import Floquet, floquet
 from contin.detection.phase_loads import phase_loads
-from contin.detection.second_variation import SecondVariation, index_of, second_variation
+from contin.detection.second_variation import SecondVariation, second_variation
 from contin.discretization.algebraic import Algebraic
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.maps import MapSystem
@@ -312,7 +312,7 @@ class Point:
         >>> straight.second_variation().index()
         1
         """
-        if index_of(self.system) is None:
+        if self.system.index is None:
             raise ProblemError("second_variation: the problem has no energy; state it as a VariationalProblem")
         found = second_variation(self.system, self.x)  # type: ignore[arg-type]
         if found is None:

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contin.arrays import Array
-from contin.discretization.algebraic import Algebraic
-from contin.discretization.maps import MapSystem
+from contin.functions.batch import Batch
 from contin.functions.interpreter import Loaded, Points, run_loaded
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
@@ -69,19 +68,15 @@ SIGN, UPDATES, ERROR = range(3)
 
 def equations_of(system: Any) -> Equations | None:
     """Return the equations of a small problem whose functions are recorded, of a map with one round; None of others."""
-    if type(system) not in (Algebraic, MapSystem) or system.size > _SMALL:
+    batch: Batch | None = system.small_equations
+    if batch is None or batch.interpreted is not None or system.size > _SMALL or system.size != system.equations + 1:
         return None
-    problem, is_map = system.problem, isinstance(system, MapSystem)
-    batch = problem.batch("map") if is_map else system._residual
-    recorded = problem.jacobian is None and batch.interpreted is None
-    if not recorded or getattr(system, "rounds", 1) != 1 or system.size != system.equations + 1:
-        return None
-    n, count, size = system.state_size, system.equations, system.size
-    scales = system.scales
-    rates = scales.rows["residual"] / scales.states if count == n else np.ones(count)
+    n, count, size, gain = system.state_size, system.equations, system.size, system.gain
+    rates = system.scales.rows["residual"] / system.scales.states if count == n else np.ones(count)
     return Equations(
         batch.load(), batch.load(batch.columns(system._free)), system.weights, rates,
-        system.gain if is_map else np.zeros(count), int(is_map), system._scaled_parameters(np.zeros(size)), system._free,
+        np.zeros(count) if gain is None else gain, int(gain is not None), system._scaled_parameters(np.zeros(size)),
+        system._free,
         np.zeros(1),
         np.empty((1, n)), np.empty((0, n)), np.empty((1, count)), np.zeros((1, count, size)), np.empty((0, 0, 0)),
     )  # fmt: skip

@@ -10,7 +10,6 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import ellipk
 
 import contin
-from contin.detection.phase import in_phase
 
 TWO_PI = 2 * math.pi
 
@@ -186,7 +185,7 @@ def test_forced_cycles_of_several_rounds_are_brought_in_phase():
     system, x = twice.system, twice.x
     later = system.moved(x, 0.5)
     later[: system.state_size : 2] += 3 * TWO_PI
-    found, _ = in_phase(system, later, (), x)
+    found, _ = system.in_phase(later, (), x)
     assert np.abs(found - x).max() < 1e-8
 
 
@@ -263,7 +262,7 @@ def test_splay_state_of_a_ring(symmetric):
     system = found.system
     shift = 0.4 * system.order
     later = system.moved(found.x, shift)
-    moved, _ = in_phase(system, later, (), found.x)
+    moved, _ = system.in_phase(later, (), found.x)
     assert np.abs(moved - found.x).max() < 1e-6
     whole = system.evaluate(found.x, np.array([0.0, float(system.order)]))
     assert np.abs(whole[1] - whole[0] - TWO_PI).max() < 1e-9

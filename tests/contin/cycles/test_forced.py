@@ -11,7 +11,6 @@ from scipy.special import mathieu_a, mathieu_b
 
 import contin
 from contin import CycleProblem, MeshControl, ProblemError
-from contin.detection.phase import in_phase
 
 
 def mathieu(t, u, p):
@@ -247,7 +246,7 @@ def test_cycles_of_several_rounds_are_brought_in_phase(shift, sign):
     system, x = point.system, point.x
     size = system.state_size
     image = np.append(sign * system.evaluate(x, (system.nodes + shift) % 1).ravel(), x[size:])
-    found, (vector,) = in_phase(system, image, (image,), x)
+    found, (vector,) = system.in_phase(image, (image,), x)
     assert np.abs(found - x).max() < 1e-6
     assert np.array_equal(found, vector)
 
@@ -260,4 +259,4 @@ def test_a_field_that_is_not_odd_has_no_mirror_image():
     point = contin.solve(problem, [4.0, 0.0])
     size = point.system.state_size
     image = np.append(-point.system.evaluate(point.x, (point.system.nodes + 0.5) % 1).ravel(), point.x[size:])
-    assert np.array_equal(in_phase(point.system, point.x, (), image)[0], point.x)
+    assert np.array_equal(point.system.in_phase(point.x, (), image)[0], point.x)
