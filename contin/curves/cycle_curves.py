@@ -17,8 +17,8 @@ from contin.arrays import Array
 from contin.curves.extended import Borders
 from contin.curves.fold_curve import FoldCurve, shrinking
 from contin.curves.multipliers import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
+from contin.detection.coefficient import Coefficient
 from contin.detection.cycle_normal_forms import NormalForms
-from contin.detection.lyapunov import Coefficient
 from contin.discretization.cycles import PeriodicCollocation
 from contin.discretization.round import Round
 from contin.discretization.system import System

@@ -16,7 +16,8 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.curves.critical_curve import CriticalCurve, other_pairs, signed_smallest
 from contin.curves.extended import Borders
-from contin.detection.lyapunov import Coefficient, critical_pair, first_lyapunov
+from contin.detection.coefficient import Coefficient
+from contin.detection.lyapunov import critical_pair, first_lyapunov
 from contin.discretization.system import System
 from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.stepping.trial import TestFunction, Trial

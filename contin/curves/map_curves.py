@@ -19,7 +19,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.curves.extended import Borders
 from contin.curves.multipliers import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
-from contin.detection.lyapunov import Coefficient
+from contin.detection.coefficient import Coefficient
 from contin.detection.map_normal_forms import period_doubling, torus
 from contin.discretization.maps import MapSystem
 from contin.discretization.system import System

@@ -23,8 +23,8 @@ import numpy as np
 from contin.arrays import Array
 from contin.curves.critical_curve import CriticalCurve
 from contin.curves.fold_curve import normal_product, turns_back
+from contin.detection.coefficient import Coefficient
 from contin.detection.interpolated import interpolated_zero
-from contin.detection.lyapunov import Coefficient
 from contin.detection.segment import Segment, SpecialPoint
 from contin.stepping.state import Reason, Stop
 from contin.stepping.trial import TestFunction, Trial

@@ -34,8 +34,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.detection.coefficient import Coefficient
 from contin.detection.floquet import has_double_one
-from contin.detection.lyapunov import Coefficient
 from contin.detection.segment import SpecialPoint
 from contin.discretization.multilinear import of_complex
 from contin.discretization.round import Round, Solver

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.detection.lyapunov import Coefficient
+from contin.detection.coefficient import Coefficient
 from contin.detection.segment import SpecialPoint
 from contin.discretization.multilinear import of_complex
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from contin.detection.lyapunov import Coefficient
+from contin.detection.coefficient import Coefficient
 from contin.detection.segment import Place, Segment, SpecialPoint
 from contin.names import value_names
 from contin.stepping.trial import TestFunction, Trial

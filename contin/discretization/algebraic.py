@@ -10,8 +10,9 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.curves.folds_of_equilibria import events_on_folds
+from contin.detection.coefficient import Coefficient
 from contin.detection.hopf import hopf
-from contin.detection.lyapunov import Coefficient, at_hopf_point
+from contin.detection.lyapunov import at_hopf_point
 from contin.detection.segment import SpecialPoint
 from contin.discretization.given import check_given
 from contin.discretization.mesh import MeshControl

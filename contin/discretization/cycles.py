@@ -13,11 +13,11 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices, Mask
 from contin.curves.folds_of_cycles import events_on_folds
+from contin.detection.coefficient import Coefficient
 from contin.detection.cycle_normal_forms import at_special_point
 from contin.detection.floquet import doubled, doubling, keep_off_one, torus
 from contin.detection.homoclinic import explained, homoclinic
 from contin.detection.hopf_end import AMPLITUDE, COLLAPSED, hopf_point_inside, shrunk
-from contin.detection.lyapunov import Coefficient
 from contin.detection.phase import cycle_in_phase, forced_cycle_in_phase, lasting
 from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.collocation import Collocation

@@ -9,8 +9,8 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray, Mask
 from contin.curves.folds_of_cycles import events_on_folds
+from contin.detection.coefficient import Coefficient
 from contin.detection.floquet import doubled, doubling, torus
-from contin.detection.lyapunov import Coefficient
 from contin.detection.map_normal_forms import at_special_point
 from contin.detection.phase import map_in_phase
 from contin.detection.segment import SpecialPoint

@@ -20,7 +20,7 @@ from contin.linalg.factors import Factors
 from contin.problems.statement import Statement
 
 if TYPE_CHECKING:
-    from contin.detection.lyapunov import Coefficient
+    from contin.detection.coefficient import Coefficient
     from contin.detection.segment import Segment, SpecialPoint
     from contin.functions.batch import Batch
     from contin.stepping.state import Stop
