@@ -1,20 +1,23 @@
 # The public names, and where they come from. `import contin` loads none of them: each is imported when it is first used.
-from .analysis.auto_07p import from_auto
-from .analysis.connections import homoclinic
-from .analysis.cycles import cycle
-from .analysis.diagram import Diagram, diagram
-from .analysis.sensitivity import sensitivities
-from .analysis.solving import solve
-from .analysis.two_parameter import curve
+from .boundary.segmented import Segment, SegmentedProblem
+from .boundary.statement import BoundaryValueProblem
+from .boundary.system import Collocation
+from .boundary.variational import VariationalProblem
+from .collocation.basis import basis, interpolation
+from .collocation.mesh import MeshControl
+from .connections.statement import ConnectionProblem
 from .continuation.run import Continuation, follow
-from .continuation.trace import trace
-from .detection.branch_point import BranchPoint, locate_branch_point
-from .detection.multiple_point import MultiplePoint
-from .discretization.algebraic import Algebraic
-from .discretization.basis import basis, interpolation
-from .discretization.collocation import Collocation
-from .discretization.mesh import MeshControl
+from .core.newton import Newton, correct
+from .core.settings import Settings
+from .core.state import Reason, State, Stop
+from .core.trial import Monitor, TestFunction, Trial
+from .cycles.map_statement import MapProblem
+from .cycles.statement import CycleProblem
+from .equilibria.statement import AlgebraicProblem
+from .equilibria.system import Algebraic
 from .errors import ContinError, ConvergenceError, ProblemError
+from .events.branch_point import BranchPoint, locate_branch_point
+from .events.multiple_point import MultiplePoint
 from .files import temporary_name, write_whole
 from .functions.batch import Batch
 from .functions.cache import cache_directory
@@ -22,22 +25,19 @@ from .functions.gradient import gradient
 from .functions.iteration import least, minimum, root
 from .linalg.orientation import eigenbasis
 from .names import exact_text
-from .problems.algebraic import AlgebraicProblem
-from .problems.boundary_value import BoundaryValueProblem
-from .problems.connection import ConnectionProblem
-from .problems.cycle import CycleProblem
-from .problems.map import MapProblem
-from .problems.segmented import Segment, SegmentedProblem
-from .problems.variational import VariationalProblem
 from .results.auto_07p import AutoBranch, AutoSolution, read_auto
 from .results.branch import Branch
 from .results.columns import StoredColumns, read_columns
 from .results.point import Point, point_of
 from .results.storage import load, save
-from .stepping.newton import Newton, correct
-from .stepping.settings import Settings
-from .stepping.state import Reason, State, Stop
-from .stepping.trial import Monitor, TestFunction, Trial
+from .search.cycle import cycle
+from .search.diagram import Diagram, diagram
+from .search.from_auto import from_auto
+from .search.homoclinic import homoclinic
+from .search.sensitivity import sensitivities
+from .search.solving import solve
+from .search.trace import trace
+from .search.two_parameter import curve
 
 __version__: str
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from contin.discretization.protocol import Discretization, inner
+from contin.core.protocol import Discretization, inner
+from contin.core.settings import Settings
+from contin.core.state import Reason, State, Stop
+from contin.core.step import aims, corrected, judged, predict
+from contin.core.trial import TestFunction, Trial
 from contin.errors import ConvergenceError
 from contin.names import exact_text
-from contin.stepping.settings import Settings
-from contin.stepping.state import Reason, State, Stop
-from contin.stepping.step import aims, corrected, judged, predict
-from contin.stepping.trial import TestFunction, Trial
 
 #: Shorter steps that are tried, as parts of ``min_step``: the largest that goes on is told.
 _SHORTER = (1e-2, 1e-4)

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contin.boundary.second_variation import nullity_of
 from contin.continuation.notes import Notes, why_lost
-from contin.detection.refinement import refined
-from contin.detection.second_variation import nullity_of
-from contin.detection.segment import Segment, SpecialPoint
-from contin.detection.test_functions import with_normal_form
-from contin.stepping.settings import Settings
-from contin.stepping.trial import TestFunction
+from contin.core.settings import Settings
+from contin.core.trial import TestFunction
+from contin.events.refinement import refined
+from contin.events.segment import Segment, SpecialPoint
+from contin.events.test_functions import with_normal_form
 
 #: Labels of points that must not be missed on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
 _CONFIRMED = ("LP", "BP", "HB", "PD", "TR")

@@ -10,16 +10,16 @@ import numpy as np
 from contin.arrays import Array
 from contin.continuation.meshes import finer, is_poor
 from contin.continuation.scaling import renewed, scaled
-from contin.detection.accuracy import accuracy_of
-from contin.detection.significance import growing
-from contin.discretization.protocol import Discretization, inner
+from contin.core.newton import Newton, correct
+from contin.core.protocol import Discretization, inner
+from contin.core.settings import Settings
+from contin.core.settling import ROUNDS
+from contin.core.state import Reason, State, Stop, standing_at
+from contin.core.trial import Linearization, TestFunction, Trial, linearization
 from contin.errors import ConvergenceError
+from contin.events.accuracy import accuracy_of
+from contin.events.significance import growing
 from contin.names import value_names
-from contin.stepping.newton import Newton, correct
-from contin.stepping.settings import Settings
-from contin.stepping.settling import ROUNDS
-from contin.stepping.state import Reason, State, Stop, standing_at
-from contin.stepping.trial import Linearization, TestFunction, Trial, linearization
 
 #: A start this far outside a limit (relative to 1 + its size) still lies on it: it was located there, to round-off.
 _SLACK = 1e-9

@@ -16,6 +16,10 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
+from contin.boundary.second_variation import stability_of
+from contin.boundary.system import Collocation
+from contin.collocation import one_call
+from contin.collocation.defect import estimate, estimate_of
 from contin.continuation.plain import Quotient, Rooms, plain_steps
 from contin.continuation.plain_on_mesh import (
     ASK,
@@ -48,27 +52,23 @@ from contin.continuation.rules import (
     Path,
     Watch,
 )
-from contin.detection.homoclinic import STILL, homoclinic
-from contin.detection.inspection import Start, is_elsewhere
-from contin.detection.second_variation import stability_of
-from contin.detection.segment import SpecialPoint
-from contin.detection.spectra import spectra_of
-from contin.detection.trivial import crossed, jumped
-from contin.discretization.collocation import Collocation
-from contin.discretization.cycles import CycleCollocation, ForcedCollocation, PeriodicCollocation
-from contin.discretization.defect import estimate, estimate_of
-from contin.discretization.monodromy import monodromy_of
-from contin.discretization.protocol import Discretization
+from contin.continuation.spectra import spectra_of
+from contin.core.protocol import Discretization
+from contin.core.settings import Settings
+from contin.core.small import equations_of, linear_of
+from contin.core.state import State
+from contin.core.step import aims
+from contin.core.trial import Linearization, TestFunction, Trial
+from contin.cycles.homoclinic import STILL, homoclinic
+from contin.cycles.monodromy import monodromy_of
+from contin.cycles.system import CycleCollocation, ForcedCollocation, PeriodicCollocation
 from contin.errors import ConvergenceError
+from contin.events.inspection import Start, is_elsewhere
+from contin.events.segment import SpecialPoint
+from contin.events.trivial import crossed, jumped
 from contin.linalg.condensation import Factorization
 from contin.linalg.ends import Relations
 from contin.results.point import Point
-from contin.stepping import one_call
-from contin.stepping.settings import Settings
-from contin.stepping.small import equations_of, linear_of
-from contin.stepping.state import State
-from contin.stepping.step import aims
-from contin.stepping.trial import Linearization, TestFunction, Trial
 
 #: Steps of the first call after a step that was looked at, and at most: each call makes twice as many as the one before.
 FEWEST, MOST = 8, 128

@@ -10,17 +10,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from contin.arrays import Array
+from contin.collocation.mesh import MeshControl
 from contin.continuation.scaling import outgrown
 from contin.continuation.steps import Steps
-from contin.detection.accuracy import Accuracy, accuracy_of
-from contin.detection.trivial import jumped
-from contin.discretization.mesh import MeshControl
-from contin.discretization.protocol import Carrier, Discretization, inner
+from contin.core.newton import correct
+from contin.core.protocol import Carrier, Discretization, inner
+from contin.core.state import State
+from contin.core.step import trial_of
+from contin.core.trial import TestFunction, Trial
 from contin.errors import ConvergenceError
-from contin.stepping.newton import correct
-from contin.stepping.state import State
-from contin.stepping.step import trial_of
-from contin.stepping.trial import TestFunction, Trial
+from contin.events.accuracy import Accuracy, accuracy_of
+from contin.events.trivial import jumped
 
 #: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
 #: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.

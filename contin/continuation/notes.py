@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from contin.detection.phase_loads import phase_loads
-from contin.detection.refinement import BENT
-from contin.detection.second_variation import contradiction
-from contin.detection.segment import Segment, SpecialPoint
-from contin.discretization.switching import Switching
-from contin.stepping.trial import TestFunction, Trial
+from contin.boundary.second_variation import contradiction
+from contin.collocation.switching import Switching
+from contin.core.trial import TestFunction, Trial
+from contin.events.phase_loads import phase_loads
+from contin.events.refinement import BENT
+from contin.events.segment import Segment, SpecialPoint
 
 
 class Notes:

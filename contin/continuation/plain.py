@@ -1,6 +1,6 @@
 """Plain steps of small problems without a mesh: one call of a kernel makes many, up to the first that asks for a closer look.
 
-Each is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.detection.watch`. Where an
+Each is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.events.watch`. Where an
 entry of the watch list asks, or round-off would have to decide, the call ends before the step, and the run makes it.
 """
 
@@ -11,16 +11,9 @@ from typing import NamedTuple
 
 from contin.continuation import rules
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
-from contin.detection.crossings import CALM, NEAR_ONE
-from contin.detection.segment import LEAST_COSINE
-from contin.detection.spectra import FIRST, LAST, Spectra, fill_cubic, fill_spectrum, may_double_or_twist, may_pass_axis
-from contin.discretization.scales import USUAL
-from contin.functions.kernel import kernel
-from contin.functions.kernel_parts import Matrix, Stack, helper
-from contin.linalg.ends import is_near_one
-from contin.linalg.small import solve_small
-from contin.linalg.spectrum import fill_eigenvalues
-from contin.stepping.small import (
+from contin.continuation.spectra import FIRST, LAST, Spectra, fill_cubic, fill_spectrum, may_double_or_twist, may_pass_axis
+from contin.core.scales import USUAL
+from contin.core.small import (
     BELIEVED,
     ERROR,
     FAILED,
@@ -32,6 +25,13 @@ from contin.stepping.small import (
     evaluate_slopes,
     fill_matrix,
 )
+from contin.events.crossings import CALM, NEAR_ONE
+from contin.events.segment import LEAST_COSINE
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import Matrix, Stack, helper
+from contin.linalg.ends import is_near_one
+from contin.linalg.small import solve_small
+from contin.linalg.spectrum import fill_eigenvalues
 
 
 class Quotient(NamedTuple):
@@ -94,7 +94,7 @@ def _made(rooms: Rooms, path: Path, number: int, bend: float) -> float:
 
 @helper
 def calm(quotient: Quotient) -> bool:
-    """Return whether no singular value comes near zero, by the quotient, as `contin.detection.crossings.calm`."""
+    """Return whether no singular value comes near zero, by the quotient, as `contin.events.crossings.calm`."""
     if is_near_one(quotient.quotient, NEAR_ONE, CALM, quotient.work):
         return True
     size = quotient.quotient.shape[0]

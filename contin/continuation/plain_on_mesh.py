@@ -1,6 +1,6 @@
 """A plain step on a mesh: what kernels make and compare of it.
 
-It is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.detection.watch`. Each of these
+It is made as `contin.continuation.run` makes it, by the same rules, and watched as by `contin.events.watch`. Each of these
 kernels is called once a step; `contin.continuation.lane` ends where one of them asks for a closer look.
 """
 
@@ -10,23 +10,23 @@ import math
 from typing import NamedTuple
 
 from contin.arrays import Array
+from contin.collocation import one_call
+from contin.collocation.workspace import Workspace
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, calm
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
-from contin.detection.crossings import PIVOT, TURN
-from contin.detection.floquet import AS_FAR
-from contin.detection.hopf_end import COLLAPSED
-from contin.detection.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
-from contin.discretization.monodromy import KNOWN, Monodromy, fill_multipliers, nearest_to_one
-from contin.discretization.rounding import NEAR_CIRCLE
-from contin.discretization.workspace import Workspace
+from contin.continuation.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
+from contin.core.newton import STAGNANT
+from contin.core.rounding import NEAR_CIRCLE
+from contin.core.small import ASKS, BELIEVED, FAILED
+from contin.cycles.floquet import AS_FAR
+from contin.cycles.hopf_end import COLLAPSED
+from contin.cycles.monodromy import KNOWN, Monodromy, fill_multipliers, nearest_to_one
+from contin.events.crossings import PIVOT, TURN
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
 from contin.linalg.condensation import Factored
 from contin.linalg.ends import Relations, divide_ends, relate_ends
-from contin.stepping import one_call
-from contin.stepping.newton import STAGNANT
-from contin.stepping.small import ASKS, BELIEVED, FAILED
 
 
 @helper
@@ -123,7 +123,7 @@ def rests(field: Matrix, n: int, still: float) -> int:
 def ends_are_calm(factored: Factored, before: Relations, after: Relations, quotient: Quotient, begins: int) -> int:
     """Fill in what a matrix says of both ends of the mesh; return `CALM` where no singular value comes near zero in a step.
 
-    That is from ``before`` on, by the condensed matrices, as in `contin.detection.crossings`. Else return whether the one here
+    That is from ``before`` on, by the condensed matrices, as in `contin.events.crossings`. Else return whether the one here
     is `SOUND`, and may be compared, or `UNSOUND`. Where a step ``begins``, nothing is compared.
     """
     factors, _, first, last, carried, _ = factored

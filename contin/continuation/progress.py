@@ -9,10 +9,10 @@ from typing import TextIO
 
 from contin import checks
 from contin.continuation.run import Continuation
+from contin.core.state import Reason, Stop
 from contin.errors import ProblemError
 from contin.results.branch import Branch
 from contin.results.point import Point
-from contin.stepping.state import Reason, Stop
 
 #: Seconds before a line is shown, and between two of them: calls that are done at once show none, and the terminal is not
 #: flooded.

@@ -1,6 +1,6 @@
 """The rules of a plain step inside kernels: predicted, judged, watched, accepted, whatever the equations are.
 
-They are those of `contin.continuation.steps` and `contin.detection.watch`. Points stand one by one in a `Path`.
+They are those of `contin.continuation.steps` and `contin.events.watch`. Points stand one by one in a `Path`.
 """
 
 from __future__ import annotations
@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from contin.detection.folds import dips, ends_low
-from contin.detection.inspection import FEWEST, REACH
-from contin.detection.significance import STANDS
+from contin.core.small import ASKS, BELIEVED, FAILED
+from contin.core.step import ASTRAY, CLEAR, fill_sums_of, following_step, is_astray, longest_step, turned, up_to
+from contin.events.folds import dips, ends_low
+from contin.events.inspection import FEWEST, REACH
+from contin.events.significance import STANDS
 from contin.functions.kernel_parts import IndexVector, Matrix, Vector, helper
-from contin.stepping.small import ASKS, BELIEVED, FAILED
-from contin.stepping.step import ASTRAY, CLEAR, fill_sums_of, following_step, is_astray, longest_step, turned, up_to
 
 #: Round-off of Newton's method above the tolerance is noted from this error on: ten times smaller, runs in small units that
 #: soon change would be.
@@ -22,7 +22,7 @@ NOISY = 1e-9
 #: error that they left; the sense of the primary parameter, and the row where it was told, 0 where that is none of these; the
 #: error of the mesh; and 1 where the first point may be near, as far as kernels tell.
 STEP, NEXT, SIGN_OF, ARCLENGTH, ITERATIONS, ERROR_LEFT, SENSE, SENSED, MESH_ERROR, CLOSES, NUMBERS = range(11)
-#: Places in ``Attempt.judged``: as in `contin.stepping.step.Judgement`, then the determinant's sign, Newton's updates and the
+#: Places in ``Attempt.judged``: as in `contin.core.step.Judgement`, then the determinant's sign, Newton's updates and the
 #: error that they left, and the error of the mesh.
 MISSED, TURN, LENGTH, SIGN, UPDATES, ERROR, OF_MESH, JUDGED = range(8)
 
@@ -49,7 +49,7 @@ class Control(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """The guess of a step, and numbers of it: ``sums`` that `contin.stepping.step.fill_sums` fills, ``judged`` from these."""
+    """The guess of a step, and numbers of it: ``sums`` that `contin.core.step.fill_sums` fills, ``judged`` from these."""
 
     guess: Vector
     sums: Vector
@@ -87,7 +87,7 @@ class Path(NamedTuple):
 
 @helper
 def predict(attempt: Attempt, path: Path, number: int, bend: float, step: float) -> None:
-    """Fill in the guess of a step, as `contin.stepping.step.predict`; ``bend`` is 0 at the first step."""
+    """Fill in the guess of a step, as `contin.core.step.predict`; ``bend`` is 0 at the first step."""
     x, tangent, earlier, new = path.x[number - 1], path.tangents[number - 1], path.tangents[number - 2], path.x[number]
     for i in range(x.size):
         attempt.guess[i] = x[i] + step * tangent[i]
@@ -119,7 +119,7 @@ def judge(frame: Frame, attempt: Attempt, control: Control, path: Path, number: 
 
 @helper
 def first_length(frame: Frame, control: Control, watch: Watch, path: Path, number: int, bend: float) -> float:
-    """Return the length of a step, not far beyond limits, as `contin.stepping.step.up_to_limits`."""
+    """Return the length of a step, not far beyond limits, as `contin.core.step.up_to_limits`."""
     x, tangent, earlier = path.x[number - 1], path.tangents[number - 1], path.tangents[number - 2]
     step: float = path.numbers[number - 1, NEXT]
     for k in range(watch.low.size):
@@ -164,7 +164,7 @@ def asks(
 
 @helper
 def _may_turn(attempt: Attempt, control: Control, path: Path, number: int, step: float) -> bool:
-    """Return whether the primary parameter may turn, as `contin.detection.folds.may_turn`."""
+    """Return whether the primary parameter may turn, as `contin.events.folds.may_turn`."""
     at, x, new = control.primary, path.x[number - 1], path.x[number]
     first, last = path.tangents[number - 1, at], path.tangents[number, at]
     if not (min(abs(first), abs(last)) >= CLEAR and first * last > 0 and path.numbers[number - 1, SENSE] * last >= 0):

@@ -6,7 +6,7 @@
     print(run.stop)
 
 One step is: adapt the mesh if due; predict; correct; halve the step until the corrected point can be believed; locate the
-special points between the two ends; accept. The loop knows of a system only its protocol (`contin.discretization.protocol`),
+special points between the two ends; accept. The loop knows of a system only its protocol (`contin.core.protocol`),
 not its kind.
 """
 
@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array
+from contin.boundary.second_variation import Stability, contradiction, stability_of
 from contin.continuation.failure import met, no_convergence, shorter_steps
 from contin.continuation.findings import IndexChange, index_changes, is_confirmed, located_again
 from contin.continuation.first import begins_outside, corrected_first, on_branch
@@ -27,27 +28,26 @@ from contin.continuation.meshes import MeshPolicy, Moved, finer, is_poor
 from contin.continuation.notes import Notes, unsettled
 from contin.continuation.rules import NOISY
 from contin.continuation.steps import Steps
-from contin.detection.accuracy import Accuracy, accuracy_of, at_branch_point
-from contin.detection.extrema import extremum
-from contin.detection.inspection import Inspection, Start
-from contin.detection.second_variation import Stability, contradiction, stability_of
-from contin.detection.segment import Segment, SpecialPoint, with_details
-from contin.detection.test_functions import (
+from contin.core.protocol import Discretization
+from contin.core.settings import Settings, check
+from contin.core.state import Reason, State, Stop
+from contin.core.step import Judgement, predict, up_to_limits
+from contin.core.trial import Linearization, Trial
+from contin.errors import ConvergenceError
+from contin.events.accuracy import Accuracy, accuracy_of, at_branch_point
+from contin.events.extrema import extremum
+from contin.events.inspection import Inspection, Start
+from contin.events.segment import Segment, SpecialPoint, with_details
+from contin.events.test_functions import (
     fold,
     limits,
     user_zeros,
     within_limits,
 )
-from contin.detection.watch import watch_list
-from contin.discretization.protocol import Discretization
-from contin.errors import ConvergenceError
+from contin.events.watch import watch_list
 from contin.names import exact_text
 from contin.results.branch import Branch
 from contin.results.point import Point
-from contin.stepping.settings import Settings, check
-from contin.stepping.state import Reason, State, Stop
-from contin.stepping.step import Judgement, predict, up_to_limits
-from contin.stepping.trial import Linearization, Trial
 
 #: A step is cut down to this fraction of itself to take several branch points one by one.
 _FINEST = 1e-3

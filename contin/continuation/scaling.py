@@ -15,7 +15,7 @@ large as a state whose small value is more than nothing, since F_x would be sing
 
 All of these are made with F_x^-1 and compared state by state, so that they do not depend on units. A limit is no size: it can
 only make one smaller. Where nothing is found the size is one; a branch that outgrows a size gets a larger one. Only sizes far
-from one count (`contin.discretization.scales`).
+from one count (`contin.core.scales`).
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, Pattern
-from contin.detection.significance import on_finer_mesh
-from contin.discretization.protocol import Carrier, Discretization
-from contin.discretization.scales import USUAL, usual
-from contin.discretization.system import System
-from contin.stepping.newton import UNITS, Newton, rounded_off
-from contin.stepping.settings import Settings
-from contin.stepping.trial import Linearization, Trial
+from contin.core.newton import UNITS, Newton, rounded_off
+from contin.core.protocol import Carrier, Discretization
+from contin.core.scales import USUAL, usual
+from contin.core.settings import Settings
+from contin.core.system import System
+from contin.core.trial import Linearization, Trial
+from contin.events.significance import on_finer_mesh
 
 #: Iterations of the power method. Sizes are powers of two: the distance to the nearest singular point needs no digits. Ten
 #: times more separate eigenvalues that differ by a tenth.

@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from contin.arrays import Array
-from contin.detection.segment import Place, Segment
-from contin.detection.significance import STANDS, free_values, sense
-from contin.detection.trivial import crossed, jumped
-from contin.errors import ConvergenceError
-from contin.stepping.settings import Settings
-from contin.stepping.settling import settled
-from contin.stepping.state import State
-from contin.stepping.step import (
+from contin.core.settings import Settings
+from contin.core.settling import settled
+from contin.core.state import State
+from contin.core.step import (
     ASTRAY,
     Judgement,
     aims,
@@ -24,7 +20,11 @@ from contin.stepping.step import (
     longest_step,
     predict,
 )
-from contin.stepping.trial import TestFunction, Trial
+from contin.core.trial import TestFunction, Trial
+from contin.errors import ConvergenceError
+from contin.events.segment import Place, Segment
+from contin.events.significance import STANDS, free_values, sense
+from contin.events.trivial import crossed, jumped
 
 #: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
 #: The next one is taken where the equations are still too nearly singular for Newton's method.

@@ -2,7 +2,7 @@
 
 A condition on time alone (``t < 0.4``, ``max(0, t - 1)``, a table of time) switches at the zeros of a function of time and of
 parameters that stand still: `switches`. A condition on states (``u.x > 0.3``, ``abs(u.x)``) switches where the solution goes:
-`selections` are looked at along each solution, by `contin.discretization.switching`. Whether the equations are smooth there
+`selections` are looked at along each solution, by `contin.collocation.switching`. Whether the equations are smooth there
 is told by the values that they would have with the other outcome of the condition.
 """
 

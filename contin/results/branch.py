@@ -9,9 +9,9 @@ from typing import Any, overload
 import numpy as np
 
 from contin.arrays import Array
+from contin.core.state import Stop
 from contin.results import plot, table
 from contin.results.point import Point
-from contin.stepping.state import Stop
 
 #: Labels that the text of a branch shows: a screen is not filled by a snaking branch of a hundred folds.
 _SHOWN = 40

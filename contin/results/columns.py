@@ -10,7 +10,7 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.discretization.basis import basis
+from contin.collocation.basis import basis
 from contin.results.storage import contents
 
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.detection.floquet import unstable
-from contin.discretization.algebraic import Algebraic
-from contin.discretization.cycles import PeriodicCollocation
-from contin.discretization.maps import MapSystem
+from contin.cycles.floquet import unstable
+from contin.cycles.maps import MapSystem
+from contin.cycles.system import PeriodicCollocation
+from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.results.axes import new_axes
 from contin.results.point import Point

@@ -11,20 +11,20 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.curves.extended import Extended
-from contin.detection.floquet import Floquet, floquet
-from contin.detection.phase_loads import phase_loads
-from contin.detection.second_variation import SecondVariation, second_variation
-from contin.discretization.algebraic import Algebraic
-from contin.discretization.cycles import PeriodicCollocation
-from contin.discretization.maps import MapSystem
-from contin.discretization.protocol import Discretization
-from contin.discretization.system import System
+from contin.boundary.second_variation import SecondVariation, second_variation
+from contin.core.protocol import Discretization
+from contin.core.system import System
+from contin.core.trial import Trial
+from contin.cycles.floquet import Floquet, floquet
+from contin.cycles.maps import MapSystem
+from contin.cycles.statement import PERIOD
+from contin.cycles.system import PeriodicCollocation
+from contin.defining.extended import Extended
+from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
-from contin.problems.cycle import PERIOD
+from contin.events.phase_loads import phase_loads
 from contin.results import portrait
 from contin.results.profile import Profile
-from contin.stepping.trial import Trial
 
 #: Kinds of curves in two parameters that begin at, or pass, points of codimension two of equilibria.
 _LEAVING = {"BT": ("LP", "HB", "homoclinic"), "GH": ("LP",), "ZH": ("LP", "HB", "TR"), "HH": ("HB", "TR")}
@@ -170,8 +170,8 @@ class Point:
         """The coefficient of the normal form; negative where the bifurcation is supercritical. None where there is none.
 
         At a Hopf point of equilibria it is the first Lyapunov coefficient, with a critical eigenvector of unit length; at a
-        period doubling c and at a torus bifurcation Re d of `contin.detection.cycle_normal_forms`; at a fold of cycles |b|,
-        which is zero at a cusp. Those of maps are in `contin.detection.map_normal_forms`; the c of their period doublings is
+        period doubling c and at a torus bifurcation Re d of `contin.cycles.normal_forms`; at a fold of cycles |b|,
+        which is zero at a cusp. Those of maps are in `contin.cycles.map_normal_forms`; the c of their period doublings is
         positive where they are supercritical. Its estimated error is ``details["normal_form_error"]``.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None

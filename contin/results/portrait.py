@@ -9,12 +9,12 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.detection.floquet import floquet
-from contin.discretization.collocation import Collocation
-from contin.discretization.cycles import PeriodicCollocation
+from contin.boundary.segmented import SegmentedProblem
+from contin.boundary.system import Collocation
+from contin.cycles.floquet import floquet
+from contin.cycles.system import PeriodicCollocation
 from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds
-from contin.problems.segmented import SegmentedProblem
 from contin.results.axes import new_axes
 
 #: Places at which a solution is drawn, for each interval of its mesh, and at least.

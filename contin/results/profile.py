@@ -8,8 +8,8 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
+from contin.boundary.segmented import SegmentedProblem
 from contin.errors import ProblemError
-from contin.problems.segmented import SegmentedProblem
 
 
 class Profile:

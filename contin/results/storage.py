@@ -13,30 +13,30 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.curves.branch_point_curve import BranchPointCurve
-from contin.curves.critical_curve import CriticalCurve
-from contin.curves.cycle_curves import DoublingCurve, TorusCurve
-from contin.curves.extended import Extended
-from contin.curves.fold_curve import FoldCurve
-from contin.curves.hopf_curve import HopfCurve
-from contin.curves.map_curves import MapDoublingCurve, MapTorusCurve
-from contin.detection.branch_point import BranchPoint
-from contin.detection.multiple_point import MultiplePoint
-from contin.discretization.algebraic import Algebraic
-from contin.discretization.collocation import Collocation
-from contin.discretization.cycles import CycleCollocation
-from contin.discretization.kinds import algebraic, discretized
-from contin.discretization.maps import MapSystem
-from contin.discretization.protocol import Discretization
-from contin.discretization.scales import Scales
+from contin.boundary.statement import BoundaryValueProblem
+from contin.boundary.system import Collocation
+from contin.core.protocol import Discretization
+from contin.core.scales import Scales
+from contin.core.state import Stop
+from contin.cycles.curves import DoublingCurve, TorusCurve
+from contin.cycles.map_curves import MapDoublingCurve, MapTorusCurve
+from contin.cycles.maps import MapSystem
+from contin.cycles.statement import CycleProblem
+from contin.cycles.system import CycleCollocation
+from contin.defining.branch_point_curve import BranchPointCurve
+from contin.defining.critical_curve import CriticalCurve
+from contin.defining.extended import Extended
+from contin.defining.fold_curve import FoldCurve
+from contin.equilibria.hopf_curve import HopfCurve
+from contin.equilibria.statement import AlgebraicProblem
+from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
+from contin.events.branch_point import BranchPoint
+from contin.events.multiple_point import MultiplePoint
 from contin.files import write_whole
-from contin.problems.algebraic import AlgebraicProblem
-from contin.problems.boundary_value import BoundaryValueProblem
-from contin.problems.cycle import CycleProblem
+from contin.kinds import algebraic, discretized
 from contin.results.branch import Branch
 from contin.results.point import Point
-from contin.stepping.state import Stop
 
 Result = TypeVar("Result")
 

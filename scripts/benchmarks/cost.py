@@ -10,8 +10,8 @@ import numpy as np
 
 import contin
 from benchmarks.measure import median
-from contin.discretization.mesh import equidistributed
-from contin.stepping.trial import Trial
+from contin.collocation.mesh import equidistributed
+from contin.core.trial import Trial
 from ribbon_model import exact
 from ribbon_model.laws import RIBBON
 from ribbon_model.seeds import primary_branch

@@ -8,7 +8,7 @@ import pytest
 from branches.config import Config
 from branches.display import Display
 from branches.job import begun, compute_branch
-from contin.stepping.newton import correct
+from contin.core.newton import correct
 
 #: Scenes whose points were wrong by as much as the last number, with newton_error 1e-14: of M1, kappa* and energy.
 SCENES = {

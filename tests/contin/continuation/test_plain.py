@@ -16,7 +16,7 @@ from contin import (
     TestFunction,
 )
 from contin.continuation import run as runs
-from contin.discretization.maps import MapSystem
+from contin.cycles.maps import MapSystem
 
 
 def lorenz(u, p):

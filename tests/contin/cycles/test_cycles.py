@@ -8,7 +8,7 @@ import pytest
 import contin
 from contin import AlgebraicProblem, CycleProblem, MeshControl, ProblemError
 from contin.continuation import lane
-from contin.discretization import cycles
+from contin.cycles import system as cycles
 
 
 def circle(u, p):

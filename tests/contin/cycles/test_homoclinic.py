@@ -7,7 +7,7 @@ import pytest
 
 import contin
 from contin import AlgebraicProblem, CycleProblem
-from contin.detection.homoclinic import resting_place
+from contin.cycles.homoclinic import resting_place
 
 
 def lorenz(u, p):

@@ -9,7 +9,7 @@ import pytest
 
 import contin
 from contin import AlgebraicProblem, CycleProblem
-from contin.detection.cycle_normal_forms import NormalForms
+from contin.cycles.normal_forms import NormalForms
 
 
 def circle(u, p):

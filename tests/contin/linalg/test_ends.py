@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contin import BoundaryValueProblem
-from contin.discretization.collocation import Collocation
+from contin.boundary.system import Collocation
 from contin.linalg.ends import compared, is_near_one
 
 COLUMN = BoundaryValueProblem(lambda t, u, p: (u.v, -p.P * u.u), lambda a, b, p: (a.u, b.u), ["u", "v"], {"P": 1.0})

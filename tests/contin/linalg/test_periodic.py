@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contin.discretization.basis import basis
+from contin.collocation.basis import basis
 from contin.linalg.periodic import log_eigenvalues
 from contin.linalg.transitions import condense, interval_matrices
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import contin
-from contin.stepping.settings import Options
+from contin.core.settings import Options
 
 LIMITS = {"P": (5.0, 45.0)}
 

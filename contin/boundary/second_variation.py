@@ -1,0 +1,479 @@
+"""The second variation of the energy at a stationary point: how many independent ways there are to lower it.
+
+From the Jacobian of the canonical equations at the Gauss points, f = (H_l, -H_x), with H_ll = C C^T:
+
+    Q = int |v|^2 - dx.H_xx dx dt + ends,     dx' = H_lx dx + C v,     de = 0,     int dg = 0.
+
+What is varied freely is v - K dx, with K = -C^+ H_lx: then dx does not grow by itself where the controls could hold it (with
+x' = w, dx' is what is varied).
+
+Gauss collocation commutes with variations: with dx collocated like the states, on their mesh, Q restricted to what the
+conditions allow is singular exactly where the collocated equations are. So changes of the index and the special points of a run
+agree to round-off.
+
+On an interval v has d k components at the Gauss points. Only n + n_int combinations of them, y, matter to what lies outside;
+the rest is eliminated where Q is well positive on it (then the index stays: inertia is additive, Haynsworth 1968). Neighbouring
+intervals are joined in the same way, as long as that holds. What is left is a small dense matrix: O(N) work in all.
+
+                 x ──> [ Phi | B ] ──> x of the next interval
+    (x, y) of an interval:  Q = [x y] [ Qxx Qxy ] [x]        constraint rows:  [Gx | Gy]
+                                      [ Qyx Qyy ] [y]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.collocation.basis import interpolation
+from contin.core.trial import TestFunction, Trial
+from contin.errors import ProblemError
+from contin.events.segment import Segment, SpecialPoint
+from contin.linalg.orientation import canonical_basis
+
+if TYPE_CHECKING:
+    from contin.boundary.system import Collocation
+    from contin.boundary.variational import Symmetry
+
+#: What is eliminated when intervals are joined has no smaller eigenvalue than this, of 1 where dx does not count: far from
+#: zero, so that elimination loses no digits.
+_POSITIVE = 0.1
+#: An eigenvalue of H_ll below this part of the largest one is zero: there are fewer controls than states.
+_NO_CONTROL = 1e-10
+#: An eigenvalue of the second variation below this part of the largest one is zero, where a solution is not found: round-off
+#: leaves 1e-15, times the condition number of what is eliminated.
+_SINGULAR = 1e-11
+#: Conditions at the ends whose smallest singular value is below this part of the largest repeat or contradict each other.
+_DEPENDENT = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class SecondVariation:
+    """The second variation at a stationary point, restricted to what the conditions allow.
+
+    Attributes
+    ----------
+    eigenvalues : ndarray
+        Of the reduced matrix, ascending, without positive ones that were eliminated. Their signs matter, and where they vanish.
+    """
+
+    eigenvalues: Array
+    _vectors: Array
+    _profile: _Profile
+
+    def __repr__(self) -> str:
+        return f"SecondVariation({len(self.eigenvalues)} eigenvalues, {self.index()} of them negative)"
+
+    def index(self, nullity: int = 0) -> int:
+        """Return the number of negative eigenvalues, without the ``nullity`` ones that are nearest to zero."""
+        values = self.eigenvalues[np.argsort(np.abs(self.eigenvalues))[nullity:]]
+        return int(np.count_nonzero(values < 0))
+
+    def modes(self, count: int, t: Array) -> Array:
+        """Return a basis of the modes of the eigenvalues nearest to zero: dx at t (K,), shape (count, K, n).
+
+        The largest number of each is 1. Basis and signs follow from the space (`contin.linalg.orientation.canonical_basis`).
+        """
+        order = np.argsort(np.abs(self.eigenvalues))[:count]
+        modes = np.array([self._profile.at(self._vectors[:, j], np.asarray(t, dtype=float)) for j in order])
+        if len(modes):
+            modes = canonical_basis(modes.reshape(len(modes), -1)).reshape(modes.shape)
+        largest = np.abs(modes).max(axis=(1, 2), keepdims=True, initial=0.0)
+        result: Array = modes / np.where(largest > 0, largest, 1.0)
+        return result
+
+    def broken(self, count: int, symmetries: Mapping[str, Symmetry]) -> tuple[str, ...]:
+        """Return the names of those symmetries that the ``count`` modes nearest to zero break."""
+        if not symmetries:
+            return ()
+        t = np.linspace(self._profile.mesh[0], self._profile.mesh[-1], _PLACES)
+        modes = self.modes(count, t)
+        return tuple(
+            name for name, image in symmetries.items()
+            if any(np.abs(np.asarray(image(t, mode)) - mode).max() > _KEEPS for mode in modes)
+        )  # fmt: skip
+
+
+def _index(trial: Trial) -> float:
+    system: Any = trial.system
+    found = second_variation(system, trial.x)
+    return np.nan if found is None else float(found.index())
+
+
+#: The index of a state with an energy. One object, so that a trial computes it once.
+INDEX = TestFunction("", "index", _index)
+
+
+def contradiction(index: TestFunction | None, segment: Segment, special: Iterable[SpecialPoint]) -> str:
+    """Return how the index over a step contradicts its special points, as a clause; "" where it does not.
+
+    It changes at special points only, by no more than the dimension of what vanishes there. A larger change means that
+    something was passed in silence. The index knows nothing of how special points are found.
+    """
+    if index is None:
+        return ""
+    before, after = segment.before.value(index), segment.trial.value(index)
+    if not abs(after - before) > sum(map(nullity_of, special)):
+        return ""
+    return f"the {index.name} goes from {before:g} to {after:g}"
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Index, nullity and broken symmetries of a point, as in `contin.Point`."""
+
+    index: int | None = None
+    nullity: int = 0
+    breaks: tuple[str, ...] = ()
+
+
+def nullity_of(point: SpecialPoint) -> int:
+    """Return the dimension of the kernel at a point: 1 at a fold, 1 or more at a branch point, else 0."""
+    if point.label not in ("LP", "BP", "CP") and not point.is_trivial:
+        return 0
+    return int(getattr(point.details, "dimension", 1))
+
+
+def stability_of(point: SpecialPoint) -> Stability:
+    """Return what the second variation says of a point; at a special one, what vanishes there does not count."""
+    trial, nullity = point.trial, nullity_of(point)
+    if not nullity:
+        index = trial.value(INDEX)
+        return Stability() if np.isnan(index) else Stability(int(index))
+    system: Any = trial.system
+    found = second_variation(system, trial.x)
+    if found is None:
+        return Stability()
+    breaks = found.broken(nullity, system.problem.symmetries) if point.label == "BP" else ()
+    return Stability(found.index(nullity), nullity, breaks)
+
+
+def legendre() -> TestFunction:
+    """Return the test function that ends a run where the energy ceases to be convex in the controls (Legendre's condition)."""
+
+    def margin(trial: Trial) -> float:
+        system: Any = trial.system
+        if system.problem.legendre is None:
+            n = system.problem.dimension
+            value = _convexity(_jacobian(system, trial.x)[:, :n, n:])
+        else:
+            points = system.states_at_gauss_points(trial.x)
+            value = system.problem.margin(system.gauss_times, points, system.all_parameters(trial.x))
+        return value if np.isfinite(value) else 1.0
+
+    return TestFunction("EP", "loss of convexity in the controls (Legendre's condition)", margin, terminal=True)
+
+
+def _convexity(hll: Array) -> float:
+    """Return a number that is positive where H_ll (K, n, n) is positive semidefinite everywhere."""
+    if not np.isfinite(hll).all():
+        return np.nan
+    values = np.linalg.eigvalsh((hll + hll.swapaxes(1, 2)) / 2)
+    largest = np.abs(values).max(axis=1)
+    return float((values[:, 0] / np.where(largest > 0, largest, 1.0)).min()) + _NO_CONTROL if np.all(largest > 0) else -1.0
+
+
+def degeneracy(system: Collocation, x: Array) -> str:
+    """Return what makes the equations of a variational problem singular at x, as a sentence; "" where nothing is found."""
+    try:
+        if not np.isfinite(system.functionals(x)).all():
+            return "energy: it has no finite value there"
+        found = second_variation(system, x)
+    except ProblemError as error:
+        return str(error)
+    except np.linalg.LinAlgError:
+        return ""
+    if found is None:
+        return "energy: it is not convex in the controls there (Legendre's condition)"
+    sizes = np.abs(found.eigenvalues)
+    if sizes.size and not sizes.min() > _SINGULAR * sizes.max():
+        return (
+            "energy: its second variation vanishes along a mode there, which nothing determines (hold more, or start elsewhere)"
+        )
+    return ""
+
+
+def dependent_conditions(system: Collocation, x: Array) -> str:
+    """Return that conditions of a variational problem repeat or contradict each other at a solution x; "" if not."""
+    try:
+        second_variation(system, x)
+    except ProblemError as error:
+        return str(error)
+    except np.linalg.LinAlgError:
+        pass
+    return ""
+
+
+#: A mode keeps a symmetry that maps it to itself up to this part of its size, and breaks one that does not.
+_KEEPS = 1e-4
+#: Places at which a mode and its image are compared.
+_PLACES = 101
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Pieces of the domain, one after the other: arrays with a first axis over pieces, as drawn above."""
+
+    phi: Array  # (K, n, n)
+    b: Array  # (K, n, m)
+    q: Array  # (K, n + m, n + m)
+    g: Array  # (K, c, n + m)
+
+
+@dataclass(frozen=True, eq=False)
+class _Recovery:
+    """How pieces came out of those before: y = turn [kept, rest], rest = -inside (x, kept); ``pairs``: these are two pieces.
+
+    ``phi`` and ``b`` lead from one of the two to the other, ``count`` is the number of pieces before.
+    """
+
+    turn: Array
+    inside: Array
+    count: int
+    phi: Array | None = None
+    b: Array | None = None
+
+    def back(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return x at the beginning, and y, of the pieces before: (K, n) and (K, m) to (2 K, n), (2 K, m / 2) for pairs."""
+        rest = -np.einsum("kij,kj->ki", self.inside, np.concatenate([x, y], axis=1))
+        whole = np.einsum("kij,kj->ki", self.turn, np.concatenate([y, rest], axis=1))
+        if self.phi is None or self.b is None:
+            return x, whole
+        first, second = np.split(whole, 2, axis=1)
+        middle = np.einsum("kij,kj->ki", self.phi, x) + np.einsum("kij,kj->ki", self.b, first)
+        starts, ys = np.stack([x, middle], 1), np.stack([first, second], 1)
+        return starts.reshape(-1, x.shape[1])[: self.count], ys.reshape(-1, first.shape[1])[: self.count]
+
+
+@dataclass(frozen=True, eq=False)
+class _Profile:
+    """dx as a function of t from the unknowns (x of the first end, all y)."""
+
+    mesh: Array
+    points: Array
+    inside: Array  # (N, d, n, n + m): dx at the Gauss points of an interval
+    recoveries: tuple[_Recovery, ...]
+    starts: Array  # (K, n, size)
+
+    def at(self, unknowns: Array, t: Array) -> Array:
+        """Return dx at t (K,), shape (K, n)."""
+        n = self.inside.shape[2]
+        x, y = self.starts[:-1] @ unknowns, unknowns[n:].reshape(len(self.starts) - 1, -1)
+        for recovery in reversed(self.recoveries):
+            x, y = recovery.back(x, y)
+        count = len(self.inside)
+        at_points = np.einsum("eijk,ek->eij", self.inside, np.concatenate([x, y], axis=1))
+        nodes = np.append(0.0, self.points)
+        weights = 1 / np.prod(nodes[:, None] - nodes + np.eye(len(nodes)), axis=1)
+        e = np.clip(np.searchsorted(self.mesh, t, side="right") - 1, 0, count - 1)
+        matrix = interpolation(nodes, weights, (t - self.mesh[e]) / np.diff(self.mesh)[e])
+        result: Array = np.einsum("ij,ijk->ik", matrix, np.concatenate([x[:, None], at_points], axis=1)[e])
+        return result
+
+
+def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
+    """Return the second variation at a solution x of a variational problem; None where Legendre's condition fails.
+
+    Raises
+    ------
+    ProblemError
+        End conditions that repeat or contradict each other there.
+    """
+    local = _intervals(system, x)
+    if local is None:
+        return None
+    pieces, inside = local
+    pieces, recoveries = _joined(pieces)
+    values, vectors, starts = _reduced(system, x, pieces)
+    return SecondVariation(values, vectors, _Profile(system.mesh, system.basis.points, inside, recoveries, starts))
+
+
+def _intervals(system: Collocation, x: Array) -> tuple[_Pieces, Array] | None:
+    """Return the single intervals, with all components of v, and dx at their Gauss points, shape (N, d, n, n + d k)."""
+    n = system.problem.dimension  # type: ignore[attr-defined]
+    h, d = np.diff(system.mesh), system.degree
+    jacobian = _jacobian(system, x).reshape(len(h), d, -1, 2 * n)
+    a, hll, hxx = jacobian[:, :, :n, :n], jacobian[:, :, :n, n:], -jacobian[:, :, n : 2 * n, :n]
+    roots = _roots((hll + hll.swapaxes(2, 3)) / 2)
+    if roots is None:
+        return None
+    c, inverse = roots
+    feedback = -inverse.swapaxes(2, 3) @ a
+    a = a + c @ feedback
+    k, g = c.shape[-1], jacobian[:, :, 2 * n :]
+    basis = system.basis
+    weights = h[:, None] * basis.weights
+    scaled = c / np.sqrt(weights)[:, :, None, None]  # v times sqrt(weight): Q begins with its square
+    step = h[:, None, None, None, None] * basis.runge_kutta[None, :, None, :, None]
+    matrix = np.eye(d * n) - (step * a.transpose(0, 2, 1, 3)[:, None]).reshape(len(h), d * n, d * n)
+    drive = (step * scaled.transpose(0, 2, 1, 3)[:, None]).reshape(len(h), d * n, d * k)
+    start = np.broadcast_to(np.tile(np.eye(n), (d, 1)), (len(h), d * n, n))
+    inside = np.linalg.solve(matrix, np.concatenate([start, drive], axis=2)).reshape(len(h), d, n, n + d * k)
+    control = np.zeros((len(h), d, k, n + d * k))
+    for i in range(d):
+        control[:, i, :, n + i * k : n + (i + 1) * k] = np.eye(k) / np.sqrt(weights[:, i])[:, None, None]
+    rates = a @ inside + c @ control
+    control += feedback @ inside
+    last = np.einsum("ei,einj->enj", weights, rates)
+    last[:, :, :n] += np.eye(n)
+    q = _products(weights, control, control)
+    q -= _products(weights, inside, ((hxx + hxx.swapaxes(2, 3)) / 2) @ inside)
+    rows = g[:, :, :, :n] @ inside + (g[:, :, :, n:] @ inverse) @ control
+    return _Pieces(last[:, :, :n], last[:, :, n:], q, np.einsum("ei,eicj->ecj", weights, rows)), inside
+
+
+def _products(weights: Array, a: Array, b: Array) -> Array:
+    """Return the integrals of a^T b over each interval, (N, j, l), from values at Gauss points: (N, d, k, j), (N, d, k, l)."""
+    rows = a.shape[1] * a.shape[2]
+    weighted = (weights[:, :, None, None] * a).reshape(len(a), rows, -1)
+    result: Array = weighted.swapaxes(1, 2) @ b.reshape(len(b), rows, -1)
+    return result
+
+
+def _jacobian(system: Collocation, x: Array) -> Array:
+    """Return the derivatives of rhs and integrands by (x, lambda) at the Gauss points, in the user's units."""
+    batch = system.problem.batch("field")
+    points = system.states_at_gauss_points(x)
+    return batch.jacobian(system.gauss_times, points, points[:0], system.all_parameters(x), batch.columns([]))[1]
+
+
+def _roots(hll: Array) -> tuple[Array, Array] | None:
+    """Return C (N, d, n, k) with C C^T = H_ll, and what takes v to multipliers, (N, d, n, k); None unless H_ll >= 0."""
+    values, vectors = np.linalg.eigh(hll)
+    if not np.isfinite(values).all():
+        return None
+    largest = values.max(axis=2)
+    if np.any(values < -_NO_CONTROL * largest[:, :, None]) or np.any(largest <= 0):
+        return None
+    k = int(np.max(np.count_nonzero(values > _NO_CONTROL * largest[:, :, None], axis=2)))
+    values, vectors = values[:, :, -k:], vectors[:, :, :, -k:]
+    root = np.sqrt(np.maximum(values, _NO_CONTROL * largest[:, :, None]))
+    return vectors * root[:, :, None], vectors / root[:, :, None]
+
+
+def _joined(pieces: _Pieces) -> tuple[_Pieces, tuple[_Recovery, ...]]:
+    """Return the pieces joined in pairs as long as possible, and the way back."""
+    recoveries = []
+    condensed, recovery = _condensed(pieces)
+    if recovery is not None:
+        pieces = condensed
+        recoveries.append(recovery)
+    while len(pieces.phi) > 1:
+        joined, recovery = _condensed(_pairs(pieces))
+        if recovery is None:
+            break
+        phi, b = pieces.phi[::2], pieces.b[::2]
+        recoveries.append(dataclasses.replace(recovery, phi=phi, b=b, count=len(pieces.phi)))
+        pieces = joined
+    return pieces, tuple(recoveries)
+
+
+def _pairs(pieces: _Pieces) -> _Pieces:
+    """Return neighbouring pieces joined; of an odd number, the last is joined with one of length zero."""
+    n, m, c = pieces.b.shape[1], pieces.b.shape[2], pieces.g.shape[1]
+    if len(pieces.phi) % 2:
+        nothing = _Pieces(np.eye(n)[None], np.zeros((1, n, m)), _only_square(n, m), np.zeros((1, c, n + m)))
+        pieces = _Pieces(*(np.concatenate([getattr(pieces, f), getattr(nothing, f)]) for f in ("phi", "b", "q", "g")))
+    first = _Pieces(*(getattr(pieces, f)[::2] for f in ("phi", "b", "q", "g")))
+    second = _Pieces(*(getattr(pieces, f)[1::2] for f in ("phi", "b", "q", "g")))
+    count = len(first.phi)
+    middle = np.zeros((count, n + m, n + 2 * m))  # (x, y) of the second piece from (x, y, y) of the joined one
+    middle[:, :n, :n], middle[:, :n, n : n + m] = first.phi, first.b
+    middle[:, n:, n + m :] = np.eye(m)
+    q = middle.swapaxes(1, 2) @ second.q @ middle
+    q[:, : n + m, : n + m] += first.q
+    g = second.g @ middle
+    g[:, :, : n + m] += first.g
+    b = np.concatenate([second.phi @ first.b, second.b], axis=2)
+    return _Pieces(second.phi @ first.phi, b, q, g)
+
+
+def _only_square(n: int, m: int) -> Array:
+    q = np.zeros((1, n + m, n + m))
+    q[0, range(n, n + m), range(n, n + m)] = 1.0
+    return q
+
+
+def _condensed(pieces: _Pieces) -> tuple[_Pieces, _Recovery | None]:
+    """Return pieces with those y that matter outside; the same where the others are not well positive, or none."""
+    n, m, c = pieces.b.shape[1], pieces.b.shape[2], pieces.g.shape[1]
+    kept = n + c
+    if m <= kept:
+        return pieces, None
+    outward = np.concatenate([pieces.b, pieces.g[:, :, n:]], axis=1)
+    sizes = np.linalg.norm(outward, axis=2, keepdims=True)
+    turn: Any = np.linalg.qr((outward / np.where(sizes > 0, sizes, 1.0)).swapaxes(1, 2), mode="complete")[0]
+    whole = np.zeros((len(pieces.phi), n + m, n + m))
+    whole[:, range(n), range(n)] = 1.0
+    whole[:, n:, n:] = turn
+    q = whole.swapaxes(1, 2) @ pieces.q @ whole
+    inner = q[:, n + kept :, n + kept :]
+    least = float(np.linalg.eigvalsh(inner).min())
+    if least < _POSITIVE:
+        return pieces, None
+    cross = q[:, n + kept :, : n + kept]
+    rest: Any = np.linalg.solve(inner, cross)
+    reduced = q[:, : n + kept, : n + kept] - cross.swapaxes(1, 2) @ rest
+    turned = _Pieces(
+        pieces.phi, pieces.b @ turn[:, :, :kept], (reduced + reduced.swapaxes(1, 2)) / 2,
+        np.concatenate([pieces.g[:, :, :n], pieces.g[:, :, n:] @ turn[:, :, :kept]], axis=2),
+    )  # fmt: skip
+    return turned, _Recovery(turn, rest, len(turn))
+
+
+def _reduced(system: Collocation, x: Array, pieces: _Pieces) -> tuple[Array, Array, Array]:
+    """Return eigenvalues and eigenvectors of Q over (x of the first end, all y), restricted to what the conditions allow.
+
+    And x at the beginning of each piece, and at the end, from these: (K + 1, n, size).
+    """
+    count, n, m = pieces.b.shape
+    size = n + count * m
+    at = np.zeros((n, size))
+    at[:, :n] = np.eye(n)
+    starts, q, held = [at], np.zeros((size, size)), np.zeros((pieces.g.shape[1], size))
+    for i in range(count):
+        own = np.zeros((n + m, size))
+        own[:n] = at
+        own[n:, n + i * m : n + (i + 1) * m] = np.eye(m)
+        q += own.T @ pieces.q[i] @ own
+        held += pieces.g[i] @ own
+        at = pieces.phi[i] @ at + pieces.b[i] @ own[n:]
+        starts.append(at)
+    ends, second = _ends(system, x)
+    both = np.vstack([starts[0], at])
+    q += both.T @ second @ both
+    rows = np.vstack([ends @ both, held])
+    rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    free = np.eye(size)
+    if len(rows):
+        _, singular, vectors = np.linalg.svd(rows)
+        if singular[-1] < _DEPENDENT * singular[0]:
+            raise ProblemError(
+                "ends: the conditions held, with the integral ones, repeat or contradict each other, or have no slope"
+            )
+        free = vectors[len(rows) :].T
+    values, modes = np.linalg.eigh(free.T @ ((q + q.T) / 2) @ free)
+    return values, free @ modes, np.array(starts)
+
+
+def _ends(system: Collocation, x: Array) -> tuple[Array, Array]:
+    """Return the derivatives of e by (x0, x1), shape (conditions, 2n), and the second ones of Phi + sigma.e, shape (2n, 2n)."""
+    problem: Any = system.problem
+    n, batch, states = problem.dimension, problem.batch("boundary"), system.states(x)
+    columns = batch.columns([])
+    jacobian = batch.jacobian(np.zeros(1), states[:1], states[-1:], system.all_parameters(x), columns)[1][0]
+    by_ends = np.concatenate([jacobian[:, :n], jacobian[:, 2 * n : 3 * n]], axis=1)
+    fixed = problem.canonical.fixed
+    free = [[i for i in range(n) if i not in places] for places in fixed]
+    conditions = len(jacobian) - len(free[0]) - len(free[1])
+    second = np.zeros((2 * n, 2 * n))
+    second[free[0]] = -by_ends[conditions : conditions + len(free[0])]
+    second[[n + i for i in free[1]]] = by_ends[conditions + len(free[0]) :]
+    held = [i for places, offset in zip(fixed, (0, n)) for i in (offset + place for place in places)]
+    second[:, held] = 0.0  # they do not move
+    return by_ends[:conditions], (second + second.T) / 2

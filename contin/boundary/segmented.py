@@ -1,0 +1,280 @@
+"""Boundary value problems on several intervals: each segment has its own equations, states and length.
+
+Every segment is mapped to [0, 1], and the states of all stand side by side: u' = rhs(s, u, p) on a segment that begins at s = a
+and has the length l becomes du/dt = l rhs(a + l t, u, p). Segments do not depend on each other but through the conditions at
+their ends, so elimination treats them one by one (`contin.linalg.layout`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter, namedtuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array, Function
+from contin.boundary.statement import BoundaryValueProblem
+from contin.errors import ProblemError
+from contin.functions.signature import Arguments, Signature, argument_count, named_values, result_count
+from contin.problems.statement import check_statement, portable
+from contin.problems.vector_field import of_parameters
+
+#: A number, the name of a parameter, or a function of the parameters.
+Quantity = float | str | Function
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """One interval of a `SegmentedProblem`, with its own equations.
+
+    Parameters
+    ----------
+    rhs : callable
+        ``rhs(s, u, p)`` returns the derivatives of the states by the coordinate s.
+    states : sequence of str
+        Names of the states, ``u.theta``; other segments may have the same.
+    length : float, str or callable
+        A positive number, the name of a parameter, or ``length(p)``.
+    begin : float, str or callable, optional
+        The coordinate s at which it begins, likewise; where the segment before ends by default, 0 for the first one.
+    functionals : mapping of str to callable, optional
+        ``f(s, u, p)``: integrands over s. A column is the sum over all segments that have one of its name.
+
+    Examples
+    --------
+    Heat that flows through a wall, whose thickness is the parameter ``d``:
+
+    >>> wall = Segment(lambda s, u, p: (-u.flux, 0.0), ["heat", "flux"], length="d")
+    >>> wall.states
+    ['heat', 'flux']
+    """
+
+    rhs: Function
+    states: Sequence[str]
+    length: Quantity = 1.0
+    begin: Quantity | None = None
+    functionals: Mapping[str, Function] = field(default_factory=dict)
+
+    def portable(self, names: tuple[str, ...], parameters: tuple[str, ...]) -> Segment:
+        """Return the segment with recordings in the place of functions that no other process finds by name."""
+        inside: Arguments = [None, names, parameters]
+        return Segment(
+            portable(self.rhs, inside), self.states, portable(self.length, [parameters]), portable(self.begin, [parameters]),
+            portable(self.functionals, inside),
+        )  # fmt: skip
+
+
+class Piece(NamedTuple):
+    """A segment as the problem has it: names and places of its states, length and beginning as functions of p."""
+
+    names: tuple[str, ...]
+    at: slice
+    length: Function
+    begin: Function
+
+
+class SegmentedProblem(BoundaryValueProblem):
+    """A boundary value problem on several intervals, with conditions between their ends.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+    boundary : callable
+        ``boundary(a, b, p)`` returns the quantities that vanish. ``a[i]`` holds the states at the beginning of segment i,
+        ``b[i]`` those at its end: ``b[0].u - a[1].u`` where they join.
+    parameters : mapping of str to float
+        Names and default values; lengths may be among them.
+
+    Raises
+    ------
+    ProblemError
+        A segment, a name or a function that cannot be used; the message says which and why.
+
+    Notes
+    -----
+    A curve needs conditions - states + 1 free parameters, states of all segments counted. Where a name occurs in several
+    segments, the states of the whole problem have the number of the segment behind it, ``u_0``, ``u_1``. All segments share one
+    mesh of [0, 1], which is adapted to all of them.
+
+    Examples
+    --------
+    Heat flows through two layers with an interface at s = .25 and conductivities 1 and 3; the flux is continuous:
+
+    >>> import contin
+    >>> layers = contin.SegmentedProblem(
+    ...     [contin.Segment(lambda s, u, p: (u.slope, 0.0), ["heat", "slope"], length=0.25),
+    ...      contin.Segment(lambda s, u, p: (u.slope, 0.0), ["heat", "slope"], length=0.75)],
+    ...     lambda a, b, p: (a[0].heat, b[0].heat - a[1].heat, b[0].slope - p.k * a[1].slope, b[1].heat - 1), {"k": 3.0},
+    ... )
+    >>> second = contin.solve(layers, [0, 0, 0, 0]).segment(1)
+    >>> print(second.s[[0, -1]], second["heat"][[0, -1]])
+    [0.25 1.  ] [0.5 1. ]
+    """
+
+    segments: tuple[Segment, ...]
+    pieces: tuple[Piece, ...]
+
+    def __init__(self, segments: Sequence[Segment], boundary: Function, parameters: Mapping[str, float]) -> None:
+        given = tuple(checks.sequence("segments", segments, "Segment"))
+        if not given:
+            raise ProblemError("segments: there must be at least one")
+        for number, segment in enumerate(given):
+            checks.instance(f"segments: {number}", segment, Segment, "a Segment")
+        pieces = _pieces(given, parameters)
+        if argument_count(checks.function("boundary", boundary)) != 3:
+            raise ProblemError("boundary must take 3 arguments, (a, b, p)")
+        object.__setattr__(self, "segments", given)
+        object.__setattr__(self, "pieces", pieces)
+        super().__init__(
+            _side_by_side([segment.rhs for segment in given], pieces), _between(boundary, pieces), _names(pieces), parameters,
+            functionals=_sums(given, pieces),
+        )  # fmt: skip
+
+    def _signatures(self) -> Mapping[str, Any]:
+        """Return the arguments of the functions."""
+        names, parameters = [piece.names for piece in self.pieces], tuple(self.parameters)
+        found: dict[str, Any] = {"boundary": [names, names, parameters]}
+        for number, piece in enumerate(self.pieces):
+            found |= {
+                f"rhs {number}": [None, piece.names, parameters],
+                f"functionals {number}": [None, piece.names, parameters],
+            }
+            found |= {f"length {number}": [parameters], f"begin {number}": [parameters]}
+        return found
+
+    def _compared(self) -> dict[str, Any]:
+        parts = ("rhs", "states", "length", "begin", "functionals")
+        segments = {f"{part} {i}": getattr(segment, part) for i, segment in enumerate(self.segments) for part in parts}
+        return {name: value for name, value in self._stated.items() if name != "segments"} | segments
+
+    def __reduce__(self) -> Any:
+        """Carry the functions of segments as recordings, too, where no other process finds them by name."""
+        make, (kind, stated) = super().__reduce__()
+        segments = [segment.portable(piece.names, tuple(self.parameters)) for segment, piece in zip(self.segments, self.pieces)]
+        return make, (kind, {**stated, "segments": segments})
+
+    def extent(self, index: int, parameters: Mapping[str, float]) -> tuple[float, float]:
+        """Return the coordinates of both ends of a segment."""
+        values = namedtuple("P", tuple(parameters))(**parameters)  # noqa: PYI024
+        piece = self.pieces[index]
+        begin = float(piece.begin(values))
+        return begin, begin + float(piece.length(values))
+
+    def guessed(self, guesses: Sequence[Any], parameters: Mapping[str, float]) -> Callable[[float], Array]:
+        """Return the states of all segments as a function of the place in [0, 1], from a guess for each segment."""
+        known: list[Any] = []
+        for index, (guess, piece) in enumerate(zip(guesses, self.pieces)):
+            begin, end = self.extent(index, parameters)
+            known.append((guess, begin, end, len(piece.names)))
+
+        def states(t: float) -> Array:
+            parts = [np.ravel(g(a + (b - a) * t) if callable(g) else g) for g, a, b, _ in known]
+            for index, (part, (_, _, _, count)) in enumerate(zip(parts, known)):
+                if part.size != count:
+                    raise ProblemError(f"guess: {part.size} numbers for segment {index}, must be its {count} states")
+            return np.concatenate(parts)
+
+        return states
+
+
+def _pieces(segments: Sequence[Segment], parameters: Mapping[str, float]) -> tuple[Piece, ...]:
+    """Return the segments, checked, with lengths and beginnings as functions.
+
+    Raises
+    ------
+    ProblemError
+    """
+    pieces: list[Piece] = []
+    for number, segment in enumerate(segments):
+        what = f"segments: {number}: "
+        names = check_statement(
+            segment.states, parameters, checks.mapping(f"{what}functionals", segment.functionals, "functions")
+        )
+        _check_function(f"{what}rhs", segment.rhs, Signature(names, tuple(parameters)), len(names))
+        for name, function in segment.functionals.items():
+            _check_function(f"{what}functionals: {name}", function, Signature(names, tuple(parameters)), 0)
+        length = of_parameters(f"{what}length", segment.length, parameters, positive=True)
+        if segment.begin is not None:
+            begin = of_parameters(f"{what}begin", segment.begin, parameters)
+        elif pieces:
+            begin = _behind(pieces[-1])
+        else:
+            begin = of_parameters(f"{what}begin", 0.0, parameters)
+        at = pieces[-1].at.stop if pieces else 0
+        pieces.append(Piece(names, slice(at, at + len(names)), length, begin))
+    return tuple(pieces)
+
+
+def _behind(piece: Piece) -> Function:
+    """Return the end of a segment as a function of p."""
+
+    def begin(p: Any) -> Any:
+        return piece.begin(p) + piece.length(p)
+
+    return begin
+
+
+def _check_function(what: str, function: Function, signature: Signature, count: int) -> None:
+    if argument_count(checks.function(what, function)) != 3:
+        raise ProblemError(f"{what} must take 3 arguments, (s, u, p)")
+    found = result_count(function, signature.arguments, what)
+    if found != count:
+        allowed = f"{count} for the states {', '.join(signature.states)}" if count else "one number"
+        raise ProblemError(f"{what} returns {found or 'one number'}{' values' if found else ''}, must return {allowed}")
+
+
+def _names(pieces: Sequence[Piece]) -> tuple[str, ...]:
+    """Return the names of all states."""
+    count = Counter(name for piece in pieces for name in piece.names)
+    return tuple(f"{name}_{i}" if count[name] > 1 else name for i, piece in enumerate(pieces) for name in piece.names)
+
+
+# --- functions of all states ----------------------------------------------------------------------------------------------
+
+
+def _states(pieces: Sequence[Piece], u: Sequence[Any]) -> list[Any]:
+    """Return the states of each segment as a named tuple."""
+    return [named_values(piece.names)(*list(u)[piece.at]) for piece in pieces]
+
+
+def _side_by_side(functions: Sequence[Function], pieces: Sequence[Piece]) -> Function:
+    """Return the right-hand side of all states on [0, 1]."""
+
+    def rhs(t: Any, u: Any, p: Any) -> Any:
+        values: list[Any] = []
+        for function, piece, own in zip(functions, pieces, _states(pieces, u)):
+            length = piece.length(p)
+            values += [length * rate for rate in function(piece.begin(p) + length * t, own, p)]
+        return values
+
+    return rhs
+
+
+def _between(boundary: Function, pieces: Sequence[Piece]) -> Function:
+    """Return the conditions as a function of all states at both ends."""
+
+    def conditions(a: Any, b: Any, p: Any) -> Any:
+        return boundary(tuple(_states(pieces, a)), tuple(_states(pieces, b)), p)
+
+    return conditions
+
+
+def _sums(segments: Sequence[Segment], pieces: Sequence[Piece]) -> dict[str, Function]:
+    """Return the functionals: sums over the segments that have them."""
+    names = dict.fromkeys(name for segment in segments for name in segment.functionals)
+    return {name: _sum(name, segments, pieces) for name in names}
+
+
+def _sum(name: str, segments: Sequence[Segment], pieces: Sequence[Piece]) -> Function:
+    def functional(t: Any, u: Any, p: Any) -> Any:
+        total = 0.0
+        for segment, piece, own in zip(segments, pieces, _states(pieces, u)):
+            if name in segment.functionals:
+                length = piece.length(p)
+                total = total + length * segment.functionals[name](piece.begin(p) + length * t, own, p)
+        return total
+
+    return functional

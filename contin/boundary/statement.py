@@ -1,0 +1,236 @@
+"""A boundary value problem as the user states it: plain functions and names, no numerics."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, cast
+
+from contin import checks
+from contin.arrays import Function
+from contin.errors import ProblemError
+from contin.functions.batch import Batch
+from contin.functions.signature import Arguments, Signature, argument_count, result_count
+from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
+
+if TYPE_CHECKING:
+    from contin.core.trial import TestFunction
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BoundaryValueProblem(Restated):
+    """u' = rhs(t, u, p) on ``domain``, with conditions at both ends and under the integral.
+
+    Every function is plain Python; ``u`` and ``p`` come as named tuples (``u.x``, ``p.mu``, ``x, y = u``). They are
+    recorded, and differentiated exactly (a comparison compares values; the derivative is that of the case that applies).
+    A function with one argument more fills that array instead of returning a tuple, and gets arrays: the way for
+    states too many to name. It then needs ``boundary_count`` or ``integral_count``.
+
+    Parameters
+    ----------
+    rhs : callable
+        ``rhs(t, u, p)`` returns the n derivatives.
+    boundary : callable
+        ``boundary(u0, u1, p)`` returns the n_bc quantities that vanish, from the states at both ends.
+    states : sequence of str, or int
+        Names of the n states; a number n stands for u0, u1, ...
+    parameters : mapping of str to float
+        Names and default values.
+    integrals : callable, optional
+        ``integrals(t, u, p)`` returns the n_int integrands whose integral over the domain vanishes.
+    domain : pair of float
+        Ends of the independent variable, finite and increasing.
+    functionals : mapping of str to callable, optional
+        ``f(t, u, p)``: integrands whose integrals over the domain are columns of every point.
+    boundary_count, integral_count : int, optional
+        Numbers of values of ``boundary`` and ``integrals`` where these fill an array.
+    phases : sequence of str, optional
+        Names of parameters, or of states, that are zero where phase conditions hold by symmetry: the unfolding numbers that
+        make the equations as many as the unknowns. A run notes labelled points at which they are not zero.
+
+    Raises
+    ------
+    ProblemError
+        A name, a domain or a function that cannot be used; the message says which and why.
+
+    Notes
+    -----
+    A curve needs n_bc + n_int - n + 1 free parameters, an isolated solution one fewer.
+
+    Examples
+    --------
+    Bratu's problem u'' + lam exp(u) = 0, u(0) = u(1) = 0:
+
+    >>> import math
+    >>> problem = BoundaryValueProblem(
+    ...     rhs=lambda t, u, p: (u.v, -p.lam * math.exp(u.u)), boundary=lambda a, b, p: (a.u, b.u),
+    ...     states=["u", "v"], parameters={"lam": 0.0},
+    ... )
+    >>> problem.free_size
+    1
+    """
+
+    rhs: Function
+    boundary: Function
+    states: Sequence[str] | int
+    parameters: Mapping[str, float]
+    integrals: Function | None = None
+    domain: tuple[float, float] = (0.0, 1.0)
+    functionals: Mapping[str, Function] = field(default_factory=dict)
+    boundary_count: int | None = None
+    integral_count: int | None = None
+    phases: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
+        ends = tuple(checks.sequence("domain", self.domain, "two finite numbers, the first the smaller"))
+        numbers = len(ends) == 2 and all(checks.is_number(end) and math.isfinite(end) for end in ends)
+        if not (numbers and ends[0] < ends[1]):
+            raise ProblemError(f"domain: {checks.shown(self.domain)} must be two finite numbers, the first the smaller")
+        if self._counts["rhs"] != len(self.state_names):
+            given = ", ".join(self.state_names[:8])
+            raise ProblemError(f"rhs returns {self._counts['rhs']} values for the {len(self.state_names)} states {given}")
+        known = (*self.parameters, *self.state_names)
+        object.__setattr__(self, "phases", checks.chosen("phases", self.phases, known))
+
+    def events(self) -> list[TestFunction]:
+        """Return the test functions that the statement brings."""
+        return []
+
+    @property
+    def index(self) -> TestFunction | None:
+        """The test function whose value is the index of a solution; None without an energy."""
+        return None
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states: ``states``, also where a number was given."""
+        return cast(tuple[str, ...], self.states)
+
+    @property
+    def boundary_size(self) -> int:
+        """n_bc, the number of boundary conditions."""
+        return self._counts["boundary"]
+
+    @property
+    def integral_size(self) -> int:
+        """n_int, the number of integral conditions."""
+        return self._counts["integrals"]
+
+    @property
+    def free_size(self) -> int:
+        """Number of free parameters on a curve of solutions: n_bc + n_int - n + 1."""
+        return self.boundary_size + self.integral_size - len(self.state_names) + 1
+
+    def batch(self, name: str) -> Batch:
+        """Return the compiled ``"field"`` (rhs and integrals), ``"boundary"`` or ``"functionals"``; made when first asked."""
+        if name not in self._batches:
+            self._batches[name] = self._compiled(name)
+        return self._batches[name]
+
+    def _groups(self) -> list[str]:
+        return ["field", "boundary", *(["functionals"] if self.functionals else [])]
+
+    def equations(self) -> str:
+        """Return the equations and conditions as text, as they were recorded or derived.
+
+        Raises
+        ------
+        ProblemError
+            A function is evaluated in Python.
+
+        Examples
+        --------
+        >>> import math, contin
+        >>> elastica = contin.VariationalProblem(
+        ...     lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle), ["angle"], {"load": 1.0},
+        ...     ends=lambda a, b, p: (a.angle,),
+        ... )
+        >>> print(elastica.equations())
+        angle' = lam_angle
+        lam_angle' = -load * sin(angle)
+        0 = angle(0)
+        0 = lam_angle(1)
+        """
+        u, p, (a, b) = self.state_names, tuple(self.parameters), self.domain
+        inside = self.batch("field").text([*u, *p])
+        ends = self.batch("boundary").text([*(f"{name}({a:g})" for name in u), *(f"{name}({b:g})" for name in u), *p])
+        left = [*(f"{name}'" for name in u), *["0 = integral of"] * self.integral_size]
+        shared, values = inside[: len(inside) - len(left)], inside[len(inside) - len(left) :]
+        lines = [*shared, *(f"{name} {value}" if name[0] == "0" else f"{name} = {value}" for name, value in zip(left, values))]
+        count = len(ends) - self.boundary_size
+        return "\n".join([*lines, *ends[:count], *(f"0 = {value}" for value in ends[count:])])
+
+    def _signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        point = self._of_point.arguments
+        return {"rhs": point, "boundary": self._of_ends.arguments, "integrals": point, "functionals": point}
+
+    @property
+    def _of_point(self) -> Signature:
+        """Arguments of rhs, integrals and functionals."""
+        return Signature(self.state_names, tuple(self.parameters))
+
+    @property
+    def _of_ends(self) -> Signature:
+        """Arguments of boundary."""
+        return Signature(self.state_names, tuple(self.parameters), times=False, ends=True)
+
+    @functools.cached_property
+    def _counts(self) -> dict[str, int]:
+        """Numbers of values of the functions."""
+        return {
+            "rhs": _value_count("rhs", self.rhs, self._of_point, len(self.state_names)),
+            "boundary": _value_count("boundary", self.boundary, self._of_ends, self.boundary_count),
+            "integrals": _value_count("integrals", self.integrals, self._of_point, self.integral_count),
+        }
+
+    @functools.cached_property
+    def _batches(self) -> dict[str, Batch]:
+        return {}
+
+    def _compiled(self, name: str) -> Batch:
+        u, p = self.state_names, tuple(self.parameters)
+        if name == "boundary":
+            shape = _shape(self.boundary, self._of_ends, self.boundary_size)
+            return Batch([self.boundary], [shape], u, p, ends=True)
+        if name == "functionals":
+            functions = list(self.functionals.values())
+            if any(argument_count(f) != 3 or result_count(f, self._of_point.arguments, "a functional") for f in functions):
+                raise ProblemError("functionals: each must be f(t, u, p) and return one number")
+            return Batch(functions, [0] * len(functions), u, p)
+        functions = [f for f in (self.rhs, self.integrals) if f is not None]
+        sizes = (len(u), self.integral_size)
+        shapes = [_shape(f, self._of_point, size) for f, size in zip(functions, sizes)]
+        return Batch(functions, shapes, u, p)
+
+
+def _value_count(name: str, function: Function | None, signature: Signature, given: int | None) -> int:
+    """Return how many values a function has; ``given`` is that number for one that fills an array.
+
+    Raises
+    ------
+    ProblemError
+        It does not take these arguments, or fills an array of unknown size.
+    """
+    if function is None and name == "integrals":
+        return 0
+    function = checks.function(name, function)
+    expected, found = len(signature.arguments), argument_count(function)
+    if found not in (expected, expected + 1):
+        raise ProblemError(f"{name} takes {found} arguments, must take {expected} (or {expected + 1}, to fill the last)")
+    if found == expected:
+        return max(result_count(function, signature.arguments, name), 1)
+    if given is None:
+        raise ProblemError(f"{name} fills an array: say how many values with {name.rstrip('s')}_count")
+    checks.whole(f"{name.rstrip('s')}_count", given, 1, MOST_CONDITIONS)
+    return given
+
+
+def _shape(function: Function, signature: Signature, size: int) -> int:
+    """Return the number of values as a Batch wants it: 0 for a function that returns a bare number."""
+    if size > 1 or signature.fills(function):
+        return size
+    return result_count(function, signature.arguments, function.__name__)

@@ -1,0 +1,203 @@
+"""A variational problem as the user states it: an energy, what may vary and what is held. The equations are derived."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from contin import checks
+from contin.arrays import Array, Function
+from contin.boundary.canonical import Canonical, Variation, canonical
+from contin.boundary.second_variation import INDEX, legendre
+from contin.boundary.statement import BoundaryValueProblem
+from contin.core.trial import TestFunction
+from contin.errors import ProblemError
+from contin.functions.batch import Batch
+from contin.functions.signature import Arguments, argument_count
+from contin.problems.statement import check_statement
+
+#: A symmetry: ``map(t, x)`` returns the image of the states x, shape (K, n), at all nodes t, shape (K,).
+Symmetry = Callable[[Array, Array], Array]
+
+
+class VariationalProblem(BoundaryValueProblem):
+    """Stationary points of E = integral of L(t, x, w, p) dt + Phi(x(t0), x(t1), p), over controls w(t) with x' = f(t, x, w, p).
+
+    Held are end conditions e(x(t0), x(t1), p) = 0 and integral conditions, the integral of g(t, x, w, p) being zero. The
+    equations of the states and their multipliers, and the conditions at free ends, are derived (`contin.boundary.canonical`):
+    nothing need be counted. Functions are plain Python with arithmetic and functions of ``math``; x, w and p come as named
+    tuples.
+
+    Parameters
+    ----------
+    energy : callable
+        ``energy(t, x, w, p)`` returns the density L, convex in w.
+    states : sequence of str
+        Names of the n states x.
+    parameters : mapping of str to float
+        Names and default values.
+    kinematics : callable, optional
+        ``kinematics(t, x, w, p)`` returns x'. Left out, the controls are the rates: ``w.y`` is y'.
+    controls : sequence of str, optional
+        Names of the controls, with ``kinematics``.
+    ends : callable, optional
+        ``ends(x0, x1, p)`` returns what vanishes at the ends. What is not held there is free.
+    integrals : mapping of str to callable, optional
+        ``g(t, x, w, p)``, whose integral vanishes. Its multiplier is the free parameter ``mu_`` + name.
+    end_energy : callable, optional
+        ``end_energy(x0, x1, p)`` returns Phi.
+    functionals : mapping of str to callable, optional
+        ``f(t, x, w, p)``: integrals that are columns of every point. ``energy`` (the integral of L) is one without being named.
+    hamiltonian : callable, optional
+        ``hamiltonian(t, x, lam, p)``, H = max over w of lam.f - L, where it is known in closed form; instead of ``energy``
+        (pass None), ``kinematics`` and ``integrals``.
+    symmetries : mapping of str to callable, optional
+        Maps of states that leave the energy unchanged, by name: ``map(t, x)`` with t (K,) and x (K, n) at symmetric places t
+        returns the image of x, as for `contin.diagram`. Special points say which of them they break.
+    phases : sequence of str, optional
+        Names of those ``integrals`` that hold by a continuous symmetry and pick one of the solutions that it moves into each
+        other; with ``hamiltonian``, of states that accumulate such an integral. Their multipliers are zero then. A run notes
+        labelled points at which they are not: the condition loads the structure.
+    domain : pair of float
+    starts : mapping of str to float, optional
+        Where the search for the controls starts at each point (0): in the domain of the energy.
+
+    Raises
+    ------
+    ProblemError
+        A name or function that cannot be used, an energy that does not determine the controls, end conditions that repeat
+        each other; the message says which and why.
+
+    Notes
+    -----
+    The states of the boundary value problem are x and the multipliers ``lam_`` + name. Besides one parameter to follow, the
+    multipliers of integral conditions (``mu_...``) and of end conditions that do more than fix one state (``sigma_1``, ...) are
+    free parameters; they are added by themselves. Points of a branch have an ``index``: the number of independent ways to lower
+    the energy (`contin.boundary.second_variation`).
+
+    Examples
+    --------
+    The elastica, clamped at both ends and compressed: y is its angle, the ends lie on one line.
+
+    >>> import math, contin
+    >>> strip = VariationalProblem(
+    ...     energy=lambda t, x, w, p: w.angle**2 / 2 + p.load * math.cos(x.angle),
+    ...     states=["angle"], parameters={"load": 30.0}, ends=lambda a, b, p: (a.angle, b.angle),
+    ...     integrals={"offset": lambda t, x, w, p: math.sin(x.angle)},
+    ... )
+    >>> straight = contin.trace(contin.solve(strip, [0.0]), free=["load"], limits={"load": (30, 60)})
+    >>> [(point.label, round(point["load"] / math.pi**2, 6), point.index) for point in straight if point.label]
+    [('EP', 3.039636, 0), ('BP', 4.0, 0), ('EP', 6.079271, 1)]
+    """
+
+    variation: Variation
+    canonical: Canonical
+    symmetries: Mapping[str, Symmetry]
+
+    def __init__(
+        self, energy: Function | None, states: Sequence[str], parameters: Mapping[str, float], *,
+        kinematics: Function | None = None, controls: Sequence[str] | None = None, ends: Function | None = None,
+        integrals: Mapping[str, Function] | None = None, end_energy: Function | None = None,
+        functionals: Mapping[str, Function] | None = None, hamiltonian: Function | None = None,
+        symmetries: Mapping[str, Symmetry] | None = None, domain: tuple[float, float] = (0.0, 1.0),
+        starts: Mapping[str, float] | None = None, phases: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        integrals, functionals, starts = integrals or {}, functionals or {}, starts or {}
+        names = check_statement(states, parameters, checks.mapping("functionals", functionals, "functions"))
+        if hamiltonian is not None and (energy is not None or kinematics is not None or integrals):
+            raise ProblemError("hamiltonian: stands instead of energy, kinematics and integrals, not beside them")
+        if hamiltonian is None and energy is None:
+            raise ProblemError("energy: None must be a function of (t, x, w, p), or hamiltonian given")
+        if (kinematics is None) != (controls is None):
+            raise ProblemError(
+                "controls: their names belong to kinematics; without it the controls are the rates of the states"
+            )
+        control_names = names if controls is None else check_statement(controls, {}, {})
+        _check_names(parameters, integrals, functionals)
+        for name, value in checks.mapping("starts", starts, "numbers").items():
+            if name not in control_names or hamiltonian is not None:
+                raise ProblemError(f"starts: {checks.shown(name)} is not one of the controls of an energy")
+            checks.number(f"starts: {name}", value)
+        held = checks.chosen("phases", phases, names if hamiltonian is not None else tuple(integrals))
+        for name, image in checks.mapping("symmetries", symmetries or {}, "functions").items():
+            checks.function(f"symmetries: {name}", image)
+        taken = [("energy", energy, 4), ("kinematics", kinematics, 4), ("ends", ends, 3), ("end_energy", end_energy, 3)]
+        taken += [("hamiltonian", hamiltonian, 4), *((f"integrals: {name}", g, 4) for name, g in integrals.items())]
+        for what, function, count in [*taken, *((f"functionals: {name}", f, 4) for name, f in functionals.items())]:
+            if function is not None and argument_count(checks.function(what, function)) != count:
+                raise ProblemError(f"{what} must take {count} arguments")
+        variation = Variation(
+            energy, kinematics, ends, end_energy, hamiltonian, dict(integrals), dict(functionals), names, control_names,
+            tuple(parameters), tuple(float(starts.get(name, 0.0)) for name in control_names),
+        )  # fmt: skip
+        derived = canonical(variation)
+        object.__setattr__(self, "variation", variation)
+        object.__setattr__(self, "canonical", derived)
+        object.__setattr__(self, "symmetries", dict(symmetries or {}))
+        for name in self.multipliers:
+            if name in parameters:
+                raise ProblemError(f"parameters: {name} is the name of a multiplier, which is a parameter by itself")
+        super().__init__(
+            derived.rhs, derived.boundary, (*names, *(f"lam_{name}" for name in names)),
+            {**parameters, **dict.fromkeys(self.multipliers, 0.0)}, derived.integrals, domain, derived.functionals,
+            phases=[f"lam_{name}" if hamiltonian is not None else f"mu_{name}" for name in held],
+        )  # fmt: skip
+
+    def _signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        v = self.variation
+        inside: Arguments = [None, v.states, v.controls, v.parameters]
+        ends: Arguments = [v.states, v.states, v.parameters]
+        return {
+            **dict.fromkeys(("energy", "kinematics", "integrals", "functionals"), inside), "ends": ends, "end_energy": ends,
+            "hamiltonian": [None, v.states, v.states, v.parameters],
+        }  # fmt: skip
+
+    def events(self) -> list[TestFunction]:
+        """Return that of Legendre's condition: where it fails, the energy is not convex in the controls."""
+        return [legendre()]
+
+    @property
+    def index(self) -> TestFunction:
+        """The number of independent ways to lower the energy."""
+        return INDEX
+
+    @property
+    def multipliers(self) -> tuple[str, ...]:
+        """Names of the multipliers that are free on every curve."""
+        ends = (f"sigma_{i + 1}" for i in range(self.canonical.sigmas))
+        return (*(f"mu_{name}" for name in self.variation.integrals), *ends)
+
+    @property
+    def dimension(self) -> int:
+        """n, the number of states x."""
+        return len(self.variation.states)
+
+    @functools.cached_property
+    def legendre(self) -> Batch | None:
+        """The pivots of -d2H/dw2, compiled; None where the Hamiltonian is given."""
+        if self.canonical.legendre is None:
+            return None
+        return Batch([self.canonical.legendre], [len(self.variation.controls)], self.state_names, tuple(self.parameters))
+
+    def margin(self, t: Array, u: Array, p: Array) -> float:
+        """Return the least pivot of -d2H/dw2 at places t (K,) with u (K, 2n): positive where Legendre's condition holds."""
+        if self.legendre is None:
+            return math.inf
+        values: Any = self.legendre.values(t, u, u[:0], p)
+        return float(values.min())
+
+
+def _check_names(
+    parameters: Mapping[str, float], integrals: Mapping[str, Function], functionals: Mapping[str, Function]
+) -> None:
+    """Raise ProblemError for names of integrals that cannot be used, and for a parameter that has the name of a column."""
+    for name in checks.mapping("integrals", integrals, "functions"):
+        if not name.isidentifier():
+            raise ProblemError(f"integrals: {checks.shown(name)} is not usable as a name (a Python identifier)")
+        if f"mu_{name}" in functionals:
+            raise ProblemError(f"functionals: mu_{name} is the multiplier of the integral {name}")
+    if "energy" in parameters and "energy" not in functionals:
+        raise ProblemError("parameters: 'energy' is the name of the energy's own column")

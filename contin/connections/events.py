@@ -1,0 +1,294 @@
+"""Special points on curves of homoclinic orbits (Champneys, Kuznetsov & Sandstede 1996; labels as in MatCont).
+
+The eigenvalues of the saddle are those of the manifold that the orbit enters, m1, m2, ... with the largest real part first,
+and those of the manifold that it leaves, l1, l2, ... with the smallest first: the leading ones. Test functions:
+
+    NSS, NSF, NFF   Re m1 + Re l1                            neutral saddle, saddle-focus, bifocus
+    DRS, DRU        (m1 - m2)^2, (l1 - l2)^2                 a real leading eigenvalue becomes a complex pair
+    NDS, NDU        2 Re m1 + Re l1, Re m1 + 2 Re l1         neutrally divergent saddle-focus (m1, l1 complex)
+    NCH, SH         -Re m1, Re l1                            the saddle comes to be a saddle-node, or has a Hopf bifurcation
+    OFS, OFU        p.(u(1) - e), q.(u(0) - e)               orbit flips: p, q are left eigenvectors of m1, l1
+    IFS, IFU        v.a(0), w.a(1)                           inclination flips: v, w are right eigenvectors of m1, l1
+
+On curves of homoclinic orbits to saddle-nodes, whose slow motion is c' = a c^2, with c = p.(u - e):
+
+    NCH             a c / |a| at u(0), where it is positive, and at u(1), where it is negative: the orbit leaves, or comes back,
+                    along another direction than the eigenvector of the eigenvalue zero, and a curve to saddles begins
+    CP, BT, ZH      a, a second eigenvalue, or a pair, is zero, or imaginary
+
+In IFS and IFU a solves the adjoint equation; its values at the ends are the multipliers of the projection conditions in the
+left null vector of F_z, z all unknowns but the user's parameters. Eigenvectors and null vectors have the signs that they have
+at the reference of the discretization.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.core.trial import TestFunction, Trial
+from contin.events.segment import SpecialPoint
+from contin.linalg.orientation import oriented
+
+if TYPE_CHECKING:
+    from contin.connections.system import ConnectionCollocation
+
+#: A null vector's part at an end below this part of its length is round-off: the orbit is long. So is the component of a vector
+#: along another one, below this part of both lengths: where equations separate it is that everywhere, with any sign.
+_NOTHING = 1e-12
+#: A sum of eigenvalues below this part of their sizes is round-off: of a reversible or conservative system it is zero
+#: everywhere. Equilibria are known to Newton's tolerance, 1e-10; ten times larger, a neutral saddle is located to 1e-8 only.
+_NEUTRAL = 1e-9
+#: An orbit that comes nearer to the saddle, over its largest state, has no direction there: Newton's error is 1e-10 of it.
+_TOO_NEAR = 1e-8
+#: With a larger gap the orbit is not close to a homoclinic one.
+_FAR = 0.2
+#: An eigenvalue whose real part is below this part of the largest one lies on the axis; a double zero is known to 1e-5.
+_ON_AXIS = 1e-3
+#: The labels of the test functions whose points `named` calls otherwise.
+_LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
+#: An eigenvalue with a smaller imaginary part, relative to its size, is real.
+_REAL = 1e-8
+
+
+def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
+    """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
+    n, unstable = len(system.problem.state_names), system.problem.unstable
+    counts = n - unstable, unstable
+    why = "the ends of the orbit are far from the saddle: it needs a longer time"
+    near = TestFunction("EP", why, _closeness, terminal=True)
+    if system.problem.saddle_node:
+        others = [_second_zero(side) for side in (0, 1) if (unstable if side else n - 1 - unstable)]
+        return [near, _NON_CENTRAL[0], _NON_CENTRAL[1], _CUSP, *others]
+    found = [
+        near,
+        TestFunction("NSS", "neutral saddle", lambda trial: _total(_leading(trial, 0)[0].real, _leading(trial, 1)[0].real)),
+        *(_ends(side) for side in (0, 1)),
+    ]
+    for side in (0, 1):
+        if counts[side] > 1:
+            found += [_double(side), _divergent(side), _orbit_flip(side), _inclination_flip(side)]
+    return found
+
+
+def own_test_of(label: str, system: ConnectionCollocation, x: Array) -> TestFunction | None:
+    """Return the test function that labels a special point x of a curve of homoclinic orbits so; None where none does.
+
+    Labels of `named` are those of the function that was located. Where two have the same label it is the one that vanishes.
+    """
+    trial, located = Trial.without_tangent(system, x), _LOCATED_AS.get(label, label)
+    if label in ("IFS", "IFU"):
+        return _inclination_flip("SU".index(label[-1]), known=True)
+    found = [test for test in homoclinic_points(system) if test.label == located != "EP"]
+    return min(found, key=lambda test: abs(test.function(trial)), default=None)
+
+
+def _closeness(trial: Trial) -> float:
+    return _FAR - trial["gap"]
+
+
+def _slow_component(trial: Trial, end: int) -> float:
+    """Return c at an end of an orbit to a saddle-node, with the sign of a: positive where the slow motion leaves."""
+    p, bend = _system(trial).slow_motion(trial.x)
+    return float(np.sign(bend) * (p @ _system(trial).apart(trial.x)[end]))
+
+
+#: The test functions of the first and of the last end of an orbit to a saddle-node, positive where it is a central one.
+_NON_CENTRAL = tuple(
+    TestFunction(
+        "NCH",
+        "non-central homoclinic orbit to a saddle-node",
+        (lambda trial: -_slow_component(trial, 1)) if end else (lambda trial: _slow_component(trial, 0)),
+        terminal=True,
+    )  # fmt: skip
+    for end in (0, 1)
+)
+
+
+def _bend(trial: Trial) -> float:
+    """Return a, positive at the reference of the discretization: its sign is that of the eigenvector."""
+    system = _system(trial)
+    return float(system.slow_motion(trial.x)[1] * np.sign(system.slow_motion(system.reference)[1]))
+
+
+#: The test function of a cusp.
+_CUSP = TestFunction("CP", "cusp: the saddle-node meets a third equilibrium", _bend, terminal=True)
+
+
+def _second_zero(side: int) -> TestFunction:
+    """Return the test function of a second eigenvalue zero, a stable (0) or unstable one: the sum of both that meet."""
+
+    def total(trial: Trial) -> float:
+        system = _system(trial)
+        rates = -np.sort(-np.linalg.eigvals(system.saddle_jacobian(trial.x)).real)
+        first = system.problem.unstable - side
+        return float(rates[first] + rates[first + 1]) * (1 if side else -1)
+
+    return TestFunction("BT", "Bogdanov-Takens: the saddle-node has two eigenvalues zero", total, terminal=True)
+
+
+def crossing(point: Any) -> tuple[bool, int]:
+    """Return, for a point labelled NCH, whether the orbit is then one to a saddle, and the end or side that it is about.
+
+    Of an orbit to a saddle-node, the end that is non-central; of one to a saddle, the side of the eigenvalue that is zero.
+    """
+    trial = Trial.without_tangent(point.system, point.x)
+    if point.system.problem.saddle_node:
+        return False, int(np.argmin([abs(test.function(trial)) for test in _NON_CENTRAL]))
+    return True, int(np.argmin([abs(_leading(trial, side)[0].real) for side in (0, 1)]))
+
+
+def ending(system: ConnectionCollocation, side: int) -> TestFunction:
+    """Return the test function NCH of an end (of orbits to a saddle-node) or side; it is positive on the curve."""
+    return _NON_CENTRAL[side] if system.problem.saddle_node else _ends(side)
+
+
+def named(point: SpecialPoint, solution: Trial | None = None) -> SpecialPoint:
+    """Return a neutral saddle, or the end of a curve, with label and name by which leading eigenvalues are complex.
+
+    ``solution`` is the orbit, where the point is one of a curve in two parameters.
+    """
+    names = _own_names(point if solution is None else dataclasses.replace(point, trial=solution))
+    return point if names is None else dataclasses.replace(point, label=names[0], name=names[1])
+
+
+def _own_names(point: SpecialPoint) -> tuple[str, str] | None:
+    """Return label and name of a neutral saddle, or of the end of a curve, whose leading eigenvalue is complex; else None."""
+    if point.label not in ("NSS", "NCH", "BT") or not point.is_located:
+        return None
+    if _system(point.trial).problem.saddle_node:
+        values = np.linalg.eigvals(_system(point.trial).saddle_jacobian(point.trial.x))
+        critical = np.count_nonzero(np.abs(values.real) < _ON_AXIS * np.abs(values).max())
+        return ("ZH", "zero-Hopf: the saddle-node has a pair, too") if point.label == "BT" and critical > 2 else None
+    kinds = [_is_complex(_leading(point.trial, side)[0]) for side in (0, 1)]
+    if point.label == "NSS" and any(kinds):
+        return ("NFF", "neutral bifocus") if all(kinds) else ("NSF", "neutral saddle-focus")
+    nearest = int(np.argmin([abs(_leading(point.trial, side)[0].real) for side in (0, 1)]))
+    return ("SH", "Shilnikov-Hopf") if point.label == "NCH" and kinds[nearest] else None
+
+
+def _system(trial: Trial) -> ConnectionCollocation:
+    system: Any = trial.system
+    found: ConnectionCollocation = system
+    return found
+
+
+def _leading(trial: Trial, side: int) -> ComplexArray:
+    """Return the eigenvalues of one side, 0 stable or 1 unstable, the leading one first."""
+    return _eigenvalues(_system(trial), trial.x, side)[0]
+
+
+def _eigenvalues(system: ConnectionCollocation, x: Array, side: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Return the eigenvalues of one side, the leading one first, and its right and left eigenvector."""
+    values, vectors = np.linalg.eig(system.saddle_jacobian(x))
+    order = np.argsort(-values.real)
+    count = system.problem.unstable
+    chosen = order[:count][::-1] if side else order[count:]
+    left = np.linalg.inv(vectors)[chosen[0]]
+    return values[chosen].astype(complex), vectors[:, chosen[0]].astype(complex), left.astype(complex)
+
+
+def _leading_vectors(system: ConnectionCollocation, x: Array, side: int) -> tuple[Array, Array]:
+    """Return the eigenvectors, right and left, of a real leading eigenvalue, with the signs of the reference."""
+    _, *there = _eigenvalues(system, system.reference, side)
+    _, *here = _eigenvalues(system, x, side)
+    signs = [np.sign((vector.conj() @ oriented(known)).real) for vector, known in zip(here, there)]
+    right, left = (sign * vector.real / np.linalg.norm(vector.real) for sign, vector in zip(signs, here))
+    return right, left
+
+
+def _is_complex(value: complex) -> bool:
+    return abs(value.imag) > _REAL * abs(value)
+
+
+def _total(first: float, second: float) -> float:
+    """Return the sum of two real parts; 0 where it is round-off."""
+    total = float(first + second)
+    return total if abs(total) > _NEUTRAL * (abs(first) + abs(second)) else 0.0
+
+
+def _ends(side: int) -> TestFunction:
+    """Return the test function that ends a curve: a leading eigenvalue of one side reaches the imaginary axis."""
+    sign = 1 if side else -1
+    return TestFunction(
+        "NCH", "non-central homoclinic orbit to a saddle-node",
+        lambda trial: sign * _leading(trial, side)[0].real, terminal=True,
+    )  # fmt: skip
+
+
+def _double(side: int) -> TestFunction:
+    def square(trial: Trial) -> float:
+        first, second = _leading(trial, side)[:2]
+        return float(((first - second) ** 2).real)
+
+    return TestFunction("DRU" if side else "DRS", f"double real leading {('stable', 'unstable')[side]} eigenvalue", square)
+
+
+def _divergent(side: int) -> TestFunction:
+    def total(trial: Trial) -> float:
+        return _total(2 * _leading(trial, side)[0].real, _leading(trial, 1 - side)[0].real)
+
+    return TestFunction(
+        "NDU" if side else "NDS", "neutrally divergent saddle-focus", total,
+        confirm=lambda trial: _is_complex(_leading(trial, side)[0]),
+    )  # fmt: skip
+
+
+def _flip(label: str, name: str, side: int, function: Callable[[ConnectionCollocation, Array], float]) -> TestFunction:
+    """Return the test function of a flip: NaN where the leading eigenvalue is complex."""
+
+    def value(trial: Trial) -> float:
+        complex_pair = _is_complex(_leading(trial, side)[0])
+        return float("nan") if complex_pair else function(_system(trial), trial.x)
+
+    return TestFunction(label, name, value)
+
+
+def _component(unit: Array, vector: Array) -> float:
+    """Return the component of a vector along one of unit length; 0 where it is round-off."""
+    component = float(unit @ vector)
+    return component if abs(component) > _NOTHING * float(np.linalg.norm(vector)) else 0.0
+
+
+def _orbit_flip(side: int) -> TestFunction:
+    def component(system: ConnectionCollocation, x: Array) -> float:
+        gap = system.apart(x)[1 - side]
+        if not np.linalg.norm(gap) > _TOO_NEAR * np.max(np.abs(x[: system.state_size])):
+            return float("nan")
+        return _component(_leading_vectors(system, x, side)[1], gap)
+
+    return _flip("OFU" if side else "OFS", "orbit flip", side, component)
+
+
+def _inclination_flip(side: int, known: bool = False) -> TestFunction:
+    """Return the test function of an inclination flip; of one that is ``known`` it is followed below round-off, too.
+
+    Right at a flip a(0), or a(1), is as small as its second exponential.
+    """
+
+    def component(system: ConnectionCollocation, x: Array) -> float:
+        border = _left_null_vector(system, system.reference, None)
+        if not known and not np.linalg.norm(system.adjoint_at_ends(x, border)[side]) > _NOTHING:
+            return float("nan")
+        adjoint = system.adjoint_at_ends(x, _left_null_vector(system, x, border))[side]
+        unit = _leading_vectors(system, x, side)[0]
+        return float(unit @ adjoint) if known else _component(unit, adjoint)
+
+    return _flip("IFU" if side else "IFS", "inclination flip", side, component)
+
+
+def _left_null_vector(system: ConnectionCollocation, x: Array, border: Array | None) -> Array:
+    """Return w with w F_z = 0, of unit length, and its product with the border (random without one) positive."""
+    own = [name for name in system.free if name not in system.problem.multipliers]
+    held = np.zeros((len(own), system.size + 1))
+    held[range(len(own)), [system.parameter_index(name) for name in own]] = 1.0
+    column = np.random.default_rng(11).standard_normal(system.equations) if border is None else border
+    _, factors = system.linearize(x, held, column[None])
+    unit = np.zeros(system.size + 1)
+    unit[-1] = 1.0
+    w: Array = factors.solve_transposed(unit)[: system.equations]
+    return w / np.linalg.norm(w)

@@ -1,0 +1,412 @@
+"""Newton's method, then chord steps, on F(x) = 0 together with a linear condition on x.
+
+One iteration: linearize at x where a new Jacobian is due, else take the residual only; solve for the update; apply it;
+estimate the error that is left; stop when that is below the tolerance or round-off, give up when updates grow.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.collocation.one_call import (
+    CLOSE,
+    CONVERGED,
+    ERROR,
+    EXACT,
+    ITERATIONS,
+    NOT_FINITE,
+    SIGN,
+    STAGNATES,
+    UPDATES,
+    Control,
+    correct_on_mesh,
+)
+from contin.collocation.workspace import Workspace
+from contin.core.protocol import Equations
+from contin.errors import ConvergenceError
+from contin.linalg.condensation import Factorization
+from contin.linalg.convergence import (
+    CHORDS,
+    ROUND_OFF,
+    diverges,
+    estimated_rate,
+    has_converged,
+    stagnates,
+    subtract,
+    wants_jacobian,
+)
+from contin.linalg.factors import Factors
+
+#: Updates below this multiple of what one unit in the last place of x makes are round-off. Ten times smaller would not suffice
+#: on meshes of many intervals.
+UNITS = 30
+#: Draws of the signs of these units. One more changes the estimate by a few percent.
+_DRAWS = 3
+#: A larger update is not taken for round-off in any case. Ten times larger, a matrix that is singular could pass.
+_COARSE = 1e-3
+#: Nor is one larger than this on the way: stiff meshes of strips leave 1e-8. Ten times larger, a step could end elsewhere.
+STAGNANT = 1e-6
+#: Returns the size of each unknown at x.
+Sizes = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Newton:
+    """How to correct: stop when the estimated error of every component is below ``tolerance`` (1 + |x|).
+
+    ``tolerance`` may be as small as round-off; iterations that stagnate there count as converged.
+
+    Examples
+    --------
+    >>> Newton(tolerance=1e-10)
+    Newton(tolerance=1e-10, max_iterations=10)
+    """
+
+    tolerance: float = 1e-12
+    max_iterations: int = 10
+
+    def __post_init__(self) -> None:
+        checks.number("newton tolerance", self.tolerance, 0, 1)
+        checks.whole("max_iterations", self.max_iterations, 1, 10_000)
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A corrected point.
+
+    Attributes
+    ----------
+    x : ndarray, shape (size,)
+    factors : Factors
+        The last factorization, taken at an iterate before x.
+    iterations : int
+    error : float
+        Estimated error left, the largest component relative to 1 + |x|.
+    tangent : ndarray, shape (size,), or None
+        The unit tangent right at x, where it was asked for and is at hand; the factors are from there, too.
+    """
+
+    x: Array
+    factors: Factors
+    iterations: int
+    error: float
+    tangent: Array | None = None
+
+
+def correct(
+    system: Equations,
+    guess: Sequence[float] | Array,
+    row: Array | None = None,
+    target: Any = 0.0,
+    newton: Newton = Newton(),
+    factors: Factors | None = None,
+    sizes: Sizes | None = None,
+    linearize: bool = False,
+) -> Corrected:
+    """Solve F(x) = 0 and row.x = target, starting from ``guess``.
+
+    Parameters
+    ----------
+    system : Collocation or alike
+        Has ``residual(x)`` and ``linearize(x, rows)``.
+    guess : ndarray, shape (size,)
+    row : ndarray, shape (size,), optional
+        The linear condition; without it F = 0 must be square.
+    factors : optional
+        A factorization from near by: tried first, for as long as it converges fast.
+    sizes : callable, optional
+        ``sizes(x)`` returns the size of each unknown. Where it is given, the last update is also small relative to these, or as
+        small as round-off of x allows: for unknowns that are not known to be of order one.
+    linearize : bool
+        The tangent right at the solution is wanted, if it costs no further call.
+
+    Raises
+    ------
+    ConvergenceError
+        Not converged, or not finite; the message holds the last updates.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1,), ["x"], {"a": 0.6})
+    >>> print(round(correct(Algebraic(circle, []), [1.0]).x[0], 12))
+    0.8
+    """
+    work = getattr(system, "workspace", None) if sizes is None else None
+    if factors is not None:
+        with contextlib.suppress(ConvergenceError):
+            if work is not None and isinstance(factors, Factorization) and factors.unknowns == len(guess):
+                done = _in_one_call(system, work, guess, row, target, newton, near=factors)
+            else:
+                done = _chords(system, guess, row, target, newton, factors)
+            if done is not None:
+                return done
+    done = None if work is None else _in_one_call(system, work, guess, row, target, newton, linearize)
+    return _newton(system, guess, row, target, newton, sizes) if done is None else done
+
+
+def _in_one_call(
+    system: Any,
+    work: Workspace,
+    guess: Sequence[float] | Array,
+    row: Array | None,
+    target: float,
+    newton: Newton,
+    linearize: bool = False,
+    near: Factorization | None = None,
+) -> Corrected | None:
+    """Return what a kernel comes to, by chord steps with factors from ``near`` by if these are given.
+
+    None where Python must decide whether updates are round-off.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    values = work.values
+    if (row is None) != (system.size == system.equations):
+        return None
+    conditions, targets = system.linear_conditions
+    own = len(targets)
+    values.rows[:own], values.targets[:own] = conditions, targets
+    if row is not None:
+        values.rows[own], values.targets[own] = row, target
+    x, report = np.array(guess, dtype=float), np.empty(UPDATES + max(newton.max_iterations, CHORDS))
+    factors = system.unfilled_factors() if near is None else near
+    tangent, control = np.empty(x.size), Control(newton.tolerance, newton.max_iterations, near is not None, linearize)
+    done = correct_on_mesh(work, factors.room, control, x, system.weights, tangent, report)
+    iterations, error = int(report[ITERATIONS]), float(report[ERROR])
+    if near is None:
+        factors.sign = float(report[SIGN])
+    if done == CONVERGED:
+        return Corrected(x, factors, iterations, error, tangent if linearize else None)
+    if done == NOT_FINITE:
+        raise ConvergenceError("the equations are not finite at the corrected point")
+    updates = report[UPDATES : UPDATES + iterations].tolist()
+    if done == STAGNATES or (near is None and updates[-1] <= STAGNANT):
+        return None
+    raise _failure(updates)
+
+
+def _newton(
+    system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes | None
+) -> Corrected:
+    """Newton's method with a new Jacobian where chord steps are not expected to do."""
+    rows = () if row is None else (row,)
+    x, progress = np.array(guess, dtype=float), _Progress(newton.tolerance)
+    factors: Factors | None = None
+    with np.errstate(all="ignore"):
+        for _ in range(newton.max_iterations):
+            fresh = factors is None
+            if factors is None:
+                residual, factors = system.linearize(x, rows)
+            else:
+                residual = system.residual(x)
+            update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
+            size = subtract(x, update)
+            if not math.isfinite(size):
+                break
+            progress.record(size, fresh)
+            if progress.converged or (progress.stagnates and _is_noise(system, x, update, rows, ROUND_OFF)):
+                relative = 0.0 if sizes is None else _relative(update, sizes(x))
+                if sizes is None or relative * max(progress.rate, min(1.0, relative)) <= newton.tolerance:
+                    return Corrected(x, factors, len(progress.sizes), progress.error)
+                return _settled(system, x, row, target, newton, sizes, progress.sizes)
+            if progress.diverges:
+                break
+            if progress.wants_jacobian:
+                factors = None
+        coarse = _COARSE if sizes is not None else STAGNANT
+        if size <= coarse and _is_noise(system, x, update, rows, coarse):
+            return Corrected(x, system.linearize(x, rows)[1], len(progress.sizes), max(progress.sizes[-2:]))
+    raise _failure(progress.sizes)
+
+
+def _settled(
+    system: Equations, x: Array, row: Array | None, target: Any, newton: Newton, sizes: Sizes, updates: list[float]
+) -> Corrected:
+    """Go on until the update is small relative to the size of each unknown, or round-off, or leads to zero.
+
+    An unknown that is zero has no size: its updates vanish much faster than they become small. What is left of it is round-off
+    of the iterate before.
+
+    Raises
+    ------
+    ConvergenceError
+        It does not become so; the message holds the last updates, relative to these sizes.
+    """
+    rows, relative, before = () if row is None else (row,), [], np.zeros_like(x)
+    noise = np.zeros_like(x)
+    for _ in range(newton.max_iterations):
+        residual, factors = system.linearize(x, rows)
+        update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
+        relative.append(_relative(update, sizes(x)))
+        if not np.isfinite(update).all():
+            break
+        least = newton.tolerance * np.maximum(sizes(x), before)
+        if not np.all(np.abs(update) <= least):
+            now = rounded_off(system, x, rows)
+            least, noise = np.maximum(least, UNITS * np.maximum(noise, now)), now
+        small = np.all(np.abs(update) <= least)
+        error, before = subtract(x, update), np.abs(update)
+        if small:
+            return Corrected(x, factors, len(updates) + len(relative), error)
+    raise _failure(relative)
+
+
+def _relative(update: Array, sizes: Array) -> float:
+    """Return the largest component of an update relative to the size of its unknown; infinity if a zero changes."""
+    moving = update != 0
+    return float(np.max(np.abs(update[moving]) / sizes[moving], initial=0.0))
+
+
+def approached(system: Equations, guess: Sequence[float] | Array) -> Iterator[Array]:
+    """Return points from which Newton's method may converge, reached from a guess by damped steps, each nearer than the last.
+
+    The damping is that of the natural monotonicity test (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3):
+    the next correction, with the same Jacobian, must be smaller. It does not depend on units of the equations. How near is near
+    enough depends on the size of the solution: corrections that have become ten times smaller give the next point.
+    """
+    for enough in _ENOUGH:
+        x, near = np.array(guess, dtype=float), _NEAR
+        with np.errstate(all="ignore"):
+            for _ in range(_MOST_DAMPED):
+                update, factors = _correction(system, x)
+                size = float(np.max(np.abs(update) / (1 + np.abs(x)), initial=0.0))
+                if size < near:
+                    yield x
+                    near = min(near, size) / 10
+                part = _part_taken(system, x, update, factors, enough)
+                if part < _LEAST_PART:
+                    break
+                x = x - part * update
+
+
+def _correction(system: Equations, x: Array) -> tuple[Array, Factors]:
+    residual, factors = system.linearize(x)
+    return factors.solve(residual), factors
+
+
+def _part_taken(system: Equations, x: Array, update: Array, factors: Factors, enough: float) -> float:
+    """Return the part of a correction that makes the next one smaller; 0 where there is none."""
+    part, size = 1.0, np.linalg.norm(update)
+    while part >= _LEAST_PART and np.isfinite(size):
+        following = factors.solve(system.residual(x - part * update))
+        if np.linalg.norm(following) <= (1 - enough * part) * size:
+            return part
+        part /= 2
+    return 0.0
+
+
+#: A step must make the next correction smaller by this part, times the part of the correction that it takes: first as theory
+#: suggests, then about as SciPy's solve_bvp asks. A hanging cable needs the first, a localized pattern the second.
+_ENOUGH = (0.5, 0.2)
+#: Damped steps end where corrections, relative to 1 + |x|, are so small: Newton's method takes over. They end, too, after so
+#: many steps, and with so small a part of the correction.
+_NEAR, _MOST_DAMPED, _LEAST_PART = 1e-2, 100, 1e-4
+
+
+def _is_noise(system: Equations, x: Array, update: Array, rows: tuple[Array, ...], coarse: float) -> bool:
+    """Return whether an update is no larger than round-off of x makes it.
+
+    With unknowns of very different sizes, round-off of the large ones reaches the small ones.
+    """
+    noise = rounded_off(system, x, rows)
+    if not (np.isfinite(noise).all() and np.isfinite(update).all()):
+        return False
+    level = float(np.max(noise / (1 + np.abs(x))))
+    return bool(np.max(np.abs(update) / (1 + np.abs(x))) <= min(UNITS * level, coarse))
+
+
+def rounded_off(system: Equations, x: Array, rows: tuple[Array, ...] = ()) -> Array:
+    """Return by how much each unknown of a solution x changes where x changes by one unit in the last place."""
+    random, noise = np.random.default_rng(5), np.zeros_like(x)
+    residual, factors = system.linearize(x, rows)
+    for _ in range(_DRAWS):
+        rounded = x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), x.size))
+        change = np.append(system.residual(rounded) - residual, np.zeros(len(rows)))
+        noise = np.maximum(noise, np.abs(factors.solve(change)))
+    return noise
+
+
+class _Progress:
+    """The sizes of the updates so far, and what they say of the error that is left."""
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance = tolerance
+        self.sizes: list[float] = []
+        self._moved = 1.0  # distance from where the Jacobian was taken
+        self.rate = 1.0  # estimated ratio of the error after the last update to its size
+
+    def record(self, size: float, fresh: bool) -> None:
+        """Note an update, made with a ``fresh`` Jacobian or with an old one."""
+        self.sizes.append(size)
+        self._moved = size if fresh else self._moved + size
+        before = self.sizes[-2] if len(self.sizes) > 1 else math.inf
+        self.rate = estimated_rate(size, before, self._moved, fresh)
+
+    @property
+    def error(self) -> float:
+        """Estimated error after the last update."""
+        return self.sizes[-1] * self.rate
+
+    @property
+    def converged(self) -> bool:
+        """The error is below the tolerance."""
+        return has_converged(self.sizes[-1], self.rate, len(self.sizes), self.tolerance)
+
+    @property
+    def stagnates(self) -> bool:
+        """Small updates no longer shrink: they are round-off, or there is no solution and unknowns are smaller still."""
+        return stagnates(self.sizes[-1], self.rate, len(self.sizes))
+
+    @property
+    def diverges(self) -> bool:
+        """The last update is more than twice the one before."""
+        return len(self.sizes) > 2 and diverges(self.sizes[-1], self.sizes[-2])
+
+    @property
+    def wants_jacobian(self) -> bool:
+        """The next update is better made with a new Jacobian: chord steps would take longer."""
+        return wants_jacobian(self.sizes[-1], self.rate, self.tolerance)
+
+
+def _chords(
+    system: Equations, guess: Sequence[float] | Array, row: Array | None, target: Any, newton: Newton, factors: Factors
+) -> Corrected:
+    """Chord steps with factors from elsewhere, for a guess that is close.
+
+    Raises
+    ------
+    ConvergenceError
+        They converge slowly.
+    """
+    x = np.array(guess, dtype=float)
+    sizes: list[float] = []
+    with np.errstate(all="ignore"):
+        while len(sizes) < CHORDS:
+            residual = system.residual(x)
+            update = factors.solve(residual if row is None else np.append(residual, row @ x - target))
+            sizes.append(subtract(x, update))
+            if sizes[-1] <= EXACT:
+                return Corrected(x, factors, len(sizes), sizes[-1])
+            if not sizes[-1] < CLOSE * (sizes[-2] if len(sizes) > 1 else 1.0):
+                break
+            if len(sizes) > 1:
+                ratio = sizes[-1] / sizes[-2]
+                if sizes[-1] * ratio / (1 - ratio) <= newton.tolerance:
+                    return Corrected(x, factors, len(sizes), sizes[-1] * ratio / (1 - ratio))
+    raise _failure(sizes)
+
+
+def _failure(sizes: list[float]) -> ConvergenceError:
+    updates = ", ".join(f"{size:.1e}" for size in sizes) or "not finite"
+    return ConvergenceError(f"Newton did not converge (updates {updates})")

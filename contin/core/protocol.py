@@ -1,0 +1,264 @@
+"""The protocol of a discretized problem: what corrector, detection and the continuation loop ask of it.
+
+`contin.Collocation` and `contin.Algebraic` follow it, and so do the extended systems of `contin.curve`.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.collocation.mesh import MeshControl
+from contin.collocation.switching import NOWHERE, Switching
+from contin.core.differences import derivative
+from contin.core.multilinear import of_lines
+from contin.linalg.factors import Factors
+from contin.problems.statement import Statement
+
+if TYPE_CHECKING:
+    from contin.core.state import Stop
+    from contin.core.trial import TestFunction, Trial
+    from contin.events.coefficient import Coefficient
+    from contin.events.segment import Segment, SpecialPoint
+    from contin.functions.batch import Batch
+
+#: Takes vectors of unknowns from one discretization of a problem to another.
+Carrier = Callable[[Array], Array]
+
+
+class Equations(Protocol):
+    """F(x) = 0, as Newton's method sees it."""
+
+    def residual(self, x: Array) -> Array:
+        """Return F(x), shape (equations,)."""
+
+    def linearize(
+        self, x: Array, rows: Sequence[Array] | Array = (), columns: Sequence[Array] | Array = ()
+    ) -> tuple[Array, Factors]:
+        """Return F(x), and the factored matrix [[F_x, columns^T], [rows]]."""
+
+
+class Discretization(Equations, Protocol):
+    """F(x) = 0 with free parameters at the end of x, as the continuation sees it.
+
+    Attributes
+    ----------
+    problem : Statement
+    free : tuple of str
+        The free parameters.
+    size : int
+        Number of unknowns.
+    state_size : int
+        Place of the first free parameter among them.
+    equations : int
+        Number of equations.
+    weights : ndarray, shape (size,)
+        Weights of the inner product.
+    aims : tuple of float
+        The usual `Settings.angle` and `Settings.accuracy`.
+    intervals, degree : int
+        Of the mesh; 0 without one.
+    scales : object
+        Sizes of states and parameters, by which they are divided in x; None where these are as they are.
+    free_scales : ndarray
+        Those of the free parameters.
+    """
+
+    problem: Statement
+    free: tuple[str, ...]
+    size: int
+    state_size: int
+    equations: int
+    weights: Array
+    aims: tuple[float, float] = (0.35, 0.02)
+    intervals: int
+    degree: int
+    scales: Any
+    free_scales: Array
+
+    @property
+    @abstractmethod
+    def nodes(self) -> Array:
+        """Values of t at the nodes, where the states are given; shape (K,)."""
+
+    def discretization_error(self, x: Array, factors: Factors, columns: Mapping[str, float]) -> float:
+        """Return the estimated error of a solution x that is due to the mesh, relative to 1 + size: 0 without a mesh.
+
+        ``factors`` are those of [F_x; row] at x or close to it, ``columns`` the functionals of x. Kinds of system with a mesh
+        that say nothing return NaN.
+        """
+        return float("nan") if self.intervals else 0.0
+
+    def newton_error(self, x: Array, factors: Factors) -> float:
+        """Return what Newton's method or round-off has left, measured in the same way."""
+        return 0.0
+
+    def lifted(self, x: Array, reference: Array) -> Array:
+        """Return the same solution with its angles moved by whole rounds, so that they are nearest to those of a reference."""
+        return x
+
+    def cut_off_errors(self, x: Array, factors: Factors) -> Array:
+        """Return by how much x is off because an infinite interval is cut off, a row for each condition there, (k, size).
+
+        All may have either sign. Most systems have none.
+        """
+        return np.empty((0, self.size))
+
+    @property
+    def named_states(self) -> tuple[str, ...]:
+        """Names of the states that are columns: those that are numbers, no functions of t."""
+        return ()
+
+    @abstractmethod
+    def states(self, x: Array) -> Array:
+        """Return the states at the nodes, shape (K, n)."""
+
+    @abstractmethod
+    def all_parameters(self, x: Array) -> Array:
+        """Return the values of all parameters."""
+
+    @abstractmethod
+    def parameter(self, x: Array, name: str) -> float:
+        """Return the value of one parameter."""
+
+    @abstractmethod
+    def parameter_index(self, name: str) -> int:
+        """Return the place of a free parameter in x."""
+
+    @abstractmethod
+    def functionals(self, x: Array) -> Array:
+        """Return the values of the problem's functionals."""
+
+    def along(self, x: Array, directions: Sequence[Array]) -> Array:
+        """Return the derivative of F along two or three directions, F_xx[v1, v2] or F_xxx[v1, v2, v3], shape (equations,).
+
+        Kinds of system that state no derivatives of F of higher order have differences of the residual, along lines.
+        """
+
+        def bend(v: Array) -> Array:
+            found: Array = derivative(lambda s: self.residual(x + s * v), len(directions), 1 / np.abs(v).max())[0]
+            return found
+
+        return of_lines(bend, directions)
+
+    def magnitudes(self, x: Array) -> Array:
+        """Return the sizes of the unknowns relative to which x must be known, shape (size,).
+
+        Kinds of system that do not say are made of unknowns of order one.
+        """
+        found: Array = 1 + np.abs(x)
+        return found
+
+    @abstractmethod
+    def carrier(self, other: Any) -> Carrier:
+        """Return the function that carries vectors of unknowns to another discretization of this problem."""
+
+    @abstractmethod
+    def refined(self) -> tuple[Discretization, Carrier] | None:
+        """Return the same on every interval halved, and the carrier; None without a mesh."""
+
+    @abstractmethod
+    def adapted(self, x: Array, control: MeshControl) -> tuple[Discretization, Carrier] | None:
+        """Return the same on a better mesh for x, and the carrier; None where there is no need."""
+
+    def switching(self, x: Array) -> Switching:
+        """Return where conditions that the solution decides switch, and the equations are not smooth."""
+        return NOWHERE
+
+    def on_switches(self, x: Array, closely: bool = False) -> tuple[Discretization, Carrier] | None:
+        """Return the same on a mesh with those places among its points, and the carrier; None where there is no need."""
+        return None
+
+    def bends(self, x: Array) -> Array | None:
+        """Return errors of second derivatives at mesh points that show corners of functions in Python; None if not known."""
+        return None
+
+    # --- what a kind of problem knows of its branches; the answers here are those of a kind that knows nothing -----------
+
+    @property
+    def solution(self) -> Discretization:
+        """The problem whose solutions are followed: of a curve in two parameters the one that it is made of, else itself."""
+        return self
+
+    def events(self) -> list[TestFunction]:
+        """Return the test functions that the kind brings, beyond folds and branch points.
+
+        Their signs may differ between meshes. They ask ``trial.system``: the mesh changes along a branch.
+        """
+        return []
+
+    @property
+    def index(self) -> TestFunction | None:
+        """The test function whose value is the index of a point, of a problem with an energy."""
+        return None
+
+    @property
+    def size_of_solutions(self) -> TestFunction | None:
+        """The test function of the size of a solution, with a sign, where solutions can shrink onto others."""
+        return None
+
+    @property
+    def small_equations(self) -> Batch | None:
+        """The functions of a problem without a mesh whose steps kernels may make; ``gain`` is what angles of a map gain."""
+        return None
+
+    def home(self, segment: Segment) -> SpecialPoint | None:
+        """Return the end of the branch inside a step, where solutions become those of another kind."""
+        return None
+
+    def collapsed(self, x: Array, z: Array) -> bool:
+        """Return whether a step from x to z has left its branch for solutions of no size."""
+        return False
+
+    def cannot_branch(self, segment: Segment) -> bool:
+        """Return whether both ends of a step of a branch say that no other branch crosses it there."""
+        return False
+
+    def may_branch(self, x: Array) -> bool:
+        """Return whether other branches are looked for at a multiple point."""
+        return True
+
+    def judged(self, point: SpecialPoint) -> SpecialPoint:
+        """Return a special point, with the label and name, or as the end of the branch, that the kind knows it by."""
+        return point
+
+    def coefficient(self, point: SpecialPoint) -> Coefficient | None:
+        """Return the coefficient of the normal form at a special point."""
+        return None
+
+    def events_on_folds(self) -> list[TestFunction]:
+        """Return the test functions of a curve of folds, beyond cusps and branch points."""
+        return []
+
+    def events_on_curves(self) -> list[TestFunction]:
+        """Return the test functions of a curve along which one of `events` stays zero."""
+        return []
+
+    def judged_on_curve(self, point: SpecialPoint, solution: Trial) -> SpecialPoint:
+        """Return a special point of such a curve, with ``solution`` there, by the label and name that the kind knows it by."""
+        return point
+
+    def standstill(self, trial: Trial, primary: str) -> Stop | None:
+        """Return the reason to end a run whose primary parameter has not moved; None to go on."""
+        return None
+
+    def explained(self, stop: Stop, trial: Trial) -> Stop:
+        """Return the reason why a run ends, with what the kind knows of its last point."""
+        return stop
+
+    def lasting(self, x: Array) -> Array:
+        """Return quantities that no shift in time changes; two solutions are as far from each other as theirs, at least."""
+        return x[self.state_size :]
+
+    def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
+        """Return a solution, and vectors at it, shifted in time to lie closest to another one; angles, by whole rounds."""
+        return self.lifted(x, reference), list(vectors)
+
+
+def inner(system: Discretization, a: Array, b: Array) -> float:
+    """Return the weighted inner product of two vectors of unknowns."""
+    return float((system.weights * a) @ b)

@@ -1,0 +1,205 @@
+"""Settings of a run: what to follow, how carefully, and where to stop."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypedDict
+
+from contin import checks, threads
+from contin.collocation.mesh import MeshControl
+from contin.core.newton import Newton
+from contin.core.protocol import Discretization
+from contin.core.trial import TestFunction
+from contin.errors import ProblemError
+from contin.names import exact_text
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What to follow, how carefully, and where to stop. Frozen, checked when made.
+
+    Attributes
+    ----------
+    primary : str, optional
+        The parameter of folds and of the printed columns; the first free one by default.
+    direction : int
+        +1 or -1: the way to go from the first point, by the sign of the primary parameter's change.
+    step, min_step, max_step : float
+        First, smallest and largest step of arclength. Steps below the default ``min_step`` are taken, and noted, where a run
+        goes on with them only.
+    max_points : int
+        Regular points after which the run ends.
+    limits : mapping of str to pair of float
+        The run ends where a parameter or functional leaves its interval.
+    zeros : mapping of str to sequence of float
+        Points where a parameter or functional reaches one of these values are labelled (UZ). A value that is given twice counts
+        once.
+    extrema : sequence of str
+        Parameters and functionals whose extrema along the branch are labelled (EX).
+    trivial : str, optional
+        A parameter or functional that vanishes on a known trivial branch only: the run ends where it changes sign.
+    test_functions : sequence of TestFunction
+        Further functions of a point whose zeros are labelled.
+    monitors : sequence of TestFunction
+        The same, by its first name.
+    folds, branch_points : bool
+        Look for folds, for branch points.
+    errors : bool
+        Solve labelled points again on the mesh halved, until that changes them by less than the mesh tolerance: the last change
+        is their error estimate.
+    angle : float, optional
+        Largest angle between the tangents of consecutive points, radians. By default 0.35, and 0.7 for cycles.
+    change : float
+        Largest change of any free parameter p in one step, as a fraction of 1 + |p|.
+    accuracy : float, optional
+        Distance between predicted and corrected point that the step aims at, as a fraction of the step. By default 0.02, and
+        0.05 for cycles.
+    scales : mapping of str to float
+        Sizes of states and parameters, where those that the first point shows are not typical. Only those far from one matter.
+    newton, mesh :
+        See `Newton`, `MeshControl`.
+
+    Raises
+    ------
+    ProblemError
+        A value that is not allowed; the message names the field, the value and what is allowed.
+
+    Examples
+    --------
+    >>> Settings(limits={"lam": (0, 4)}, zeros={"lam": [1.0]}).step
+    0.05
+    """
+
+    primary: str | None = None
+    direction: int = 1
+    step: float = 0.05
+    min_step: float = 1e-6
+    max_step: float = 1e6
+    max_points: int = 2000
+    limits: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    zeros: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    trivial: str | None = None
+    monitors: Sequence[TestFunction] = ()
+    folds: bool = True
+    branch_points: bool = True
+    errors: bool = True
+    angle: float | None = None
+    change: float = 0.4
+    accuracy: float | None = None
+    newton: Newton = field(default_factory=Newton)
+    mesh: MeshControl = field(default_factory=MeshControl)
+    test_functions: Sequence[TestFunction] = ()
+    scales: Mapping[str, float] = field(default_factory=dict)
+    extrema: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        self._check_kinds()
+        self._check_numbers()
+        self._check_columns()
+
+    def _check_kinds(self) -> None:
+        for name in ("primary", "trivial"):
+            if getattr(self, name) is not None:
+                checks.instance(name, getattr(self, name), str, "a name")
+        for name in ("folds", "branch_points", "errors"):
+            checks.truth(name, getattr(self, name))
+        checks.names("extrema", self.extrema)
+        for name in ("test_functions", "monitors"):
+            for test in checks.sequence(name, getattr(self, name), "TestFunction"):
+                checks.instance(name, test, TestFunction, "a TestFunction")
+        checks.instance("newton", self.newton, Newton, "a Newton")
+        checks.instance("mesh", self.mesh, MeshControl, "a MeshControl")
+
+    def _check_numbers(self) -> None:
+        if not checks.is_number(self.direction) or self.direction not in (1, -1):
+            raise ProblemError(f"direction: {checks.shown(self.direction)} must be +1 or -1")
+        for name in ("step", "min_step"):
+            checks.number(name, getattr(self, name), 0)
+        if not checks.is_number(self.max_step) or not self.min_step <= self.step <= self.max_step:
+            bounds = f"min_step = {exact_text(self.min_step)} and max_step = {checks.shown(self.max_step)}"
+            raise ProblemError(f"step: {exact_text(self.step)} must lie between {bounds}")
+        checks.whole("max_points", self.max_points, 1, 10**9)
+        for name in ("angle", "accuracy", "change"):
+            if name == "change" or getattr(self, name) is not None:
+                checks.number(name, getattr(self, name), 0, 1.5)
+
+    def _check_columns(self) -> None:
+        for name, size in checks.mapping("scales", self.scales, "positive numbers").items():
+            checks.number(f"scales: {checks.plain(name)}", size, 0)
+        for name, ends in checks.mapping("limits", self.limits, "pairs of numbers").items():
+            what, allowed = f"limits: {checks.plain(name)}", "two numbers, the first the smaller"
+            pair = tuple(checks.sequence(what, ends, allowed))
+            if len(pair) != 2 or not all(map(checks.is_number, pair)) or not pair[0] < pair[1]:
+                raise ProblemError(f"{what}: {checks.shown(ends)} must be {allowed}")
+        for name, values in checks.mapping("zeros", self.zeros, "lists of numbers").items():
+            for value in checks.sequence(f"zeros: {checks.plain(name)}", values, "numbers"):
+                checks.number(f"zeros: {checks.plain(name)}", value)
+
+
+def check(system: Discretization, settings: Settings) -> None:
+    """Refuse settings that name what a problem does not have, and a system with too many or too few free parameters.
+
+    Raises
+    ------
+    ProblemError
+    """
+    threads.count()  # refuses a wrong number, also where the problem is too small to use it
+    if len(system.free) != system.problem.free_size:
+        raise ProblemError(
+            f"free parameters: {len(system.free)} given ({', '.join(system.free)}), a curve of this problem needs "
+            f"{system.problem.free_size} (conditions - states + 1)"
+        )
+    if settings.primary is not None and settings.primary not in system.free:
+        raise ProblemError(f"primary: {settings.primary!r} is not one of the free parameters {', '.join(system.free)}")
+    known = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
+    trivial = () if settings.trivial is None else (settings.trivial,)
+    for name in (*settings.limits, *settings.zeros, *settings.extrema, *trivial):
+        if name not in known:
+            raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)})")
+
+
+class Options(TypedDict, total=False):
+    """The fields of `Settings` by name, as `trace`, `curve` and `diagram` take them: a type checker knows what is misspelt."""
+
+    primary: str | None
+    direction: int
+    step: float
+    min_step: float
+    max_step: float
+    max_points: int
+    limits: Mapping[str, Sequence[float]]
+    zeros: Mapping[str, Sequence[float]]
+    trivial: str | None
+    monitors: Sequence[TestFunction]
+    folds: bool
+    branch_points: bool
+    errors: bool
+    angle: float | None
+    change: float
+    accuracy: float | None
+    newton: Newton
+    mesh: MeshControl
+    test_functions: Sequence[TestFunction]
+    scales: Mapping[str, float]
+    extrema: Sequence[str]
+
+
+def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:
+    """Return the settings with some fields changed.
+
+    Raises
+    ------
+    ProblemError
+        An unknown field, or a value that it cannot have.
+    """
+    checks.instance("settings", settings, (Settings, type(None)), "a Settings")
+    known = [entry.name for entry in dataclasses.fields(Settings)]
+    for name in options:
+        if name not in known:
+            raise ProblemError(f"there is no setting {name!r}; known are {', '.join(known)}")
+    settings = settings or Settings()
+    if "step" not in options and checks.is_number(options.get("max_step")):  # the first step is no longer than the largest
+        options = {**options, "step": min(settings.step, max(options["max_step"], settings.min_step))}
+    return dataclasses.replace(settings, **options)

@@ -1,0 +1,245 @@
+"""Newton's method and the tangent in a kernel, for small problems without a mesh whose functions are recorded.
+
+The rules are those of `contin.core.newton`. Where round-off would have to tell whether it has converged, that is asked.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import threading
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.core.newton import STAGNANT, Newton
+from contin.functions.batch import Batch
+from contin.functions.interpreter import Loaded, Points, run_loaded
+from contin.functions.kernel import kernel
+from contin.functions.kernel_parts import IndexVector, Matrix, Stack, Vector, helper
+from contin.linalg.convergence import diverges, estimated_rate, has_converged, stagnates, subtract, wants_jacobian
+from contin.linalg.small import factor_small, solve_small
+
+#: What came of it: a point or step to be believed; none; one that is not decided here.
+BELIEVED, FAILED, ASKS = range(3)
+#: Largest number of unknowns: from some fifty on, LAPACK's factors are faster than those of a kernel.
+_SMALL = 32
+
+
+class Equations(NamedTuple):
+    """F(x) = 0, as `contin.equilibria.system` and `contin.cycles.maps` have it, and room to evaluate it in.
+
+    ``parameters`` are all of them, ``free`` the places of the free ones. ``rates`` (equations,) takes values to rates of states
+    divided by their sizes, of u' = F. Of a map, ``is_map`` is 1 and ``gain`` what angles gain: F is the function less u and
+    ``gain``.
+    """
+
+    values: Loaded
+    slopes: Loaded
+    weights: Vector
+    rates: Vector
+    gain: Vector
+    is_map: int
+    parameters: Vector
+    free: IndexVector
+    time: Vector
+    states: Matrix
+    none: Matrix
+    found: Matrix
+    slopes_found: Stack
+    no_slopes: Stack
+
+
+class Linear(NamedTuple):
+    """The matrix [F_x; row], its factors, an update, and ``found``: sign of the determinant, updates, error that is left."""
+
+    matrix: Matrix
+    lu: Matrix
+    exchanges: IndexVector
+    row: Vector
+    update: Vector
+    found: Vector
+
+
+#: Places in ``Linear.found``.
+SIGN, UPDATES, ERROR = range(3)
+
+
+def equations_of(system: Any) -> Equations | None:
+    """Return the equations of a small problem whose functions are recorded, of a map with one round; None of others."""
+    batch: Batch | None = system.small_equations
+    if batch is None or batch.interpreted is not None or system.size > _SMALL or system.size != system.equations + 1:
+        return None
+    n, count, size, gain = system.state_size, system.equations, system.size, system.gain
+    rates = system.scales.rows["residual"] / system.scales.states if count == n else np.ones(count)
+    return Equations(
+        batch.load(), batch.load(batch.columns(system._free)), system.weights, rates,
+        np.zeros(count) if gain is None else gain, int(gain is not None), system._scaled_parameters(np.zeros(size)),
+        system._free,
+        np.zeros(1),
+        np.empty((1, n)), np.empty((0, n)), np.empty((1, count)), np.zeros((1, count, size)), np.empty((0, 0, 0)),
+    )  # fmt: skip
+
+
+def linear_of(size: int) -> Linear:
+    """Return the room for a matrix of this size."""
+    (matrix, lu), (row, update) = np.empty((2, size, size)), np.empty((2, size))
+    return Linear(matrix, lu, np.empty(size, dtype=np.int64), row, update, np.empty(ERROR + 1))
+
+
+@functools.lru_cache(maxsize=16)
+def _rooms(system: Any, thread: int) -> tuple[Equations, Linear] | None:
+    """Return where a thread corrects points of a system; None where kernels do not."""
+    equations = equations_of(system)
+    return None if equations is None else (equations, linear_of(system.size))
+
+
+class Found(NamedTuple):
+    """A corrected point: x, unit tangent, the matrix [F_x; row] right there and the sign of its determinant.
+
+    With the iterations of Newton's method, and the error that they left.
+    """
+
+    x: Array
+    tangent: Array
+    matrix: Array
+    sign: float
+    iterations: int
+    error: float
+
+
+def corrected_small(system: Any, guess: Array, row: Array, target: Any, newton: Newton) -> Found | None:
+    """Solve F(x) = 0 and row.x = target; None where the kernel does not, or does not decide whether it has."""
+    rooms = _rooms(system, threading.get_ident())
+    if rooms is None:
+        return None
+    x, tangent, linear = np.array(guess, dtype=float), np.empty(guess.size), rooms[1]
+    linear.row[:] = row
+    if correct_point(*rooms, newton.tolerance, newton.max_iterations, x, float(target), tangent) != BELIEVED:
+        return None
+    sign, iterations, error = linear.found.tolist()
+    return Found(x, tangent, linear.matrix.copy(), sign, int(iterations), error)
+
+
+@helper
+def put(equations: Equations, x: Array) -> None:
+    """Put states and free parameters of x where functions find them."""
+    n = equations.states.shape[1]
+    for i in range(n):
+        equations.states[0, i] = x[i]
+    for k in range(equations.free.size):
+        equations.parameters[equations.free[k]] = x[n + k]
+
+
+@helper
+def evaluate_values(equations: Equations, x: Array) -> None:
+    """Evaluate the functions."""
+    put(equations, x)
+    points = Points(equations.time, equations.states, equations.none)
+    run_loaded(equations.values, equations.parameters, points, equations.found, equations.no_slopes)
+
+
+@helper
+def evaluate_slopes(equations: Equations, x: Array) -> None:
+    """Evaluate the functions and their derivatives by the unknowns."""
+    put(equations, x)
+    points = Points(equations.time, equations.states, equations.none)
+    run_loaded(equations.slopes, equations.parameters, points, equations.found, equations.slopes_found)
+
+
+@helper
+def fill_residual(equations: Equations, right: Array) -> None:
+    """Fill in F from what was evaluated."""
+    for i in range(equations.gain.size):
+        right[i] = equations.found[0, i]
+        if equations.is_map:
+            right[i] -= equations.states[0, i] + equations.gain[i]
+
+
+@helper
+def fill_matrix(equations: Equations, row: Array, matrix: Array) -> None:
+    """Fill in [F_x; row] from what was evaluated."""
+    size = row.size
+    for i in range(size - 1):
+        for j in range(size):
+            matrix[i, j] = equations.slopes_found[0, i, j]
+        if equations.is_map:
+            matrix[i, i] -= 1.0
+    for j in range(size):
+        matrix[size - 1, j] = row[j]
+
+
+@helper
+def linearize(equations: Equations, linear: Linear, x: Array) -> float:
+    """Factor [F_x; row] at x; return the sign of its determinant."""
+    evaluate_slopes(equations, x)
+    fill_matrix(equations, linear.row, linear.matrix)
+    return factor_small(linear.matrix, linear.lu, linear.exchanges)
+
+
+@helper
+def _correct(equations: Equations, linear: Linear, tolerance: float, most: int, x: Array, target: float) -> int:
+    """Solve F(x) = 0 and row.x = target by Newton's method and chord steps, in place."""
+    size, fresh, moved, before, now = x.size, True, 1.0, math.inf, math.inf
+    for number in range(1, most + 1):
+        now = math.inf
+        if not fresh:
+            evaluate_values(equations, x)
+        elif linearize(equations, linear, x) == 0.0:
+            break
+        fill_residual(equations, linear.update)
+        missing = -target
+        for i in range(size):
+            missing += linear.row[i] * x[i]
+        linear.update[size - 1] = missing
+        solve_small(linear.lu, linear.exchanges, linear.update)
+        now = subtract(x, linear.update)
+        if not now < math.inf:
+            return FAILED
+        moved = now if fresh else moved + now
+        rate = estimated_rate(now, before, moved, fresh)
+        if has_converged(now, rate, number, tolerance):
+            linear.found[UPDATES], linear.found[ERROR] = number, now * rate
+            return BELIEVED
+        if stagnates(now, rate, number):
+            return ASKS
+        if number > 2 and diverges(now, before):
+            break
+        fresh, before = wants_jacobian(now, rate, tolerance), now
+    return ASKS if now <= STAGNANT else FAILED
+
+
+@helper
+def _fill_tangent(equations: Equations, linear: Linear, tangent: Array) -> None:
+    """Fill in the unit tangent from the factors."""
+    size = tangent.size
+    for i in range(size):
+        tangent[i] = 1.0 if i == size - 1 else 0.0
+    solve_small(linear.lu, linear.exchanges, tangent)
+    square = 0.0
+    for i in range(size):
+        square += equations.weights[i] * tangent[i] * tangent[i]
+    length = math.sqrt(square)
+    for i in range(size):
+        tangent[i] /= length
+
+
+@kernel(reorder=False, last=True)
+def correct_point(
+    equations: Equations, linear: Linear, tolerance: float, most: int, x: Vector, target: float, tangent: Vector
+) -> int:
+    """Correct x, in place, so that F(x) = 0 and row.x = target; fill in the tangent right there. ``linear.row`` is given."""
+    outcome = _correct(equations, linear, tolerance, most, x, target)
+    if outcome != BELIEVED:
+        return outcome
+    sign = linearize(equations, linear, x)
+    fill_residual(equations, linear.update)
+    total = 0.0
+    for i in range(x.size - 1):
+        total += abs(linear.update[i])
+    if sign == 0.0 or not total < math.inf:
+        return FAILED
+    linear.found[SIGN] = sign
+    _fill_tangent(equations, linear, tangent)
+    return BELIEVED

@@ -1,0 +1,239 @@
+"""Discretized problems of both kinds: names, values and places of parameters."""
+
+from __future__ import annotations
+
+import functools
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array, Indices
+from contin.collocation.mesh import MeshControl
+from contin.core.differences import derivative
+from contin.core.protocol import Carrier, Discretization
+from contin.core.scales import Scales, nothing_scaled
+from contin.errors import ProblemError
+from contin.functions.batch import Batch
+from contin.problems.angles import periods_of
+from contin.problems.statement import Statement, with_multipliers
+
+
+class System(Discretization):
+    """A problem with chosen free parameters; ``x`` holds the states, flattened, then the free parameters.
+
+    Attributes
+    ----------
+    problem : Statement
+    free : tuple of str
+        The free parameters.
+    parameters : ndarray
+        Values of all parameters; those of the free ones are not used.
+    state_size : int
+        Where the free parameters begin in x; set by the kinds of system.
+
+    Raises
+    ------
+    ProblemError
+        An unknown parameter.
+    """
+
+    parameters: Array
+
+    def __init__(
+        self, problem: Statement, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None
+    ) -> None:
+        self.problem, self.free = problem, with_multipliers(problem, free)
+        names = tuple(problem.parameters)
+        for name in (*self.free, *parameters):
+            if name not in names:
+                raise ProblemError(f"parameter {name!r} is not one of {', '.join(names)}")
+        self.parameters = np.array([float(parameters.get(name, problem.parameters[name])) for name in names])
+        self._free = self._indices(self.free)
+        self.scales = scales or nothing_scaled(len(problem.states), len(names), self._rows)
+        #: Sizes of the free parameters.
+        self.free_scales: Array = self.scales.parameters[self._free]
+
+    @property
+    def _rows(self) -> tuple[tuple[str, int], ...]:
+        """Names and numbers of the equations that have sizes of their own."""
+        return ()
+
+    def __repr__(self) -> str:
+        mesh = f"{self.intervals} interval{'s' * (self.intervals != 1)} of degree {self.degree}, " * bool(self.intervals)
+        return (
+            f"{type(self).__name__}({mesh}states {checks.listed(self.problem.states)}; free {', '.join(self.free) or 'none'})"
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: all but what is computed when it is first asked for, such as compiled functions."""
+        kinds = {name: getattr(type(self), name, None) for name in vars(self)}
+        return {name: value for name, value in vars(self).items() if not isinstance(kinds[name], functools.cached_property)}
+
+    def _indices(self, names: Sequence[str]) -> Indices:
+        """Return the places of parameters among all of them."""
+        return np.array([list(self.problem.parameters).index(name) for name in names], dtype=np.int64)
+
+    def pack(self, states: Any, values: Mapping[str, float]) -> Array:
+        """Return a vector of unknowns from states and the mapping of free parameters."""
+        scaled = np.asarray(states, dtype=float).reshape(-1, self.scales.states.size) / self.scales.states
+        free = np.array([float(values[name]) for name in self.free])
+        return np.concatenate([scaled.ravel(), free / self.free_scales])
+
+    def all_parameters(self, x: Array) -> Array:
+        """Return the values of all parameters, shape (number of names,), the free ones from x."""
+        p = self.parameters.copy()
+        p[self._free] = x[self.state_size :] * self.free_scales
+        return p
+
+    def _scaled_parameters(self, x: Array) -> Array:
+        """Return all parameters divided by their sizes."""
+        p = self.parameters / self.scales.parameters
+        p[self._free] = x[self.state_size :]
+        return p
+
+    def _batch(self, name: str, rows: Sequence[str] = ()) -> Batch:
+        """Return some of the functions, compiled, of scaled inputs; ``rows`` name the sizes of its values."""
+        batch: Batch = self.problem.batch(name)
+        sizes, states = {"states": self.scales.states, **self.scales.rows}, self.scales.states
+        values = np.concatenate([sizes[row] for row in rows]) if rows else np.ones(batch.count)
+        ends = [states] if batch.signature.ends else []
+        return batch.sized(np.concatenate([states, *ends, self.scales.parameters]), values)
+
+    def _between_scales(self, carry: Carrier, other: Any) -> Carrier:
+        """Return a carrier of unknowns as they are, made one to a system that may have other scales."""
+        if other.scales is self.scales or (self.scales.are_one and other.scales.are_one):
+            return carry
+        ours, theirs = self.unscaled_factors, other.unscaled_factors
+        return lambda x: carry(x * ours) / theirs
+
+    @property
+    def unscaled_factors(self) -> Array:
+        """Sizes of all unknowns, shape (size,)."""
+        count = self.state_size // self.scales.states.size
+        return np.concatenate([np.tile(self.scales.states, count), self.free_scales])
+
+    @functools.cached_property
+    def circles(self) -> Array:
+        """Periods of the states that are angles, divided by their sizes, and zero for the others, shape (n,)."""
+        return periods_of(self.problem) / self.scales.states
+
+    def magnitudes(self, x: Array) -> Array:
+        """Return the largest value of each state, and each free parameter, in the places of the unknowns, shape (size,)."""
+        count = len(self.problem.states)
+        largest = self.largest(x)
+        return np.append(np.tile(largest[:count], self.state_size // count), largest[count:])
+
+    def largest(self, v: Array) -> Array:
+        """Return the largest absolute value of each state, and that of each free parameter, of a vector like x."""
+        states = np.abs(v[: self.state_size]).reshape(-1, len(self.problem.states)).max(axis=0, initial=0.0)
+        return np.append(states, np.abs(v[self.state_size :]))
+
+    def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[System, Array]:
+        """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it.
+
+        Kinds of system that have no scales return themselves.
+        """
+        return self, x
+
+    def without_scales(self, x: Array) -> tuple[System, Array]:
+        """Return the same problem in the user's units, and x for it."""
+        return self, x
+
+    def parameter(self, x: Array, name: str) -> float:
+        """Return the value of one parameter."""
+        return float(self.all_parameters(x)[list(self.problem.parameters).index(name)])
+
+    def parameter_index(self, name: str) -> int:
+        """Return the place of the free parameter ``name`` in x."""
+        return self.state_size + self.free.index(name)
+
+    def column_gradient(self, x: Array, name: str) -> Array | None:
+        """Return the derivatives of a column (a parameter or functional) by x, shape (size,); None where they are not known."""
+        if name in self.free:
+            at = self.parameter_index(name)
+            unit = np.zeros(self.size)
+            unit[at] = self.free_scales[at - self.state_size]
+            return unit
+        return np.zeros(self.size) if name in self.problem.parameters else None
+
+    @abstractmethod
+    def parameter_columns(self, x: Array, names: Sequence[str]) -> Array:
+        """Return the derivatives of F by any parameters, free or not, shape (equations, len(names))."""
+
+    def bent(self, x: Array, w: Array, v: Array) -> Array:
+        """Return the gradient of w.(F_x v) by x, the derivative of F_x^T w along v, shape (size,).
+
+        ``w`` has the shape (equations,), ``v`` (size,). Kinds of system that state no derivatives of F of higher order have
+        differences of `transposed_product`.
+        """
+        longest = np.abs(v).max(initial=0.0)
+        if not longest:
+            return np.zeros(self.size)
+        found: Array = derivative(lambda s: self.transposed_product(x + s * v, w), 1, 1 / longest)[0]
+        return found
+
+    def column_bent(self, x: Array, name: str, v: Array) -> Array:
+        """Return the derivative of `column_gradient` along v, shape (size,), of a column where that is known."""
+        longest = np.abs(v).max(initial=0.0)
+        if name in self.problem.parameters or not longest:
+            return np.zeros(self.size)
+        found: Array = derivative(lambda s: self.column_gradient(x + s * v, name), 1, 1 / longest)[0]
+        return found
+
+    def with_derivative_error(self, function: Callable[[], Any]) -> tuple[Any, float]:
+        """Return what a function returns, and the estimated relative error of the derivatives that it took.
+
+        That is round-off, or the error of differences: of these alone, whatever was computed before.
+        """
+        batches = [batch.interpreted for batch in self._evaluated if batch.interpreted is not None]
+        before = [batch.error for batch in batches]
+        for batch in batches:
+            batch.error = 0.0
+        found = function()
+        error = max([_ROUND_OFF, *(batch.error for batch in batches)])
+        for batch, known in zip(batches, before):
+            batch.error = max(batch.error, known)
+        return found, error
+
+    @property
+    def _evaluated(self) -> Sequence[Batch]:
+        """The functions that the equations are made of."""
+        return ()
+
+    def _wide(self, v: Array, states: Array) -> Array:
+        """Return directions in the space of all inputs of functions: of states (K, n), and of the free parameters in v."""
+        wide = np.zeros((len(states), states.shape[1] + len(self.parameters)))
+        wide[:, : states.shape[1]] = states
+        wide[:, states.shape[1] + self._free] = v[self.state_size :]
+        return wide
+
+    @abstractmethod
+    def refined(self) -> tuple[System, Carrier] | None:
+        """Return the same problem with every interval halved, and the carrier; None without a mesh."""
+
+    @abstractmethod
+    def adapted(self, x: Array, control: MeshControl) -> tuple[System, Carrier] | None:
+        """Return the same problem on a better mesh for x, and the carrier; None where there is no need."""
+
+    def on_switches(self, x: Array, closely: bool = False) -> tuple[System, Carrier] | None:
+        """Return the same problem on a mesh with the places of `switching` among its points; None where there is no need."""
+        return None
+
+    @abstractmethod
+    def transposed_product(self, x: Array, w: Array) -> Array:
+        """Return F_x^T w, shape (size,)."""
+
+    @abstractmethod
+    def with_parameters(self, values: Mapping[str, float]) -> System:
+        """Return the same problem with other values of parameters that are not free."""
+
+    @abstractmethod
+    def with_free(self, free: Sequence[str], x: Array) -> tuple[System, Array]:
+        """Return the same problem with other free parameters (values from x), and x for it."""
+
+
+#: Round-off of derivatives that are exact, relative to the sum of the absolute values of their terms.
+_ROUND_OFF = 1e-15

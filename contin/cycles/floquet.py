@@ -1,0 +1,381 @@
+"""Special points of cycles that their Floquet multipliers show: period doublings and torus bifurcations.
+
+Each kind has a function of its own. Period doublings are zeros of det(M + I), M the monodromy matrix: a sign decides, also
+where two multipliers meet at -1. Two of them in one step leave the sign as it was and show as a dip of the function, which is
+followed to its lowest place. At a torus bifurcation a complex pair passes the unit circle (`contin.events.hopf`); one that
+stays on it, as in a conservative system, passes nothing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.core.newton import Newton, correct
+from contin.core.protocol import Discretization
+from contin.core.rounding import changes_of_multipliers
+from contin.core.state import Reason, Stop
+from contin.core.trial import TestFunction, Trial, sign_changed
+from contin.cycles.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
+from contin.errors import ConvergenceError
+from contin.events.hopf import hopf, hopf_points, passes
+from contin.events.segment import Place, Segment, SpecialPoint
+from contin.events.significance import on_finer_mesh
+
+if TYPE_CHECKING:
+    from contin.cycles.maps import MapSystem
+    from contin.cycles.system import PeriodicCollocation
+
+#: Where a step is looked at inside, on the cubic, as parts of it: also beside its ends, where a dip towards zero would show at
+#: no other place. Without those two of Mathieu's doublings, a part of .03 and .04 behind the beginning of a step, are passed.
+LOOKS = (1 / 64, 1 / 4, 1 / 2, 3 / 4, 63 / 64)
+#: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
+#: to this part. Ten times smaller, two period doublings that nearly meet are passed.
+DEEPER = 0.5
+#: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
+#: larger, period doublings beside folds lose their coefficients.
+_ONE = 1e-5
+#: A multiplier whose logarithm is smaller is not called unstable: in a conservative system the mesh moves the second multiplier
+#: 1 by up to 1e-10, where round-off moves it by 1e-13. Ten times larger, a cycle beside a fold may count as stable.
+_NEARLY_ONE = 1e-9
+#: A multiplier is told from 1 where its logarithm is larger than so many times that of the one that is 1. The two of a double
+#: one differ by 1e-7 of it. Ten times larger, a cycle beside a fold may count as stable.
+AS_FAR = 2.0
+#: Step along the tangent over which multipliers are compared: their errors need one digit. In a canard explosion they change by
+#: a tenth of their value where the step is a thousand times longer.
+_ASIDE = 1e-5
+#: Where the multiplier 1 is off by more, other multipliers near the unit circle may lie on the other side of it. In the tail of
+#: AUTO's demo ``tor`` the doublings to the period 49 are certain, those from 54 on are not.
+_MEANINGLESS = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Floquet:
+    """The Floquet multipliers of a cycle, which may be larger or smaller than numbers can be.
+
+    Attributes
+    ----------
+    logarithms : ndarray of complex, shape (n,)
+        Natural logarithms of the multipliers, the largest first; a multiplier with a positive real part is unstable.
+    errors : ndarray, shape (n,)
+        Estimated errors of the logarithms: their change on a mesh halved and, for the multiplier of an autonomous system that
+        is 1, its own. NaN where the cycle is not found on that mesh. Of maps, round-off.
+    unstable : int
+        Number of unstable multipliers, without the one that is 1.
+    """
+
+    logarithms: ComplexArray
+    errors: Array
+    unstable: int
+
+    def __repr__(self) -> str:
+        return f"Floquet({len(self.logarithms)} multipliers, {self.unstable} unstable; the largest {self.multipliers[0]:.6g})"
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """The multipliers, shape (n,): infinite or zero where no number holds them."""
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            found: ComplexArray = np.exp(self.logarithms.real) * np.exp(1j * self.logarithms.imag)
+        return found
+
+
+def floquet(
+    system: Discretization, x: Array, tangent: Array, errors: Mapping[str, float] | None = None, fold: bool = False
+) -> Floquet:
+    """Return the Floquet multipliers of a cycle, or of one on a curve in two parameters, with their errors.
+
+    The tangent is NaN where it is not known. ``errors`` are those of the free parameters at a located point: how far it may lie
+    from its place, and how much the multipliers change over that distance. At a ``fold`` one of them is 1 besides.
+    """
+    cycles: Any = system.solution
+    x_of = slice(0, cycles.size)
+    values, trivial = cycles.eigenvalues(x[x_of]), _trivial(cycles, x[x_of])
+    if not cycles.intervals:  # of a map
+        found = changes_of_multipliers(cycles.eigenvalues, x[x_of], values)
+        return Floquet(values, found, unstable(cycles, x[x_of]))
+    finer: Any
+    finer, carry = system.refined()  # type: ignore[misc]  # there is a mesh
+    try:
+        again = _corrected(finer, carry(x), carry(tangent))
+        found = _apart(values, finer.solution.eigenvalues(again[: finer.solution.size]))
+    except ConvergenceError:
+        found = np.full(values.shape, np.nan)
+    found += _by_place(system, x, tangent, errors or {}, fold)
+    if trivial is not None:
+        found[trivial] = abs(values[trivial])
+    return Floquet(cycles.whole_round(values), cycles.order * found, unstable(cycles, x[x_of]))
+
+
+def _by_place(system: Any, x: Array, tangent: Array, errors: Mapping[str, float], fold: bool) -> Array | float:
+    """Return by how much the multipliers change between a located point and where it may lie.
+
+    That is as far as free parameters take to change by their errors and, of a fold, to where a multiplier is 1: in a canard
+    explosion a fold is known to lie on a long piece of the branch only.
+    """
+    known = [(errors[name] / size, tangent[system.parameter_index(name)])
+             for name, size in zip(system.free, system.free_scales) if errors.get(name, 0.0) > 0]  # fmt: skip
+    if not known or not np.isfinite(known).all():
+        return 0.0
+    error, rate = np.linalg.norm(known, axis=0)
+    cycles: Any = system.solution
+    beside = x + _ASIDE * tangent
+    values, trivial = cycles.eigenvalues(x[: cycles.size]), _trivial(cycles, x[: cycles.size])
+    changes: Array = _apart(values, cycles.eigenvalues(beside[: cycles.size])) / _ASIDE
+    distance = error / rate if rate > 0 else 0.0
+    if fold:
+        place = min((i for i in range(len(values)) if i != trivial), key=lambda i: abs(values[i]))
+        distance = max(distance, abs(values[place]) / changes[place] if changes[place] > 0 else 0.0)
+    return changes * distance
+
+
+def _corrected(system: Discretization, x: Array, tangent: Array) -> Array:
+    """Return a cycle corrected; as it is where F_x is singular there and no tangent is known."""
+    if system.size == system.equations:
+        return correct(system, x).x
+    if not np.isfinite(tangent).all():
+        return x
+    row = system.weights * tangent
+    return correct(system, x, row, row @ x).x
+
+
+def _apart(values: ComplexArray, others: ComplexArray) -> Array:
+    """Return how far each of some logarithms is from its counterpart: angles are alike up to full turns."""
+    from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]  # takes .1 s; only this needs it
+
+    gaps = values[:, None] - others
+    gaps = np.abs(gaps.real + 1j * ((gaps.imag + math.pi) % (2 * math.pi) - math.pi))
+    distances: Array = gaps[linear_sum_assignment(gaps)]
+    return distances
+
+
+def _trivial(system: PeriodicCollocation | MapSystem, x: Array) -> int | None:
+    """Return the place of the multiplier that is 1 along every autonomous cycle; None of a forced one."""
+    return int(np.abs(system.eigenvalues(x)).argmin()) if system.autonomous else None
+
+
+def unstable(system: PeriodicCollocation | MapSystem, x: Array, least: float = _NEARLY_ONE) -> int:
+    """Return the number of unstable multipliers, without the one that is 1 and those that are on the circle up to round-off.
+
+    Multipliers whose logarithm is below ``least`` are left out, too, and those as near to 1 as the one that is 1 by its error:
+    in a conservative system the mesh parts a double one to both sides.
+    """
+    values, trivial = system.eigenvalues(x), _trivial(system, x)
+    outside = (values.real > 0) & ~system.neutral(x) & (np.abs(values) >= least)
+    if trivial is not None:
+        outside &= np.abs(values) > AS_FAR * abs(values[trivial])
+    return int(np.count_nonzero(outside))
+
+
+def has_double_one(system: PeriodicCollocation, x: Array) -> bool:
+    """Return whether a multiplier is 1 beside the one that always is, as far as can be told: that of a Jordan block may be off.
+
+    In a conservative system it is along the whole family.
+    """
+    values, trivial = np.abs(system.eigenvalues(x)), _trivial(system, x)
+    if trivial is not None:
+        values[trivial] = np.inf
+    return bool(values.min() < _ONE)
+
+
+@functools.cache  # one for all steps: a point that two steps share has its value once
+def doubling(order: int = 1) -> TestFunction:
+    """Return the test function of period doublings: det(M + I), each factor divided by 1 + |multiplier|.
+
+    With a symmetry of even order n, M being the map over one n-th of the period, the multiplier over the whole period is
+    (-1)^n = 1 there: cycles of the same period branch off that have lost the symmetry.
+    """
+    label, name = ("PD", "period doubling") if order % 2 else ("BP", "symmetry breaking")
+    return TestFunction(label, name, _antiperiodic, search=_doublings, asks=_may_double, describe=_of_doubling)
+
+
+def _antiperiodic(trial: Trial) -> float:
+    system: Any = trial.system
+    values = system.eigenvalues(trial.x)
+    with np.errstate(invalid="ignore"):  # NaN where there are none
+        size = np.exp(-np.abs(values.real))
+        ahead = np.exp(1j * values.imag)
+        factors = np.where(values.real > 0, size + ahead, 1 + size * ahead) / (1 + size)
+        return float(np.prod(factors).real)
+
+
+def _of_doubling(trial: Trial) -> dict[str, float]:
+    return {"frequency": math.pi, "pairs": 1}
+
+
+def doubled(system: PeriodicCollocation | MapSystem, point: SpecialPoint) -> SpecialPoint:
+    """Return a special point, as the end of the branch where a cycle comes to go twice round one of half its period.
+
+    Beyond it the branch is itself, half a period on.
+    """
+    if point.label != "BP" or point.name in ("start", "symmetry breaking") or not system.is_doubled(point.trial.x):
+        return point
+    stop = Stop(Reason.PERIOD_DOUBLING, "the cycles come to go twice round cycles of half the period, at a period doubling")
+    return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)
+
+
+def _may_double(segment: Segment) -> bool:
+    """Return whether there may be period doublings inside a step."""
+    test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
+    return not segment.before.value(test) * segment.trial.value(test) > 0 or _comes_near(segment, MINUS_ONE)
+
+
+def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
+    """Return the period doublings between places of a step, in order."""
+    test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
+    known = [trial.value(test) for _, trial in knots]
+    if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, MINUS_ONE):
+        return []
+    inside = [segment.step * part for part in LOOKS]
+    looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
+    values = [trial.value(test) for _, trial in looked]
+    if not np.isfinite(values).all() or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
+        return []
+    knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda place: place[0])
+    knots = sorted([*knots, *_below(segment, knots, test)], key=lambda place: place[0])
+    pieces = [(left, right) for left, right in itertools.pairwise(knots)
+              if sign_changed(left[1].value(test), right[1].value(test))
+              and _changes_on_finer_mesh(left[1], right[1], test, segment.newton)]  # fmt: skip
+    return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
+
+
+def _comes_near(segment: Segment, what: int) -> bool:
+    """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
+    ends = np.array([_without_trivial(segment.before), _without_trivial(segment.trial)])
+    real, imaginary = np.ascontiguousarray(ends.real), np.ascontiguousarray(ends.imag)
+    return bool(comes_near(real, imaginary, what, int(not segment.trial.system.intervals)))
+
+
+@functools.lru_cache(maxsize=4)
+def _without_trivial(trial: Trial) -> ComplexArray:
+    """Return the logarithms of the multipliers of a cycle but for the one that is 1."""
+    system: Any = trial.system
+    values, trivial = system.eigenvalues(trial.x), _trivial(system, trial.x)
+    found: ComplexArray = values if trivial is None else np.delete(values, trivial)
+    return found
+
+
+def keep_off_one(segment: Segment) -> bool:
+    """Return whether no multiplier but the one that is 1 comes near 1 in a step of a branch of cycles, by those at both ends.
+
+    That is where cycles branch.
+    """
+    return not _comes_near(segment, ONE)
+
+
+def _changes_on_finer_mesh(left: Trial, right: Trial, test: TestFunction, newton: Newton) -> bool:
+    """Return whether a test function changes its sign on the mesh halved, too; looked at where multipliers are in doubt."""
+    system: Any = left.system
+    if not any(system.is_drifted(trial.x) for trial in (left, right)):
+        return True
+    finer = [on_finer_mesh(trial, newton) for trial in (left, right)]
+    values = [trial.value(test) for trial in finer if trial is not None]
+    return len(values) == 2 and sign_changed(*values)
+
+
+def _dips(places: list[Place], values: list[float]) -> list[tuple[float, float]]:
+    """Return where, between three places of the same sign, a parabola through the values comes near zero or passes it.
+
+    With half its second derivative.
+    """
+    found = []
+    for three, at_three in zip(zip(places, places[1:], places[2:]), zip(values, values[1:], values[2:])):
+        if len(set(np.sign(at_three))) > 1:
+            continue
+        at, square, lowest = _parabola([s for s, _ in three], at_three)
+        if square > 0 and three[0][0] < at < three[2][0] and lowest < DEEPER * min(map(abs, at_three)):
+            found.append((at, square))
+    return found
+
+
+def _parabola(places: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
+    """Return vertex, half the second derivative and value at the vertex of the parabola through three absolute values."""
+    (a, b, c), (first, middle, last) = places, map(abs, values)
+    if not a < b < c:
+        return math.nan, 0.0, math.nan
+    before, behind = (middle - first) / (b - a), (last - middle) / (c - b)
+    square = (behind - before) / (c - a)
+    linear = before + square * (b - a)  # the slope at b
+    if not square > 0:
+        return math.nan, square, math.nan
+    return b - linear / (2 * square), square, middle - linear**2 / (4 * square)
+
+
+def _below(segment: Segment, knots: list[Place], test: TestFunction) -> list[Place]:
+    """Return places of the other sign, found by following the dips between places of one sign."""
+    dips = _dips(knots, [trial.value(test) for _, trial in knots])
+    found = (_followed(segment, at, square, test) for at, square in dips)
+    return [place for place in found if place is not None]
+
+
+def _followed(segment: Segment, at: float, square: float, test: TestFunction) -> Place | None:
+    """Return a place near ``at`` where a function that dips towards zero has passed it; None where it turns before.
+
+    ``square`` is about half its second derivative: by that and the value, the lowest place is no further off than the places
+    on both sides that are looked at.
+    """
+    sign, lowest = np.sign(segment.before.value(test)), math.inf
+    while True:
+        here = at, segment.near(at)
+        value = sign * here[1].value(test)
+        if value < 0:
+            return here
+        if not value < DEEPER * lowest:
+            return None
+        lowest = value
+        apart = math.sqrt(value / square)
+        if not 0 < at - apart < at + apart < segment.step:
+            return None
+        sides = [(s, segment.near(s)) for s in (at - apart, at + apart)]
+        values = [sign * trial.value(test) for _, trial in sides]
+        if min(values) < 0:
+            return sides[int(np.argmin(values))]
+        at, square, _ = _parabola((at - apart, at, at + apart), (values[0], value, values[1]))
+        if not square > 0 or not 0 < at < segment.step:
+            return None
+
+
+def torus() -> TestFunction:
+    """Return the test function of torus bifurcations: the largest real part of the logarithm of a complex multiplier."""
+    return TestFunction("TR", "torus", hopf().function, search=_tori, asks=_may_twist)
+
+
+def _may_twist(segment: Segment) -> bool:
+    """Return whether there may be torus bifurcations inside a step."""
+    return _unstable(segment.before) != _unstable(segment.trial) or _comes_near(segment, CIRCLE)
+
+
+def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
+    """Return the torus bifurcations between places of a step, in order."""
+    if not _may_twist(segment):
+        return []
+    return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
+
+
+@functools.lru_cache(maxsize=4)
+def _unstable(trial: Trial) -> int:
+    """Return the number of unstable multipliers of a cycle, however near to the circle."""
+    system: Any = trial.system
+    return unstable(system, trial.x, 0.0)
+
+
+def _doubtful(point: SpecialPoint) -> SpecialPoint:
+    """Return a special point, as not located where the multiplier that is 1 has such an error that others mean little."""
+    system: Any = point.trial.system
+    trivial = _trivial(system, point.trial.x)
+    if trivial is None or not point.is_located:
+        return point
+    error = abs(np.expm1(system.eigenvalues(point.trial.x)[trivial]))
+    return dataclasses.replace(point, is_located=error <= _MEANINGLESS)
+
+
+def _passes(segment: Segment, point: SpecialPoint) -> bool:
+    """Return whether the pair of a torus bifurcation lies inside the circle on one side of it, and outside on the other."""
+    return not point.is_located or passes(segment, point.at, point.details["frequency"])

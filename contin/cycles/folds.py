@@ -1,0 +1,46 @@
+"""Special points on curves of folds of cycles, and of cycles of maps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contin.core.trial import TestFunction, Trial
+from contin.defining.critical_curve import signed_smallest
+from contin.defining.fold_curve import NORMAL, normal_product, shrinking
+
+if TYPE_CHECKING:
+    from contin.cycles.maps import MapSystem
+    from contin.cycles.system import PeriodicCollocation
+
+#: A multiplier is real where its imaginary part is below this part of it: round-off of its logarithm.
+_REAL = 1e-12
+#: `NORMAL` of cycles of maps, without a mesh: a point is located to this part of the way on which the cosine is of order one.
+_NORMAL_OF_MAPS = 1e-14
+
+
+def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[TestFunction]:
+    """Return the test functions of points where a further multiplier is one, or another is -1, and of where cycles shrink.
+
+    The change of g with the multiplier vanishes where a further one is one.
+    """
+    autonomous, noise = cycles.autonomous, NORMAL if cycles.intervals else _NORMAL_OF_MAPS
+    critical = 1 + autonomous
+
+    def further(trial: Trial) -> float:
+        system: Any = trial.system
+        v, w, _ = system.null_vectors(trial.x)
+        n = len(system.problem.states)
+        return normal_product(v[:n], w[-1 - n : -1] if autonomous else w[-n:], noise)
+
+    def flip(trial: Trial) -> float:
+        system: Any = trial.system
+        exponents = system.base.eigenvalues(trial.x)
+        others = exponents[np.argsort(np.abs(exponents))[critical:]]
+        size = np.maximum(others.real, 0.0)  # multipliers may be larger than any number
+        multipliers = np.exp(others - size)
+        multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
+        return signed_smallest(np.exp(-size) + multipliers)
+
+    return [*shrinking(cycles), TestFunction("R1", "resonance 1:1", further), TestFunction("LPPD", "fold-flip", flip)]

@@ -1,0 +1,261 @@
+"""Cycles whose period runs away: the equilibrium near which such a cycle spends its time, and the end of its branch.
+
+Near an equilibrium a cycle is slow. On its way to a homoclinic orbit, or to a saddle-node on it, the least speed falls without
+bound; where its square is round-off, the parameter no longer tells the cycle from the homoclinic orbit, and special points of
+longer cycles mean nothing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.core.newton import correct
+from contin.core.state import Stop
+from contin.core.trial import TestFunction, Trial, linearization
+from contin.cycles.statement import PERIOD
+from contin.errors import ConvergenceError
+from contin.linalg.dense import eigenvalues
+from contin.linalg.orientation import first_least
+from contin.problems.angles import whole_rounds
+
+if TYPE_CHECKING:
+    from contin.cycles.system import CycleCollocation
+
+#: A branch ends where the least speed of a cycle is below this part of the largest: the square root of round-off. Ten times
+#: larger, homoclinic points are known to 1e-14 and not to the last digit.
+STILL = 1e-8
+#: A cycle is looked at where its least speed is below this part of the largest, ...
+_SLOW = 0.05
+#: ... and is near an equilibrium while it is closer than this part of its size, ...
+_NEAR = 0.1
+#: ... which counts where that takes at least this part of the period.
+_MOSTLY = 0.5
+#: A coordinate of the equilibrium below this part of the cycle's size is zero: round-off of Newton's method.
+_NOTHING = 1e-13
+#: Newton's method for the equilibrium: updates at most, and the size of the last one relative to 1 + the states.
+_UPDATES, _CONVERGED = 30, 1e-10
+#: A saddle-node lies within this distance in the parameter, relative to 1 + that, where the least speed of a cycle beside it is
+#: below `STILL`, to which it is proportional. Slow stretches of relaxation oscillations have none within 1e-2.
+_BESIDE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class RestingPlace:
+    """The equilibrium near which a cycle spends most of its time.
+
+    Attributes
+    ----------
+    states : ndarray, shape (n,)
+    eigenvalues : ndarray of complex, shape (n,)
+        Those of the equilibrium, the largest real part first.
+    share : float
+        Part of the period that the cycle is near.
+    passes : int
+        How often it comes near in a period: twice where two saddles are one, as at the angles -pi and pi.
+    fold : bool
+        The equilibrium is that of a saddle-node, beside the value of the parameter.
+    """
+
+    states: Array
+    eigenvalues: ComplexArray
+    share: float
+    passes: int = 1
+    fold: bool = False
+
+    def describe(self, names: tuple[str, ...]) -> str:
+        """Return all that as a sentence."""
+        place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, self.states))
+        values = ", ".join(_number(value) for value in self.eigenvalues if value.imag >= 0)
+        kind = ", at a fold of equilibria" if self.fold else ""
+        return f"the cycle spends {100 * self.share:.3g} % of its time near the equilibrium {place}{kind}, eigenvalues {values}"
+
+
+def _number(value: complex) -> str:
+    return f"{value.real:.6g} +- {value.imag:.6g} i" if value.imag else f"{value.real:.6g}"
+
+
+@functools.cache  # one for all runs
+def homoclinic() -> TestFunction:
+    """Return the test function that ends a branch of cycles at a homoclinic orbit, unless the user has limited the period."""
+    return TestFunction("EP", "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD)
+
+
+def _liveliness(trial: Trial) -> float:
+    """Return a number that is positive where the least speed of a cycle can be told from zero.
+
+    The slow stretches of relaxation oscillations are beside no equilibrium, and end nothing.
+    """
+    system: Any = trial.system
+    speeds = _speeds(system, trial.x)
+    if not speeds.min() > 0:
+        return 1.0
+    value = float(np.log10(speeds.min() / speeds.max() / STILL))
+    return value if value > 0 or resting_place(system, trial.x) is not None else 1.0
+
+
+def _speeds(system: Any, x: Array) -> Array:
+    """Return the speeds of a cycle at the Gauss points, scaled, shape (N d,)."""
+    speeds: Array = np.linalg.norm(system.rates(x, system.at_gauss_points(x)), axis=1)
+    return speeds
+
+
+def equilibrium_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
+    """Return the equilibrium that Newton's method finds from where a cycle is slowest; None where it finds none.
+
+    Returns
+    -------
+    states : ndarray, shape (n,)
+        Divided by their sizes.
+    eigenvalues : ndarray of complex, shape (n,)
+        Those of the equilibrium, the largest real part first.
+    """
+    points = system.at_gauss_points(x)
+    size = np.ptp(points, axis=0)
+    states = points[first_least(_speeds(system, x))].copy()
+    for _ in range(_UPDATES):
+        try:
+            update = np.linalg.solve(system.rates_by_states(x, states[None])[0], system.rates(x, states[None])[0])
+        except np.linalg.LinAlgError:
+            return None
+        states -= update
+        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(states).max()):
+            break
+    else:
+        return None
+    return np.where(np.abs(states) > _NOTHING * np.where(size > 0, size, 1.0), states, 0.0), _spectrum(system, x, states)
+
+
+def _spectrum(system: CycleCollocation, x: Array, states: Array) -> ComplexArray:
+    """Return the eigenvalues of an equilibrium, the largest real part first."""
+    values = eigenvalues(system.rates_by_states(x, states[None])[0]) / system.unit_time(x)
+    found: ComplexArray = values[np.argsort(-values.real)]
+    return found
+
+
+def _fold_beside(system: CycleCollocation, x: Array) -> tuple[Array, ComplexArray] | None:
+    """Return the equilibrium of a saddle-node beside a cycle, as `equilibrium_beside` does; None where there is none.
+
+    Beyond a saddle-node there is no equilibrium. That of the nearest value of the parameter p comes from Newton's method for
+    F(u, p) = 0 with the smallest updates of u and p. On slow stretches of relaxation oscillations it is far away.
+    """
+    at = next(system.parameter_index(name) for name in system.free if name != PERIOD)
+    points, y = system.at_gauss_points(x), x.copy()
+    states = points[first_least(_speeds(system, x))].copy()
+    step = np.sqrt(np.finfo(float).eps) * (1 + abs(x[at]))
+    for _ in range(_UPDATES):
+        ahead, rates = y.copy(), system.rates(y, states[None])[0]
+        ahead[at] += step
+        slope = (system.rates(ahead, states[None])[0] - rates) / step
+        matrix = np.column_stack([system.rates_by_states(y, states[None])[0], slope])
+        if not np.isfinite(matrix).all():
+            return None
+        update = np.linalg.lstsq(matrix, -rates)[0]
+        states += update[:-1]
+        y[at] += update[-1]
+        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(states).max()):
+            near = abs(y[at] - x[at]) <= _BESIDE * (1 + abs(x[at]))
+            return (states, _spectrum(system, y, states)) if near else None
+    return None
+
+
+def resting_place(system: CycleCollocation, x: Array) -> RestingPlace | None:
+    """Return the equilibrium near which a cycle spends most of its time; None where there is none."""
+    points, speeds = system.at_gauss_points(x), _speeds(system, x)
+    if not speeds.min() < _SLOW * speeds.max():
+        return None
+    found = equilibrium_beside(system, x)
+    fold = found is None
+    found = _fold_beside(system, x) if found is None else found
+    if found is None:
+        return None
+    states, eigenvalues = found
+    size = np.ptp(points, axis=0)
+    apart = points - states
+    apart = apart - whole_rounds(apart, system.circles)
+    near = np.abs(apart / np.where(size > 0, size, 1.0)).max(axis=1) < _NEAR
+    share = float(system.gauss_weights @ near)
+    if share < _MOSTLY:
+        return None
+    passes = max(int(np.count_nonzero(near & ~np.roll(near, 1))), 1)
+    return RestingPlace(states * system.scales.states, eigenvalues, share, passes, fold)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The value that a parameter tends to as the period grows without bound, with an estimate of its error."""
+
+    name: str
+    value: float
+    error: float
+
+    def describe(self) -> str:
+        """Return it as a clause."""
+        places = int(np.clip(1 - np.floor(np.log10(max(self.error, 1e-15))), 0, 15))
+        return f"as the period grows, {self.name} tends to {self.value:.{places}f} +- {self.error:.1g}"
+
+
+def limit_of_parameter(system: CycleCollocation, x: Array, place: RestingPlace) -> Limit | None:
+    """Return the limit of the free parameter p on a branch that tends to a homoclinic orbit; None where it is not known.
+
+    Near a saddle p - limit = A exp(-k T), with the eigenvalue k or -k that is nearest to the imaginary axis, over the number of
+    passes in a period, so that the limit is p + (dp/dT) / k. The error is its difference from that of a cycle with half the
+    rate dp/dT, where the next exponentials are larger, and from that on the mesh halved. Of a complex leading eigenvalue p
+    oscillates, and is not extrapolated.
+    """
+    if place.fold:
+        return None
+    eigenvalues = place.eigenvalues
+    (name, *_), rates = [name for name in system.free if name != PERIOD], np.abs(eigenvalues.real)
+    leading = eigenvalues[rates.argmin()]
+    if leading.imag or not rates.min() > 0 or len(set(np.sign(eigenvalues.real))) < 2:
+        return None
+    k = float(rates.min()) / (system.order * place.passes)
+    try:
+        value = _extrapolated(system, x, (name, k), 0.0)
+        shorter = _extrapolated(system, x, (name, k), np.log(2) / k)
+        finer, carry = system.refined()
+        better = _extrapolated(finer, carry(x), (name, k), 0.0)  # type: ignore[arg-type]
+    except ConvergenceError:
+        return None
+    error = abs(value - shorter) + abs(value - better) + np.finfo(float).eps * abs(value)
+    return Limit(name, better, float(error)) if np.isfinite(error) else None
+
+
+def explained(system: CycleCollocation, stop: Stop, x: Array) -> Stop:
+    """Return the end of a branch, where the period runs away with the equilibrium near which the cycle spends its time.
+
+    With the limit of the parameter, if it is known.
+    """
+    place = None if system.has_shrunk(x) else resting_place(system, x)
+    if place is None:
+        return stop
+    message = f"{stop.message}; {place.describe(system.problem.state_names)}"
+    limit = limit_of_parameter(system, x, place)
+    if limit is None:
+        return dataclasses.replace(stop, message=message)
+    details = {f"limit_{limit.name}": limit.value, f"limit_{limit.name}_error": limit.error}
+    return dataclasses.replace(stop, message=f"{message}; {limit.describe()}", details=details)
+
+
+def _extrapolated(system: CycleCollocation, x: Array, law: tuple[str, float], less: float) -> float:
+    """Return p + (dp/dT) / k, for ``law`` (p, k), at a period that is shorter by some time.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    (name, k), row = law, np.zeros(system.size)
+    at, of_period = system.parameter_index(name), system.parameter_index(PERIOD)
+    sizes = system.free_scales[[i - system.state_size for i in (at, of_period)]]
+    row[of_period] = 1.0
+    tangent = linearization(system, x, row).tangent
+    guess = x - tangent / tangent[of_period] * less / sizes[1]
+    found = correct(system, guess, row, guess[of_period]).x
+    tangent = linearization(system, found, row).tangent
+    return float(sizes[0] * (found[at] + tangent[at] / tangent[of_period] / (k * sizes[1])))

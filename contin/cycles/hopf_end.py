@@ -1,0 +1,141 @@
+"""The end of a branch of cycles that shrink onto an equilibrium, at a Hopf point.
+
+The amplitude, the projection of a cycle on an earlier one of the run, passes zero along the branch: beyond the Hopf point is
+the same branch again, half a period on. The equations of cycles are singular at the equilibrium (the period is arbitrary
+there), and their solutions are known the less exactly the smaller the cycle is. So the place is taken from the amplitude on the
+cubic through both ends of a step, and the point from its own equations, which are regular:
+
+1. Find the zero of the amplitude on the cubic. The cycle there, but for its mean, is left out.
+2. Find the equilibrium F(u, p) = 0 by Newton's method, for the value of the parameter.
+3. Change the parameter, by the secant method, until the pair of eigenvalues nearest to +-2 pi i / T is imaginary; go to 2.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.core.state import Reason, Stop
+from contin.core.trial import TestFunction, Trial
+from contin.cycles.statement import PERIOD
+from contin.errors import ConvergenceError
+from contin.events.root import find_zero
+from contin.events.segment import Segment, SpecialPoint
+
+if TYPE_CHECKING:
+    from contin.cycles.system import CycleCollocation
+
+#: Smallest size of a cycle as a part of that before the step. A branch that ends at a Hopf point is this near to it at the end
+#: of a step by chance only, and the step is halved then; Newton's method that falls onto an equilibrium is nearer by far.
+COLLAPSED = 1e-3
+#: Newton's updates of the equilibrium, and secants, at most: both converge from near by, in four to six.
+_UPDATES = 20
+#: Newton's method ends with an update below this, relative to 1 + the states, the secant method with such a step: a few units
+#: in the last place. Ten times larger, the point is known to as much less.
+_CONVERGED = 1e-14
+#: First step of the secant method, relative to 1 + the parameter: the square root of round-off.
+_FIRST = 1e-8
+#: The real part at the Hopf point, as a part of the frequency, is below this.
+_ON_AXIS = 1e-9
+
+
+#: The size of a cycle as a part of an earlier one of the run, with a sign.
+AMPLITUDE = TestFunction("HB", "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
+
+
+def hopf_point_inside(system: CycleCollocation, segment: Segment) -> SpecialPoint | None:
+    """Return the Hopf point inside a step of a branch of cycles, or None."""
+    before, trial = segment.before.value(AMPLITUDE), segment.trial.value(AMPLITUDE)
+    if not before > 0 > trial:
+        return None
+    try:
+        at = find_zero(
+            lambda s: system.amplitude(segment.guess(s)), (segment.low, before), (segment.step, trial), segment.precision
+        )
+        x, frequency, error = _hopf_point(system, segment.guess(at))
+    except ConvergenceError:
+        return None
+    if not segment.passes_by(x, at):
+        return None
+    stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
+    there, details = Trial.without_tangent(system, x), {"frequency": frequency, "pairs": 1}
+    sizes = dict(zip(system.free, map(float, error * system.free_scales)))
+    return SpecialPoint(at, "HB", "Hopf", there, stop, details, errors=sizes)
+
+
+def shrunk(system: CycleCollocation, point: SpecialPoint) -> SpecialPoint:
+    """Return a special point, as the end of the branch where cycles have shrunk onto an equilibrium.
+
+    Beyond the Hopf point the branch is itself, half a period later.
+    """
+    if not system.has_shrunk(point.trial.x):
+        return point
+    stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
+    return dataclasses.replace(point, label="HB", name="Hopf", stop=stop)
+
+
+def _hopf_point(system: CycleCollocation, guess: Array) -> tuple[Array, float, Array]:
+    """Return the unknowns of the Hopf point near a small cycle, its frequency, and the errors of the free parameters.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    n, size = len(system.problem.state_names), system.state_size
+    at, period = (
+        next(i for i in range(size, system.size) if i != system.parameter_index(PERIOD)),
+        system.parameter_index(PERIOD),
+    )
+    x = guess.copy()
+    states = x[:size].reshape(-1, n)
+    states[:] = system.weights[:size:n] @ states
+    expected = 2j * math.pi / system.order
+
+    def critical(value: float) -> complex:
+        x[at] = value
+        return _critical(system, x, states, expected)
+
+    first = float(x[at])
+    last, step = critical(first), _FIRST * (1 + abs(first))
+    for _ in range(_UPDATES):
+        found = critical(float(x[at]) + step)
+        change = found.real - last.real
+        if abs(step) <= _CONVERGED * (1 + abs(x[at])) or change == 0:
+            break
+        step, last = -found.real * step / change, found
+    if not abs(found.real) < _ON_AXIS * abs(found.imag):
+        raise ConvergenceError("no Hopf point is found near the cycle")
+    x[period] *= expected.imag / found.imag
+    frequency = 2 * math.pi / float(system.all_parameters(x)[list(system.problem.parameters).index(PERIOD)])
+    errors = np.zeros(len(system.free))
+    errors[at - size] = abs(step) + np.finfo(float).eps * (1 + abs(x[at]))
+    errors[period - size] = np.finfo(float).eps * abs(x[period]) * (1 + abs(found))
+    return x, frequency, errors
+
+
+def _critical(system: CycleCollocation, x: Array, states: Array, expected: complex) -> complex:
+    """Return the eigenvalue, nearest to an expected one, at the equilibrium that is put into ``states``, a view of x.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    here: Any = states[0].copy()
+    for _ in range(_UPDATES):
+        jacobian = system.rates_by_states(x, here[None])[0]
+        try:
+            update = np.linalg.solve(jacobian, system.rates(x, here[None])[0])
+        except np.linalg.LinAlgError:
+            break
+        here = here - update
+        if not np.isfinite(here).all():
+            break
+        if np.abs(update).max() <= _CONVERGED * (1 + np.abs(here).max()):
+            states[:] = here
+            values = np.linalg.eigvals(system.rates_by_states(x, here[None])[0])
+            return complex(values[np.abs(values - expected).argmin()])
+    raise ConvergenceError("no equilibrium is found near the cycle")

@@ -1,0 +1,313 @@
+"""Periodic orbits as the user states them: a vector field, autonomous or with a forcing of known period."""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections import namedtuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array, Function
+from contin.boundary.statement import BoundaryValueProblem
+from contin.cycles.symmetry import averaged, check_equivariance, check_lattice, image, order_of, symmetry_matrix
+from contin.equilibria.statement import AlgebraicProblem
+from contin.errors import ProblemError
+from contin.functions.batch import Batch
+from contin.functions.signature import Arguments, Signature
+from contin.problems.angles import WINDING, Angles, angle_periods, check_periodic, winding_names
+from contin.problems.statement import check_statement
+from contin.problems.vector_field import check_field, found_elsewhere, of_parameters, returning, scaled
+
+#: What is said of a field with other arguments.
+_FORCED = "must be a function of (t, u, p), as a period is given"
+_AUTONOMOUS = "must be a function of (u, p); one of (t, u, p) needs a period"
+#: The name of the period: of an autonomous field a parameter, of a forced one a column.
+PERIOD = "period"
+#: Of a forced field, the parameter that says after how many periods of the forcing the cycle closes.
+ROUNDS = "rounds"
+
+#: The period of a forcing: a number, the name of a parameter, or a function of the parameters.
+Period = float | str | Callable[[Any], Any]
+
+
+class CycleProblem(BoundaryValueProblem):
+    """Periodic orbits of u' = F(u, p), or of u' = F(t, u, p) where F has a known period in t.
+
+    On the unit interval: u' = T F(u, p), u(0) = u(1). Of an autonomous field, the period T is the parameter ``period``; it is
+    free on every curve and need not be named. The phase condition, the integral of u . v' = 0 with an earlier orbit v of the
+    run, keeps the orbit from sliding along itself.
+
+    Of a forced field there is no phase condition, and the period is a column: that of the forcing times the parameter
+    ``rounds``, the number of periods of the forcing after which the cycle closes.
+
+    States that are angles may gain whole rounds: u(1) = u(0) + 2 pi k. The winding number k of the angle phi is the parameter
+    ``winding_phi``, which is read off the guess, unless it is given, and cannot be free. A constant guess goes round uniformly
+    as often as is given. The largest and smallest value of an angle that rotates are half a period and minus that.
+
+    Parameters
+    ----------
+    field : callable
+        ``field(u, p)`` returns the rates of the states, as for an `AlgebraicProblem` whose equilibria are looked for;
+        ``field(t, u, p)`` with ``period``. With one argument more, an array, it fills that with the rates.
+    states : sequence of str
+    parameters : mapping of str to float
+        Names and default values.
+    functionals : mapping of str to callable, optional
+        ``f(u, p)``, of a forced field ``f(t, u, p)``: means over the period, columns of every point. The largest and the
+        smallest value of each state are columns by themselves: ``max_`` and ``min_`` + name.
+    period : float, str or callable, optional
+        The period of a forced field: a number, the name of a parameter, or a function ``period(p)``.
+    symmetry : sequence of float or array, optional
+        Of an autonomous field, a matrix S, or its diagonal, with F(S u) = S F(u) and S^n = 1: cycles with u(t + T/n) = S u(t)
+        are looked for, n the smallest such number. One n-th of the cycle is computed, with u(1) = S u(0) on the unit interval
+        and the time T/n. Guesses, the period and all columns are those of the whole cycle; winding numbers are those of the
+        part: u(1) = S u(0) + 2 pi k.
+    angles : sequence of str, or mapping of str to float, optional
+        States in which the field is periodic, with the period 2 pi or, in a mapping, any other. Functionals should be periodic
+        in them, too: the mean of another one depends on where the round begins.
+
+    Raises
+    ------
+    ProblemError
+        A name, a period, a symmetry or a function that cannot be used; a field that is not periodic in an angle.
+
+    Examples
+    --------
+    A circle of radius sqrt(mu), traversed in the time 2 pi:
+
+    >>> import math, contin
+    >>> def field(u, p):
+    ...     square = u.x**2 + u.y**2
+    ...     return p.mu * u.x - u.y - u.x * square, u.x + p.mu * u.y - u.y * square
+    >>> problem = CycleProblem(field, ["x", "y"], {"mu": 0.25})
+    >>> def guess(t):
+    ...     return 0.6 * math.cos(2 * math.pi * t), 0.6 * math.sin(2 * math.pi * t)
+    >>> orbit = contin.solve(problem, guess, {"period": 6})
+    >>> print(round(orbit["period"] / math.pi, 10), round(orbit["max_x"], 10))
+    2.0 0.5
+
+    A forced linear oscillator, x" + x = a cos(w t) with x = a cos(w t) / (1 - w^2):
+
+    >>> def forced(t, u, p):
+    ...     return u.v, -u.x + p.a * math.cos(p.w * t)
+    >>> problem = CycleProblem(forced, ["x", "v"], {"a": 3.0, "w": 2.0}, period=lambda p: 2 * math.pi / p.w)
+    >>> print(round(contin.solve(problem, [0.0, 0.0], degree=7)["max_x"], 10))
+    1.0
+
+    A pendulum with friction, driven by a constant torque: where it rotates, the torque balances the friction in the mean:
+
+    >>> pendulum = CycleProblem(lambda u, p: (u.v, p.torque - u.v - math.sin(u.phi)), ["phi", "v"], {"torque": 3.0},
+    ...                         functionals={"mean": lambda u, p: u.v}, angles=["phi"])
+    >>> rotation = contin.solve(pendulum, lambda t: (2 * math.pi * t, 3.0), {"period": 2.1})
+    >>> print(rotation["winding_phi"], round(rotation["mean"] * rotation["period"] / math.pi, 8))
+    1.0 2.0
+    """
+
+    field: Function
+    means: Mapping[str, Function]
+    period: Function | None
+    symmetry: Array
+    order: int
+    angles: Mapping[str, float]
+
+    def __init__(
+        self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *,
+        functionals: Mapping[str, Function] | None = None, period: Period | None = None, symmetry: Any = None,
+        angles: Angles = (),
+    ) -> None:  # fmt: skip
+        means = dict(checks.mapping("functionals", functionals or {}, "functions"))
+        names = check_statement(states, parameters, means)
+        forced = period is not None
+        periods = angle_periods(angles, names)
+        windings = dict.fromkeys(winding_names(periods), 0.0)
+        extremes = [f"{kind}_{name}" for name in names for kind in ("max", "min")]
+        for name in (PERIOD, *extremes, *([ROUNDS] if forced else []), *windings):
+            if name in parameters or name in means:
+                raise ProblemError(f"parameters: {name} is a column of every cycle by itself")
+        signature = Signature(names, tuple(parameters), times=forced)
+        field = returning(field, signature)
+        check_field(field, signature, _FORCED if forced else _AUTONOMOUS)
+        count = len(names)
+        turn = _turn(symmetry, forced, count)
+        check_equivariance(field, turn, names, parameters)
+        check_lattice(turn, names, periods)
+        found = None if period is None else of_parameters("period", period, parameters, positive=True)
+        rhs = scaled(field, PERIOD, order_of(turn)) if found is None else _scaled_by_forcing(field, found)
+        object.__setattr__(self, "field", field)
+        object.__setattr__(self, "means", means)
+        object.__setattr__(self, "period", found)
+        object.__setattr__(self, "symmetry", turn)
+        object.__setattr__(self, "order", order_of(turn))
+        object.__setattr__(self, "angles", periods)
+        own = {**({ROUNDS: 1.0} if forced else {PERIOD: 1.0}), **windings}
+        super().__init__(rhs, _periodic(turn, names, periods), names, {**parameters, **own})
+        columns = [*extremes, PERIOD] if forced else extremes
+        object.__setattr__(self, "functionals", {**dict.fromkeys(columns, found_elsewhere), **means})
+        if periods:
+            check_periodic("field", self.batch("field"), periods, self.parameters)
+
+    def _signatures(self) -> Mapping[str, Arguments]:
+        """Return the arguments of the functions."""
+        states, own = self.state_names, (PERIOD, ROUNDS, *winding_names(self.angles))
+        parameters = tuple(name for name in self.parameters if name not in own)
+        of_field = Signature(states, parameters, times=self.period is not None).arguments
+        of_means = Signature(states, tuple(self.parameters), times=self.period is not None).arguments
+        return {"field": of_field, "functionals": of_means, "period": [parameters]}
+
+    @classmethod
+    def of(cls, problem: AlgebraicProblem) -> CycleProblem:
+        """Return the cycles of the vector field whose equilibria a problem states, one statement for each.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem
+        >>> equilibria = AlgebraicProblem(lambda u, p: (u.v, -p.k * u.x), ["x", "v"], {"k": 4.0})
+        >>> list(CycleProblem.of(equilibria).parameters)
+        ['k', 'period']
+        """
+        found = _STATED.get(problem)
+        if found is None:
+            given = problem.residual, problem.state_names, problem.parameters
+            found = cls(*given, functionals=problem.functionals, angles=problem.angles)
+            _STATED[problem] = found
+        return found
+
+    def doubled(self) -> CycleProblem:
+        """Return the problem of cycles that close after twice the part computed here: with the symmetry S^2.
+
+        Of cycles without a symmetry, and with one of odd order, those are cycles of twice the period.
+
+        Examples
+        --------
+        >>> oscillator = CycleProblem(lambda u, p: (u.v, -(u.x**3)), ["x", "v"], {}, symmetry=[-1, -1])
+        >>> oscillator.order, oscillator.doubled().order
+        (2, 1)
+        """
+        if self.order == 1:
+            return self
+        own = (PERIOD, *winding_names(self.angles))
+        kept = {name: value for name, value in self.parameters.items() if name not in own}
+        symmetry = self.symmetry @ self.symmetry if self.order > 2 else None
+        return CycleProblem(self.field, self.state_names, kept, functionals=self.means, symmetry=symmetry, angles=self.angles)
+
+    @property
+    def multipliers(self) -> tuple[str, ...]:
+        """Names of the parameters that are free on every curve."""
+        return (PERIOD,) if self.period is None else ()
+
+    @property
+    def free_size(self) -> int:
+        """Number of free parameters on a curve: one and, of an autonomous field, the period with the phase condition."""
+        return 2 if self.period is None else 1
+
+    def duration(self, parameters: Mapping[str, float]) -> float:
+        """Return the period of a cycle with these parameters.
+
+        Raises
+        ------
+        ProblemError
+            The period of a forced field is no positive number there.
+
+        Examples
+        --------
+        >>> import math
+        >>> def forced(t, u, p):
+        ...     return u.v, -u.x + math.cos(p.w * t)
+        >>> problem = CycleProblem(forced, ["x", "v"], {"w": 2.0}, period=lambda p: 2 * math.pi / p.w)
+        >>> round(problem.duration(problem.parameters) / math.pi, 10)
+        1.0
+        """
+        if self.period is None:
+            return parameters[PERIOD]
+        values: Any = namedtuple("P", tuple(parameters))  # type: ignore[misc]  # noqa: PYI024
+        value = self.period(values(**parameters))
+        if not checks.is_number(value) or not 0 < value < math.inf:
+            raise ProblemError(f"period: {checks.shown(value)} must be a positive number")
+        return float(value * parameters[ROUNDS])
+
+    def _compiled(self, name: str) -> Batch:
+        if name != "functionals":
+            return super()._compiled(name)
+        functions = [self._mean(function) for function in self.means.values()]
+        return Batch(functions, [0] * len(functions), self.state_names, tuple(self.parameters))
+
+    def _mean(self, function: Function) -> Function:
+        """Return a functional as a function of (t, u, p) whose mean over the part computed is that over the period."""
+        if self.period is not None:
+            return _of_forcing(function, self.period)
+        return _of_time(function) if self.order == 1 else averaged(function, self.symmetry, self.state_names, self.order)
+
+
+def _turn(symmetry: Any, forced: bool, count: int) -> Array:
+    """Return the matrix of a symmetry, the identity where there is none.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if symmetry is None:
+        return np.eye(count)
+    if forced:
+        raise ProblemError("symmetry: must be left out where a period is given; only autonomous fields may have one")
+    return symmetry_matrix(symmetry, count)
+
+
+#: The cycles of vector fields that are still used: to state them anew would make their functions ready again.
+_STATED: weakref.WeakKeyDictionary[AlgebraicProblem, CycleProblem] = weakref.WeakKeyDictionary()
+
+
+def rounds_of(free: Sequence[str], parameters: Mapping[str, float]) -> int:
+    """Return the number of rounds after which a cycle of a forced system, or of a map, closes.
+
+    Raises
+    ------
+    ProblemError
+        It is no whole number, or free.
+    """
+    rounds = parameters[ROUNDS]
+    if ROUNDS in free:
+        raise ProblemError(f"free: {ROUNDS} must not be free, as it is a whole number")
+    if not (rounds >= 1 and rounds == int(rounds)):
+        raise ProblemError(f"parameters: {ROUNDS} = {checks.shown(rounds)} must be a whole number from 1")
+    return int(rounds)
+
+
+def _scaled_by_forcing(field: Function, period: Function) -> Function:
+    """Return a forced field times the period, at the time from 0 to 1."""
+
+    def rhs(t: Any, u: Any, p: Any) -> Any:
+        duration = p.rounds * period(p)
+        return [duration * rate for rate in field(duration * t, u, p)]
+
+    return rhs
+
+
+def _periodic(turn: Array, names: Sequence[str], angles: Mapping[str, float]) -> Function:
+    """Return the boundary conditions S u(0) - u(1) = 0; angles gain whole rounds."""
+    rows, rounds = turn.tolist(), [(names.index(name), WINDING + name, period) for name, period in angles.items()]
+
+    def boundary(a: Any, b: Any, p: Any) -> Any:
+        gaps = [turned - end for turned, end in zip(image(rows, a), b)]
+        for place, winding, period in rounds:
+            gaps[place] = gaps[place] + period * getattr(p, winding)
+        return gaps
+
+    return boundary
+
+
+def _of_time(function: Function) -> Function:
+    def mean(t: Any, u: Any, p: Any) -> Any:
+        return function(u, p)
+
+    return mean
+
+
+def _of_forcing(function: Function, period: Function) -> Function:
+    def mean(t: Any, u: Any, p: Any) -> Any:
+        return function(p.rounds * period(p) * t, u, p)
+
+    return mean

@@ -1,0 +1,269 @@
+"""Branch points: located through their own regular equations, with the tangents of all branches that meet there.
+
+Newton's method for F + beta psi = 0 together with grad beta = 0 (`contin.events.bordered`): linearize with the borders; one
+update solves the first equations, one along the kernel, by the Hessian, brings the gradient to zero. Between new Hessians
+the change of the gradient updates it (Broyden's rule).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.core.newton import Newton
+from contin.core.protocol import Discretization, inner
+from contin.errors import ConvergenceError
+from contin.events.bordered import BorderedMatrix
+from contin.linalg.orientation import ordered, oriented, oriented_along
+
+#: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear.
+_LINEAR = 0.1
+#: Updates that small and no longer shrinking (by less than `_SHRINKING`) are round-off.
+_ROUND_OFF, _SHRINKING = 1e-9, 0.3
+#: An update is followed by a new Hessian where it is more than this part of the one before.
+_SLOW = 0.05
+#: The Hessian is taken anew for the tangents where x has moved by more since: they are wanted right at the branch point, to
+#: well below what counts as stationary (`contin.events.inspection`). At 1e-5 folds at pitchforks would be missed.
+_MOVED = 1e-6
+#: An update larger than this, relative to 1 + |x|, leaves the neighbourhood for good.
+_GONE = 10
+#: Where the Hessian explains less of the gradient than one half it does not lead to a zero.
+_UNEXPLAINED = 0.5
+#: Singular values of the Hessian below this part of the largest count as zero: a gradient along their direction is not
+#: followed.
+_FLAT = 1e-9
+
+#: Steps of Newton's method that are made of round-off. The largest of three is seldom below half of what is usual.
+_DRAWS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """A simple branch point.
+
+    Attributes
+    ----------
+    x : ndarray, shape (size,)
+    tangents : tuple of ndarray
+        Unit tangents of the two branches, `contin.linalg.orientation.oriented`; empty where none is real (an isolated point).
+    kernel : ndarray, shape (2, size)
+        Orthonormal basis of the kernel of F_x.
+    left : ndarray, shape (equations,)
+        Left null vector.
+    hessian : ndarray, shape (2, 2)
+        Coefficients of the algebraic bifurcation equation a.H.a = 0 of the tangents a.kernel.
+    imperfection : float
+        The residual beta by which the discrete equations miss a perfect bifurcation.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> transcritical = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0})
+    >>> found = locate_branch_point(Algebraic(transcritical, ["a"]), np.array([0.1, 0.1]))
+    >>> sorted(abs(round(float(tangent[0]), 6)) for tangent in found.tangents)  # x = 0 and x = a
+    [0.0, 0.707107]
+    """
+
+    x: Array
+    tangents: tuple[Array, ...]
+    kernel: Array
+    left: Array
+    hessian: Array
+    imperfection: float
+
+    def __repr__(self) -> str:
+        branches = f"{len(self.tangents)} branches cross" if self.tangents else "isolated"
+        return f"BranchPoint({branches}; imperfection {self.imperfection:.1e})"
+
+    @property
+    def gap(self) -> float:
+        """Distance at which the curve beta = 0, a hyperbola near by, passes the branch point: zero where it is perfect."""
+        largest = float(np.max(np.abs(np.linalg.eigvalsh(self.hessian))))
+        return float(np.sqrt(2 * self.imperfection / largest)) if largest > 0 else 0.0
+
+    def along(self, system: Discretization, direction: Array) -> BranchPoint:
+        """Return the same branch point with its tangents in order: first the one nearest to ``direction``, with its sense.
+
+        A tangent orthogonal to it, as of a symmetric pitchfork's arms, is oriented by its largest component.
+
+        Examples
+        --------
+        >>> from contin import Algebraic, AlgebraicProblem
+        >>> transcritical = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0})
+        >>> system = Algebraic(transcritical, ["a"])
+        >>> found = locate_branch_point(system, np.array([0.1, 0.1])).along(system, np.array([-1.0, -1.0]))
+        >>> found.tangents[0].round(6).tolist()
+        [-0.707107, -0.707107]
+        """
+        unit = direction / np.sqrt(inner(system, direction, direction))
+        cosines = [inner(system, tangent, unit) for tangent in self.tangents]
+        order = ordered(self.tangents, cosines)
+        tangents = [oriented_along(self.tangents[i], cosines[i]) for i in order]
+        return dataclasses.replace(self, tangents=tuple(tangents))
+
+
+def locate_branch_point(
+    system: Discretization, x: Array, newton: Newton = Newton(), kernel: Array | None = None, max_iterations: int = 12
+) -> BranchPoint:
+    """Return the branch point near x.
+
+    Parameters
+    ----------
+    system : Collocation or alike
+    x : ndarray, shape (size,)
+    newton : Newton
+    kernel : ndarray, shape (2, size), optional
+        About the kernel that it has, where several branch points are near by.
+    max_iterations : int
+
+    Raises
+    ------
+    ConvergenceError
+        None was found near x.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+    >>> found = locate_branch_point(Algebraic(pitchfork, ["a"]), np.array([0.1, 0.1]))
+    >>> bool(np.all(np.abs(found.x) < 1e-8)), len(found.tangents)
+    (True, 2)
+    """
+    with np.errstate(all="ignore"):
+        search = _Search(system, np.array(x, dtype=float), newton, kernel)
+        for _ in range(max_iterations - 1):  # the first linearization made the borders
+            if not search.advance():
+                break
+            if search.converged:
+                return search.result()
+            search.prepare()
+    raise ConvergenceError(f"no branch point near by (last update {search.before:.1e})")
+
+
+def rounded_off(system: Discretization, point: BranchPoint, newton: Newton) -> Array:
+    """Return by how much round-off moves each unknown of a branch point: by further Newton steps, which lead nowhere.
+
+    Each begins where the one before ended, rounded once more: round-off of all residuals is drawn anew.
+
+    Examples
+    --------
+    >>> from contin import Algebraic, AlgebraicProblem
+    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2 - 1),), ["x"], {"a": 1.0})
+    >>> system = Algebraic(pitchfork, ["a"])
+    >>> found = locate_branch_point(system, np.array([0.1, 1.1]))
+    >>> bool(np.all(rounded_off(system, found, Newton()) < 1e-15))
+    True
+    """
+    random, noise = np.random.default_rng(5), np.zeros_like(point.x)
+    with np.errstate(all="ignore"):
+        search = _Search(system, point.x, newton, point.kernel)
+        for _ in range(_DRAWS):
+            search.x = before = search.x * (1 + np.finfo(float).eps * random.choice((-1.0, 1.0), search.x.size))
+            if not search.advance():
+                break
+            noise = np.maximum(noise, np.abs(search.x - before))
+            search.forget()
+    return noise
+
+
+class _Search:
+    """The iteration of `locate_branch_point`: x, beta, and the Hessian with what is known of its change."""
+
+    def __init__(self, system: Discretization, x: Array, newton: Newton, kernel: Array | None) -> None:
+        self.system, self.x, self.newton = system, x, newton
+        self.beta = 0.0
+        self.size, self.before = np.inf, np.inf  # of the last update, and of the one before
+        random = np.random.default_rng(20240501)
+        phi = _orthonormal(system, random.standard_normal((2, system.size)) if kernel is None else kernel)
+        psi = random.standard_normal(system.equations) / np.sqrt(system.equations)
+        # borders of random numbers first, then of the kernel itself: the best conditioned
+        matrix = BorderedMatrix(system, x, phi, psi)
+        if not np.isfinite(matrix.kernel).all():
+            raise ConvergenceError("no branch point near by: the bordered matrix is singular")
+        self._borders = _orthonormal(system, matrix.kernel), matrix.left()
+        self._hessian: Array | None = None
+        self._slope: Array = np.empty((2, 2))  # the Hessian, corrected by how the gradient has really changed
+        self._drop: Array = np.zeros(2)  # the last update along the kernel
+        self._gradient: Array = np.zeros(2)  # g before it
+
+    def advance(self) -> bool:
+        """Make one Newton step; return False where it leads nowhere."""
+        matrix = self._matrix = BorderedMatrix(self.system, self.x, *self._borders)
+        if self._hessian is None:
+            self._hessian, self._origin = matrix.hessian(self.x), self.x
+            self._slope = self._hessian
+        elif np.any(self._drop):  # Broyden's update
+            missed = self._gradient - matrix.g - self._slope @ self._drop
+            self._slope = self._slope + np.outer(missed, self._drop / (self._drop @ self._drop))
+        if not (np.isfinite(self._hessian).all() and np.isfinite(matrix.g).all()):
+            return False
+        correction = matrix.factors.solve(np.concatenate([matrix.residual + self.beta * self._borders[1], [0.0, 0.0]]))
+        drop: Any = np.linalg.lstsq(self._slope, matrix.g, rcond=_FLAT)[0]
+        self._drop = drop
+        self._gradient = matrix.g
+        if np.abs(self._slope @ self._drop - matrix.g).max() > _UNEXPLAINED * np.abs(matrix.g).max():
+            return False  # a gradient that does not change along the kernel: no branch point here
+        update = correction[:-1] + self._drop @ matrix.kernel
+        self.beta -= correction[-1]
+        self.x = self.x - update
+        self.size = float(np.max(np.abs(update) / (1 + np.abs(self.x))))
+        return bool(np.isfinite(self.size) and self.size <= _GONE)
+
+    def forget(self) -> None:
+        """Forget the last update: the next is no continuation of it."""
+        self._drop = np.zeros(2)
+
+    @property
+    def converged(self) -> bool:
+        """The estimated error is below the tolerance, or the updates are round-off."""
+        rate = min(1.0, max(_LINEAR, self.size / self.before)) if np.isfinite(self.before) else 1.0
+        return self.size * rate <= self.newton.tolerance or (self.size < _ROUND_OFF and rate > _SHRINKING)
+
+    def prepare(self) -> None:
+        """Drop the Hessian where the last update was not much smaller than the one before."""
+        if self.size > _SLOW * self.before:
+            self._hessian = None
+        self.before = self.size
+
+    def result(self) -> BranchPoint:
+        """Return the branch point: tangents from the algebraic bifurcation equation, the kernel made orthonormal."""
+        assert self._hessian is not None
+        system, matrix, hessian = self.system, self._matrix, self._hessian
+        if np.max(np.abs(self.x - self._origin)) > _MOVED:
+            matrix = BorderedMatrix(system, self.x, *self._borders)
+            hessian = matrix.hessian(self.x)
+        if not (np.isfinite(matrix.kernel).all() and np.isfinite(hessian).all() and matrix.is_regular()):
+            raise ConvergenceError("no simple branch point near by: the kernel has more than two dimensions")
+        tangents = [a @ matrix.kernel for a in _null_directions(hessian)]
+        tangents = [oriented(tangent / np.sqrt(inner(system, tangent, tangent))) for tangent in tangents]
+        tangents = [tangents[i] for i in ordered(tangents, [0.0] * len(tangents))]
+        kernel = _orthonormal(system, matrix.kernel)
+        change = np.linalg.inv([[inner(system, old, new) for new in kernel] for old in matrix.kernel])  # new = change @ old
+        hessian = change @ hessian @ change.T
+        return BranchPoint(self.x, tuple(tangents), kernel, matrix.left(), hessian, float(abs(self.beta)))
+
+
+def _orthonormal(system: Discretization, vectors: Iterable[Array]) -> Array:
+    """Return vectors as rows made orthonormal in the weighted inner product: Gram-Schmidt, twice."""
+    result: list[Array] = []
+    for vector in vectors:
+        for _ in range(2):
+            for other in result:
+                vector = vector - inner(system, vector, other) * other
+        result.append(vector / np.sqrt(inner(system, vector, vector)))
+    return np.array(result)
+
+
+def _null_directions(hessian: Array) -> list[Array]:
+    """Return unit vectors a with a.H.a = 0: two where det H < 0, none otherwise."""
+    values, vectors = np.linalg.eigh(hessian)
+    if not values[0] < 0 < values[1]:
+        return []
+    ratio = np.sqrt(-values[0] / values[1])
+    directions = [vectors[:, 0] + sign * ratio * vectors[:, 1] for sign in (1, -1)]
+    return [direction / np.linalg.norm(direction) for direction in directions]

@@ -1,0 +1,183 @@
+"""Branch points inside a step: how many there are, and where.
+
+A branch point changes the sign of the determinant of [F_x; row]; more of them are seen in how those singular values change
+that change most (`contin.events.crossings`). Both must agree: where the sign stays and one value passes, another did unseen.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import itertools
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray
+from contin.core.protocol import inner
+from contin.core.trial import Trial, sign_changed
+from contin.errors import ConvergenceError
+from contin.events.branch_point import locate_branch_point
+from contin.events.crossings import calm, crossings, passed, quotients
+from contin.events.multiple_point import MultiplePoint, locate_multiple_point
+from contin.events.segment import Segment, SpecialPoint
+from contin.linalg.orientation import canonical_basis
+from contin.linalg.singular import smallest_directions
+
+#: How far outside a step, as a part of it, a branch point may be found that changes the determinant's sign inside it: places
+#: of branch points are known to about the square root of round-off there.
+_OUTSIDE = 1e-6
+#: A branch point that the curve passes at a larger distance is none: the branches do not cross. A mesh that is not symmetric
+#: parts them by the root of its error; ten times smaller, such branch points of coarse meshes would be lost.
+_GAP = 1e-2
+#: The same without a mesh, where branches that cross are parted by the root of round-off, 1e-8, or of the last digits of data:
+#: ten digits part them by 1e-5. At 1e-2, cycles of maps of period 32 were "branch points" with residuals of 1e-2.
+_GAP_WITHOUT_MESH = 1e-5
+#: How often the bracket is halved: a branch point closer than 2^-12 of the step to another singular point is not located.
+_HALVINGS = 12
+#: The smallest singular value is smaller by far than the next one if their quotient is above this. In layers whose steps were
+#: divided it is 77 and more; three times larger, the first of these are divided again.
+_BY_FAR = 30.0
+#: Singular values that vanish together are expected at places no further apart than this part of the step.
+_TOGETHER = 0.1
+
+
+class BranchPointSearch:
+    """The branch points inside one step."""
+
+    def __init__(self, segment: Segment) -> None:
+        self.segment = segment
+        self._shares: Array = np.empty(0)  # at which parts of the step branch points are expected, in order
+
+    @property
+    def _share(self) -> float:
+        """Where branch points are expected, as a part of the step."""
+        return float(np.mean(self._shares)) if len(self._shares) else 0.5
+
+    @functools.cached_property
+    def count(self) -> tuple[int, bool]:
+        """How many branch points the step passes, and whether that is clear."""
+        state, before, trial = self.segment.state, self.segment.before, self.segment.trial
+        row, size = state.row, state.system.size
+        if before.factors is None:
+            before.refactor(row)
+        if before.sign == trial.sign and (
+            state.system.cannot_branch(self.segment) or calm(before.factors, trial.factors, size)
+        ):
+            return 0, True
+        before.refactor(row)
+        values = quotients(before.factors, trial.factors, size)
+        self._shares = np.sort(_shares(values[values.real < 0]))
+        count, clear = crossings(values)
+        if (count > 1 or not clear) and self._without_smallest():
+            return int(self.sign_changes), True
+        return count, clear and (count % 2 == 1) == self.sign_changes
+
+    def _without_smallest(self) -> bool:
+        """Return whether one singular value explains the sign of the determinant, and no other one comes near zero.
+
+        Where one is smaller than the others by far, as of a layer that is held in its place by exp(-1 / width) only, inverse
+        matrices consist of its singular vectors, and their quotients have negative eigenvalues as soon as these turn. Bordered
+        by the vectors at the end of the step, the matrices are regular::
+
+            M = [ A    u ]       M [x; g] = [0; 1],    det A = g det M
+                [ v^T  0 ]
+
+        So the sign of A is that of g, as long as no singular value of M passes zero. Two zeros of g in the step would leave its
+        sign as it was: it is looked at between the places where they are expected.
+        """
+        segment, system = self.segment, self.segment.state.system
+        size, unit = system.size, np.zeros(system.size + 1)
+        right, left, response = smallest_directions(segment.trial.factors, size, 2)
+        inverses = np.sort(np.linalg.svd(response, compute_uv=False)) if np.isfinite(response).all() else np.ones(2)
+        if inverses[1] < _BY_FAR * inverses[0]:
+            return False
+        rows, unit[-1] = np.zeros((2, size + 1)), 1.0
+        rows[0, :-1], rows[1, :-1] = segment.state.row, right[0]
+        column = left[:1, : system.equations]
+        first, last = (system.linearize(end.x, rows, column)[1] for end in (segment.before, segment.trial))
+        g = [factors.solve(unit)[-1] for factors in (first, last)]
+        if not np.isfinite(g).all() or (g[0] * g[1] < 0) != self.sign_changes:
+            return False
+        if crossings(quotients(first, last, size + 1)) != (0, True):
+            return False
+        with contextlib.suppress(ConvergenceError):
+            places = [segment.at(segment.step * (a + b) / 2).x for a, b in itertools.pairwise(self._shares)]
+            between = [system.linearize(x, rows, column)[1].solve(unit)[-1] for x in places]
+            signs = np.sign([g[0], *between, g[1]])
+            return int(np.count_nonzero(np.diff(signs))) == int(self.sign_changes)
+        return False
+
+    @property
+    def _gap(self) -> float:
+        """Largest distance between two arms of a curve that count as branches which cross."""
+        return _GAP if self.segment.state.system.intervals else _GAP_WITHOUT_MESH
+
+    @property
+    def sign_changes(self) -> bool:
+        """The determinant's sign changes inside the step."""
+        return sign_changed(self.segment.before.sign, self.segment.trial.sign)
+
+    @functools.cached_property
+    def simple(self) -> SpecialPoint:
+        """The branch point inside the step, its bracket halved until the locator's answer lies inside it."""
+        segment = self.segment
+        state, trial, step = segment.state, segment.trial, segment.step
+        low, high = segment.low, step
+        middle = low + self._share * (high - low)
+        for _ in range(_HALVINGS):
+            try:
+                found = locate_branch_point(state.system, segment.guess(middle), segment.newton)
+                at = inner(state.system, state.tangent, found.x - state.x)
+                inside = segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
+                if inside and found.gap < self._gap and segment.passes_by(found.x, at):
+                    found = found.along(state.system, segment.direction(at))
+                    return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
+            except ConvergenceError:
+                pass
+            try:
+                sign = segment.at(middle).sign
+            except ConvergenceError:
+                break
+            low, high = (middle, high) if sign == segment.before.sign else (low, middle)
+            middle = (low + high) / 2
+        return SpecialPoint(high, "BP", "", trial, is_located=False)
+
+    @functools.cached_property
+    def multiple(self) -> SpecialPoint:
+        """The multiple point inside the step, where several singular values vanish together; "possible" where they do not."""
+        segment = self.segment
+        state, step = segment.state, segment.step
+        count, middle = self.count[0], segment.low + self._share * (step - segment.low)
+        with contextlib.suppress(ConvergenceError):
+            if np.ptp(self._shares) < _TOGETHER and not self._apart(middle):
+                found = locate_multiple_point(state.system, segment.guess(middle), state.row, count, segment.newton)
+                assert found.x is not None
+                at = inner(state.system, state.tangent, found.x - state.x)
+                if segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE):
+                    trial = Trial.without_tangent(state.system, found.x)
+                    return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
+        kernel = smallest_directions(segment.trial.factors, state.system.size, count + 1)[0][:count]
+        kernel = canonical_basis(kernel, state.system.weights)
+        return SpecialPoint(step, "BP", "", segment.trial, details=MultiplePoint(count, kernel), is_located=False)
+
+    def _apart(self, middle: float) -> bool:
+        """Return whether the singular values pass zero at different places, as seen from halfway between the expected ones.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        segment, (count, _) = self.segment, self.count
+        there = segment.at(middle)
+        there.refactor(segment.state.row)
+        values = quotients(segment.before.factors, there.factors, segment.state.system.size)
+        passing, vanishing = passed(values)
+        shares = _shares(values[passing | vanishing])
+        return 0 < len(shares) < count or (len(shares) == count and float(np.ptp(shares)) > _TOGETHER)
+
+
+def _shares(values: ComplexArray) -> Array:
+    """Return at which part of the step singular values pass zero that change evenly, from their `quotients`."""
+    sizes = np.abs(values)
+    shares: Array = sizes / (1 + sizes)
+    return shares

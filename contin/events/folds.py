@@ -1,0 +1,269 @@
+"""Folds inside a step: places where the primary parameter turns.
+
+The rate r of the primary parameter along the step vanishes at a fold. One fold changes its sign from one end of the step to the
+other; two folds leave it as it was, and show as a dip of r between the ends. From its values at both ends and its mean, which
+is known from the parameter itself, r is a parabola. Where that, or an end close to zero, raises the suspicion of a dip, the
+smallest |r| is searched by parabolas through three places, closer and closer as it sinks, until a place of the other sign
+is found or r stays away from zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from contin.core.protocol import inner
+from contin.core.trial import TestFunction, Trial, sign_changed
+from contin.errors import ConvergenceError
+from contin.events.segment import Place, Segment, SpecialPoint
+from contin.events.significance import passed_before, senses
+from contin.functions.kernel_parts import helper
+
+#: A component of the unit tangent below this may be round-off: it is believed where the parameter itself changes.
+_ROUND_OFF = 1e-9
+#: A smallest rate within this part of those at the ends is zero to round-off: an inflection, not two folds.
+_FLAT = 1e-15
+#: Units in the last place by which a parameter may differ between two points where it is the same.
+_UNITS = 16
+#: A rate that sinks to this part of its values at the ends may pass zero, ...
+_SHALLOW = 0.5
+#: ... and the search for a smallest rate goes on while it lowers it to this part at least.
+_DEEPER = 0.5
+#: The rate right beside a pitchfork's fold is taken at this part of the step from it. Closer, tangents are blurred; further
+#: away, another fold would be between.
+_ASIDE = 1e-2
+#: A branch point may be located this part of the step outside of it (as in `contin.events.branch_points`).
+_OUTSIDE = 1e-6
+#: A rate at one end below this part of what it would be at the other, were the parabola's vertex at this one, is near zero.
+_BESIDE = 0.05
+
+
+class _Parabola(NamedTuple):
+    """The rate between two places: first + linear z + square z^2, z from 0 to 1."""
+
+    first: float
+    last: float
+    linear: float
+    square: float
+
+    @property
+    def dips(self) -> bool:
+        """It comes near zero between the places."""
+        return dips(*self)
+
+    @property
+    def ends_low(self) -> bool:
+        """It is near zero at one place already, and lower beside it."""
+        return ends_low(*self)
+
+    def times(self, sense: float) -> _Parabola:
+        """Return the parabola multiplied by a sign."""
+        return _Parabola(sense * self.first, sense * self.last, sense * self.linear, sense * self.square)
+
+
+@helper
+def dips(first: float, last: float, linear: float, square: float) -> bool:
+    """Return whether a parabola comes near zero between the places."""
+    return 0 < -linear < 2 * square and first - linear**2 / (4 * square) < _SHALLOW * min(first, last)
+
+
+@helper
+def ends_low(first: float, last: float, linear: float, square: float) -> bool:
+    """Return whether it is near zero at one place already, and lower beside it."""
+    inwards = linear if first < last else -linear - 2 * square
+    return min(first, last) < _BESIDE * square and inwards < _SHALLOW * square
+
+
+def may_turn(segment: Segment, fold: TestFunction) -> bool:
+    """Return whether the primary parameter may turn inside a step, by its rates at both ends and their parabola.
+
+    It may, too, where its sense cannot be told at an end, or is not that in which it went before.
+    """
+    ends = senses(segment, fold)
+    if not ends[0] * ends[1] > 0 or segment.state.sense * ends[1] < 0:
+        return True
+    search = FoldSearch(segment, fold, lambda: None)
+    parabola = search._parabola((segment.low, segment.before), (segment.step, segment.trial)).times(ends[0])
+    return parabola.dips or parabola.ends_low
+
+
+class FoldSearch:
+    """The search for folds inside one step.
+
+    Parameters
+    ----------
+    segment : Segment
+    fold : TestFunction
+        The tangent's component of the primary parameter, which is its name.
+    pitchfork : callable
+        Returns the fold at the branch point inside the step, where the parameter turns right there, or None.
+    """
+
+    def __init__(self, segment: Segment, fold: TestFunction, pitchfork: Callable[[], SpecialPoint | None]) -> None:
+        self.segment, self.fold, self.pitchfork = segment, fold, pitchfork
+        self._index = segment.trial.system.parameter_index(fold.name)
+        self._outside = _OUTSIDE * segment.step
+
+    def find(self) -> list[SpecialPoint]:
+        """Return the folds inside the step, in order.
+
+        The parameter goes one way before a fold and the other way behind it. Where its rate is so small that it may be
+        round-off, or the equations so nearly singular that Newton's method stays above its tolerance, and the parameter itself
+        does not differ from one fold to the next, or to both ends of the step, there is none. A fold where it does not differ
+        from a first point on which branches cross is that point. For rates that may be errors of the mesh see
+        `contin.events.significance`.
+        """
+        segment = self.segment
+        left, right = (segment.low, segment.before), (segment.step, segment.trial)
+        if not all(senses(segment, self.fold)):
+            return passed_before(segment, self.fold)
+        found = self.between(left, right)
+        while segment.state.singular and found and not self._differs(left[1], found[0].trial):
+            del found[0]  # the first point itself: beside it tangents are blurred
+        clear = max(abs(left[1].value(self.fold)), abs(right[1].value(self.fold))) >= _ROUND_OFF
+        if found and not (clear and segment.trial.newton_error <= segment.newton.tolerance):
+            self._drop_round_off(found, left, right)
+        return found or passed_before(segment, self.fold)
+
+    def _drop_round_off(self, found: list[SpecialPoint], left: Place, right: Place) -> None:
+        """Take out of the folds found those between which, or beside which, the parameter does not differ."""
+        at = 0
+        while at < len(found):
+            places = [left[1], *(fold.trial for fold in found), right[1]]
+            if at + 1 < len(found) and not self._differs(places[at + 1], places[at + 2]):
+                del found[at : at + 2]
+            elif not (self._differs(places[at], places[at + 1]) or self._differs(places[at + 1], places[at + 2])):
+                del found[at]
+            else:
+                at += 1
+
+    def _differs(self, one: Trial, other: Trial) -> bool:
+        """Return whether the parameter differs between two points by more than round-off."""
+        p, q = one.x[self._index], other.x[self._index]
+        noise = _UNITS * np.finfo(float).eps + one.newton_error + other.newton_error
+        return bool(abs(p - q) > noise * (1 + abs(p)))
+
+    def between(self, left: Place, right: Place) -> list[SpecialPoint]:
+        """Return the places between two where the rate changes its sign, in order."""
+        ends = left[1].value(self.fold), right[1].value(self.fold)
+        if max(abs(ends[0]), abs(ends[1])) < _ROUND_OFF and not self._differs(left[1], right[1]):
+            return []
+        fork = self.pitchfork()
+        if fork is not None and left[0] - self._outside <= fork.at <= right[0] + self._outside:
+            return self._around(fork, left, right)
+        if sign_changed(*ends):
+            return [self.segment.locate(self.fold, left, right, self.estimate(left, right))]
+        dip = self._dip(left, right)
+        return [] if dip is None else self.between(left, dip) + self.between(dip, right)
+
+    def _around(self, fork: SpecialPoint, left: Place, right: Place) -> list[SpecialPoint]:
+        """Return the fold of a pitchfork between two places, and the folds before and behind it.
+
+        The rate is odd around it: where another fold is close, its mirror image is, too, and the rate at the two places has
+        the signs that it would have without both.
+        """
+        aside = _ASIDE * self.segment.step
+        sides = [s for s in (fork.at - aside, fork.at + aside) if left[0] < s < right[0]]
+        try:
+            near = [(s, self.segment.at(s)) for s in sides]
+        except ConvergenceError:  # right beside the fork the equations are too nearly singular: the ends decide
+            return [fork] if sign_changed(left[1].value(self.fold), right[1].value(self.fold)) else []
+        before, behind = (near[0] if fork.at - aside > left[0] else left), (near[-1] if fork.at + aside < right[0] else right)
+        found = [fork] if sign_changed(before[1].value(self.fold), behind[1].value(self.fold)) else []
+        if before is not left:
+            found = self.between(left, before) + found
+        if behind is not right:
+            found = found + self.between(behind, right)
+        return self._turning(found, fork, left, right)
+
+    def _turning(self, found: list[SpecialPoint], fork: SpecialPoint, left: Place, right: Place) -> list[SpecialPoint]:
+        """Return the folds at which the parameter turns: beside the fork tangents are blurred."""
+        at = 0
+        while at < len(found):
+            values = [trial.x[self._index] for trial in (left[1], *(fold.trial for fold in found), right[1])]
+            if found[at] is not fork and (values[at + 1] - values[at]) * (values[at + 2] - values[at + 1]) > 0:
+                del found[at]
+                at = 0
+            else:
+                at += 1
+        return found
+
+    def rate(self, trial: Trial) -> float:
+        """Return the rate of the primary parameter along the state's tangent."""
+        state = self.segment.state
+        return trial.value(self.fold) / inner(state.system, state.tangent, trial.tangent)
+
+    def estimate(self, left: Place, right: Place) -> float | None:
+        """Return about where the rate vanishes between two places at which it has opposite signs."""
+        parabola = self._parabola(left, right)
+        first, last, linear, square = parabola.first, parabola.last, parabola.linear, parabola.square
+        root = np.sqrt(max(linear**2 - 4 * square * first, 0.0))
+        slope = linear + (root if last > first else -root)
+        if slope == 0:
+            return None
+        zero = -2 * first / slope  # the one where the rate goes from first to last
+        return float(left[0] + (right[0] - left[0]) * zero) if 0 < zero < 1 else None
+
+    def _parabola(self, left: Place, right: Place) -> _Parabola:
+        (a, start), (b, end) = left, right
+        first, last = self.rate(start), self.rate(end)
+        mean = (end.x[self._index] - start.x[self._index]) / (b - a)
+        return _Parabola(first, last, 6 * mean - 4 * first - 2 * last, 3 * first + 3 * last - 6 * mean)
+
+    def _dip(self, left: Place, right: Place) -> Place | None:
+        """Return a place between two of equal rates where the rate has the other sign; None if there is none."""
+        parabola = self._parabola(left, right)
+        first, last = parabola.first, parabola.last
+        if not (first or last):
+            return None
+        sense = math.copysign(1.0, first or last)
+        place, square = self._suspect(left, right, parabola if sense > 0 else parabola.times(sense))
+        lowest, flat = np.inf, _FLAT * max(abs(first), abs(last))
+        while place is not None:
+            value = sense * self.rate(place[1])
+            if value < -flat:
+                return place
+            if value <= flat:
+                return None  # an inflection
+            if value > _DEEPER * lowest:
+                return None
+            lowest = value
+            apart = self._distance(place, np.sqrt(value / square), left, right)
+            if apart is None:
+                return None
+            near = [(s, self.segment.at(s)) for s in (place[0] + apart, place[0] + 2 * apart)]
+            values = [sense * self.rate(trial) for _, trial in near]
+            if min(values) < -flat:
+                return near[int(np.argmin(values))]
+            bend = values[1] - 2 * values[0] + value
+            if not bend > 0:
+                return None
+            s = place[0] + apart * (0.5 - (values[0] - value) / bend)
+            place = (s, self.segment.at(s)) if left[0] < s < right[0] else None
+        return None
+
+    def _suspect(self, left: Place, right: Place, parabola: _Parabola) -> tuple[Place | None, float]:
+        """Return a place between two where the rate could come near zero, or None, and half its second derivative.
+
+        That is the vertex of the parabola, which is positive at both ends. Where it lies outside, but the rate at one end is
+        close to zero already: that end.
+        """
+        a, width = left[0], right[0] - left[0]
+        first, last, linear, square = parabola
+        if parabola.dips:
+            s = a - width * linear / (2 * square)
+            return (s, self.segment.at(s)), square / width**2
+        return (left if first < last else right) if parabola.ends_low else None, square / width**2
+
+    @staticmethod
+    def _distance(place: Place, apart: float, left: Place, right: Place) -> float | None:
+        """Return the signed distance between three places, the first given, so that all lie between the ends; None if none do.
+
+        At ``apart`` the rate doubles from one place to the next if it is smallest in the first.
+        """
+        if place[0] + 2 * apart >= right[0]:
+            apart = -apart
+        return apart if place[0] + 2 * apart >= left[0] else None

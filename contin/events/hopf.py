@@ -1,0 +1,293 @@
+"""Hopf points: pairs of complex eigenvalues of F_u that cross the imaginary axis, for u' = F (AUTO's HB).
+
+Eigenvalues at both ends of a piece are matched, nearest to nearest. Each complex one that changed the side of the axis is
+followed to the place where its real part vanishes. Where one was real at an end, or two were located at one place where only
+one pair lies on the axis, the piece is halved. Real eigenvalues that cross (folds, branch points), and two opposite real ones
+(neutral saddles), are no Hopf points.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array, ComplexArray, Indices
+from contin.core.trial import TestFunction, Trial
+from contin.errors import ConvergenceError
+from contin.events.root import find_zero
+from contin.events.segment import Place, Segment, SpecialPoint
+
+#: An eigenvalue with a smaller imaginary part, relative to 1 + its size, is real: a double real one splits by the square root
+#: of round-off.
+_REAL = 1e-8
+#: Into how many parts a step is divided to look inside it, on the cubic, ...
+_PARTS = 4
+#: ... how often these parts are halved, where eigenvalues move far: peaks of a hundredth of a step are seen. Without, two of
+#: 187 Hopf points of random problems are passed, in a step of 30 times their distance, ...
+_CLOSER = 5
+#: ... of this many unknowns at most, whose eigenvalues at a place take less time than a step, ...
+_SMALL = 32
+#: ... and how often a piece is halved: crossings closer than 2^-20 of it are not told apart.
+_CUTS = 20
+#: Hopf points closer than this part of the step are one point with several pairs: round-off of eigenvalues of multiplicity two.
+_TOGETHER = 1e-7
+#: Part of a step before and behind a Hopf point where its pair must lie on different sides of the axis, where that is in doubt.
+_BESIDE = 1e-3
+#: A real part below this, relative to 1 + the eigenvalue's size, is zero at a Hopf point.
+_ON_AXIS = 1e-7
+
+
+def hopf() -> TestFunction:
+    """Return the test function of Hopf points: the largest real part of a complex eigenvalue. Several pairs are told apart."""
+
+    def function(trial: Trial) -> float:
+        values = _upper(trial)
+        parts = values[_is_complex(values)].real
+        return float(parts.max()) if parts.size else float("nan")
+
+    return TestFunction("HB", "Hopf", function, search=hopf_points, asks=may_pass)
+
+
+def may_pass(segment: Segment) -> bool:
+    """Return whether a pair may pass the axis inside a step, by how far eigenvalues move between its ends."""
+    return _moving([(segment.low, segment.before), (segment.step, segment.trial)])[0]
+
+
+def critical_real_part(frequency: float) -> Callable[[Trial], float]:
+    """Return the function of a trial that vanishes at a Hopf point of this frequency: the real part of the critical pair."""
+    return _nearest(1j * frequency).function
+
+
+def _nearest(value: complex) -> TestFunction:
+    """Return the test function of one pair: the real part of the eigenvalue that is nearest to a value."""
+
+    def function(trial: Trial) -> float:
+        values = _upper(trial)
+        return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
+
+    return TestFunction("HB", "Hopf", function, search=hopf_points)
+
+
+def _upper(trial: Trial) -> ComplexArray:
+    """Return the eigenvalues with a positive imaginary part, and real ones."""
+    system: Any = trial.system  # one with eigenvalues
+    values: ComplexArray = system.computed_eigenvalues(trial.x)
+    return values[values.imag > -_REAL * (1 + np.abs(values))]
+
+
+def _is_complex(values: ComplexArray) -> Any:
+    return values.imag > _REAL * (1 + np.abs(values))
+
+
+def _half_plane(values: ComplexArray) -> Any:
+    """Return 1 for an eigenvalue above the real axis, -1 below it, 0 on it."""
+    return np.where(np.abs(values.imag) > _REAL * (1 + np.abs(values)), np.sign(values.imag), 0.0)
+
+
+def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
+    """Return the Hopf points between places of a step, in order."""
+    symmetric: Any = getattr(segment.trial.system, "is_symmetric", None)
+    if symmetric is not None and symmetric(segment.state.x) and symmetric(segment.trial.x):
+        return []  # all eigenvalues are real
+    inside = sorted({segment.step * part / _PARTS for part in range(1, _PARTS)} - {s for s, _ in knots})
+    looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda knot: knot[0])
+    moves = _moving(looked)
+    if not any(moves):
+        return []
+    passed = _passed(looked, moves)
+    if segment.trial.system.size <= _SMALL:  # otherwise each place takes long
+        closely = _passed(*_looked_at_closely(segment, looked, moves))
+        if len(closely) > len(passed):
+            passed, inside = closely, sorted({*inside, *(s for pair in closely for s in pair)} - {s for s, _ in knots})
+    if passed:
+        knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda knot: knot[0])
+    found: list[SpecialPoint] = []
+    for left, right in itertools.pairwise(knots):
+        found += _between(segment, left, right, 0)
+    return _joined(sorted(found, key=lambda point: point.at), segment)
+
+
+def _moving(places: list[Place]) -> list[bool]:
+    """Return between which of some places a pair of eigenvalues may move to the imaginary axis, by how far all of them move.
+
+    Where all move less than they are from it, each is nearer to one on its own side of the axis than to any on the other: none
+    changes the side. Those on the axis at both places do not count, nor does the one that is nearest to it: a pair is two. They
+    are taken to move as fast as beside the two places too: ones that go to the axis and come back look as if they stood.
+    """
+    system: Any = places[0][1].system
+    values = system.eigenvalues_at([trial.x for _, trial in places])
+    if not values[0].size or any(len(each) != len(values[0]) for each in values):
+        return [True] * (len(places) - 1)
+    along = np.sort(np.array(values), axis=1)
+    sizes = np.abs(along.real)
+    distances = np.where((sizes[1:] == 0) & (sizes[:-1] == 0), np.inf, np.minimum(sizes[1:], sizes[:-1]))
+    distances = np.sort(distances, axis=1)[:, 1] if distances.shape[1] > 1 else np.full(len(distances), np.inf)
+    lengths = np.diff([s for s, _ in places])
+    speeds = np.zeros(len(lengths) + 2)
+    speeds[1:-1] = np.abs(along[1:] - along[:-1]).max(axis=1) / lengths
+    fastest = np.maximum(np.maximum(speeds[:-2], speeds[2:]), speeds[1:-1])
+    return [not far < distance for far, distance in zip(fastest * lengths, distances)]
+
+
+def _looked_at_closely(segment: Segment, places: list[Place], moves: list[bool]) -> tuple[list[Place], list[bool]]:
+    """Return the places and, where eigenvalues move far between two of them, further ones between these, on the cubic.
+
+    A pair may pass the axis and come back: where two pairs nearly meet their real parts have narrow peaks. ``moves`` tells
+    where eigenvalues move far, and comes back for the new places.
+    """
+    for _ in range(_CLOSER):
+        between = [(left[0] + right[0]) / 2 for (left, right), far in zip(itertools.pairwise(places), moves) if far]
+        if not between:
+            break
+        places = sorted([*places, *((s, segment.guessed(s)) for s in between)], key=lambda place: place[0])
+        moves = _moving(places)
+    return places, moves
+
+
+def _passed(places: list[Place], moves: list[bool]) -> list[tuple[float, float]]:
+    """Return neighbours among places of a step between which a pair passes: none where eigenvalues do not move so far."""
+    pieces = zip(itertools.pairwise(places), moves)
+    return [(left[0], right[0]) for (left, right), far in pieces if far and _passes_as_pair(left[1], right[1])]
+
+
+def _passes_as_pair(left: Trial, right: Trial) -> bool:
+    """Return whether an eigenvalue that is complex at one of two places changed the side of the imaginary axis."""
+    first, last = _changes(left, right)
+    return bool(np.any(_half_plane(first)) or np.any(_half_plane(last)))
+
+
+def _changes(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
+    """Return the eigenvalues at both ends that changed the side of the imaginary axis."""
+    system: Any = left.system
+    if not (np.any(system.eigenvalues(left.x).real > 0) or np.any(system.eigenvalues(right.x).real > 0)):
+        return np.empty(0, complex), np.empty(0, complex)  # as where all is stable
+    first, last = _matched(left, right)
+    changed = (first.real > 0) != (last.real > 0)
+    upper = (first.imag > -_REAL * (1 + np.abs(first))) | (last.imag > -_REAL * (1 + np.abs(last)))
+    return first[changed & upper], last[changed & upper]
+
+
+def _matched(left: Trial, right: Trial) -> tuple[ComplexArray, ComplexArray]:
+    """Return the eigenvalues at two places, each beside the one that it becomes; none where they are not finite.
+
+    Of a large matrix only those right of the axis or near to it are known, and their number differs from place to place. One
+    right of the axis that is left over at one place has gone far to the left at the other: it is looked for there.
+    """
+    system: Any = left.system
+    first, last = system.eigenvalues(left.x), system.eigenvalues(right.x)
+    if not (np.isfinite(first).all() and np.isfinite(last).all()):
+        return np.empty(0, complex), np.empty(0, complex)
+    rows, columns = _nearest_pairs(np.abs(first[:, None] - last))
+    ahead = [z for i, z in enumerate(first) if i not in rows and z.real > 0]
+    behind = [z for j, z in enumerate(last) if j not in columns and z.real > 0]
+    if not ahead and not behind:
+        return first[rows], last[columns]
+    gone = [system.eigenvalue_near(right.x, z) for z in ahead]
+    came = [system.eigenvalue_near(left.x, z) for z in behind]
+    return np.concatenate([first[rows], ahead, came]), np.concatenate([last[columns], gone, behind])
+
+
+def _nearest_pairs(gaps: Array) -> tuple[Indices, Indices]:
+    """Return rows and columns of a matrix that belong together, as many as the shorter side has: their sum is the least."""
+    nearest: Indices = gaps.argmin(axis=1) if gaps.size else np.empty(0, dtype=np.int64)
+    if len(set(nearest.tolist())) == len(gaps):
+        return np.arange(len(gaps)), nearest
+    from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]  # takes .1 s; most steps do without
+
+    rows, columns = linear_sum_assignment(gaps)
+    return rows, columns
+
+
+def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
+    """Return the Hopf points between two places."""
+    if not _passes_as_pair(left[1], right[1]):
+        return []
+    first, last = _changes(left[1], right[1])
+    one, other = _half_plane(first), _half_plane(last)
+    if np.all(one == other):
+        located = [_located(segment, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
+        found = [point for point in located if point is not None]
+        if all(_pairs_at(point) >= _count_at(point, found, segment) for point in found):
+            return found
+    if depth == _CUTS:
+        return []
+    middle = (left[0] + right[0]) / 2
+    there = middle, segment.near(middle)
+    return _between(segment, left, there, depth + 1) + _between(segment, there, right, depth + 1)
+
+
+def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint | None:
+    """Return the place where the real part of an eigenvalue vanishes that has these values at two places.
+
+    The second place, not located, where that fails; None where the pair turns out to be real.
+    """
+    (a, b), (first, last) = (left[0], right[0]), pair
+
+    def real_part(s: float) -> float:
+        found = _nearest(first + (last - first) * (s - a) / (b - a)).function(segment.at(s))
+        if not math.isfinite(found):
+            raise ConvergenceError("no eigenvalue is known there")
+        return found
+
+    is_located = True
+    try:
+        at = find_zero(real_part, (a, first.real), (b, last.real), segment.precision)
+        there = segment.at(at)
+    except ConvergenceError:
+        (at, there), is_located = right, False
+    values = _upper(there)
+    if not values.size:
+        return None
+    here = first + (last - first) * (at - a) / (b - a)
+    frequency = float(values[np.argmin(np.abs(values - here))].imag)
+    system: Any = there.system
+    crossing = system.crossing(there.x, frequency)
+    if crossing is None:
+        return None
+    label, name = crossing
+    test = _nearest(1j * frequency)
+    if is_located and 0.0 in (first.real, last.real) and not passes(segment, at, frequency):
+        return None  # the pair lies on the axis before
+    details = {"frequency": frequency, "pairs": 1}
+    return SpecialPoint(at, label, name, there, None, details, test, is_located=is_located)
+
+
+def passes(segment: Segment, at: float, frequency: float) -> bool:
+    """Return whether the pair of this frequency lies on different sides of the axis before and behind a place.
+
+    One that is on the axis up to round-off at either place does not.
+    """
+    sides = []
+    for s in (at - _BESIDE * segment.step, at + _BESIDE * segment.step):
+        trial = segment.near(s)
+        system: Any = trial.system
+        values = system.eigenvalues(trial.x)
+        sides.append(values[np.argmin(np.abs(values - 1j * frequency))].real)
+    return bool(sides[0] * sides[1] < 0)
+
+
+def _pairs_at(point: SpecialPoint) -> int:
+    """Return how many pairs lie on the imaginary axis at a Hopf point."""
+    values = _upper(point.trial)
+    return int(np.count_nonzero(_is_complex(values) & (np.abs(values.real) < _ON_AXIS * (1 + np.abs(values)))))
+
+
+def _count_at(point: SpecialPoint, found: list[SpecialPoint], segment: Segment) -> int:
+    """Return how many of the points found lie at the place of one of them."""
+    return sum(abs(point.at - other.at) <= _TOGETHER * segment.step for other in found)
+
+
+def _joined(found: list[SpecialPoint], segment: Segment) -> list[SpecialPoint]:
+    """Return the points, those at one place joined."""
+    result: list[SpecialPoint] = []
+    for point in found:
+        if result and point.at - result[-1].at <= _TOGETHER * segment.step and point.trial is not result[-1].trial:
+            if _pairs_at(point) > result[-1].details["pairs"]:
+                result[-1].details["pairs"] += 1
+        else:
+            result.append(point)
+    return result

@@ -1,0 +1,424 @@
+"""Inspection of a step: does it stay on its branch, and which special points does it pass?
+
+In order: the end on the trivial branch, or a branch point, or several; zeros of the test functions, looked for between the
+folds; the folds; the end of a closed branch. What was located is sorted by its distance along the step.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.core.protocol import Discretization, inner
+from contin.core.settings import Settings
+from contin.core.state import Reason, Stop
+from contin.core.trial import Linearization, TestFunction, Trial
+from contin.events.branch_point import BranchPoint
+from contin.events.branch_points import BranchPointSearch
+from contin.events.folds import FoldSearch
+from contin.events.segment import Place, Segment, SpecialPoint, stop_of
+from contin.events.trivial import crossed, round_off
+
+#: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
+#: labelled already.
+_AT_START = 1e-6
+#: Special points closer than this are at one place: those that coincide exactly are located 1e-15 to 1e-9 apart. Ten times
+#: larger, points that are distinct in the digits shown could change places.
+_AT_ONCE = 1e-8
+#: A zero of a test function that also vanishes at a fold or branch point nearer than this part of the step is that point: the
+#: place of a fold is known to 2e-4 of a step. Ten times larger, a second zero beside it could be passed.
+_CLOSE = 1e-3
+#: This close to a branch point tangents are round-off: the square root of it, times ten.
+_BLURRED = 1e-7
+#: A test function is zero at the first point of a run where it is smaller by this factor than at the next: a corrected point
+#: that lies on the zero misses it by the corrector's tolerance.
+_ON_ZERO = 1e-8
+#: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
+_STANDS = 1e-11
+#: A tangent's component at a branch point below this is zero: tangents there come from differences with an error of 1e-8.
+_STATIONARY = 1e-7
+#: A test function vanishes at a special point where it is smaller there by this factor than at the larger end of the step: as
+#: exactly as branch points are located. Values that are typed as round numbers coincide exactly.
+_COINCIDENT = 1e-10
+#: The same on a mesh: where zero and special point coincide in the problem, they differ by the error of the discretization.
+_NEARLY = 1e-6
+#: Zeros of a test function that vanishes at a special point are looked for from this part of the step on beside it.
+_BESIDE = 1e-4
+#: The branch point where a branch ends on the trivial one has the trivial quantity at zero to this part of its values at the
+#: ends of the step; another branch point inside the step has not.
+_TRIVIAL = 1e-6
+_STRAYS = "the determinant changes its sign, and no branch point was found"
+_ADVICE = "a smaller max_step or accuracy, or more intervals may help"
+#: A branch can close on its first point after this many regular points.
+FEWEST = 3
+#: A closing branch comes back to its first point along its tangent there: with this cosine at least, ...
+_SAME_WAY = 0.5
+#: ... and at a distance of this part of the step at most.
+_BACK = 0.1
+#: A first point inside a step is not further than so many steps from its end, nor from both ends together.
+REACH = 2
+#: A fold within this distance, absolute and as a part of the step, of a point where branches cross is that point ...
+_SAME, _SAME_SHARE = 1e-4, 2e-3
+#: ... unless the parameter goes from the one to the other by what the tangent at the crossing says, up to this factor.
+_EXPLAINED = 2.0
+
+#: The first point of a run: system, x, tangent.
+Start = tuple[Discretization, Array, Array]
+
+
+class Inspection:
+    """The inspection of one step.
+
+    Parameters
+    ----------
+    segment : Segment
+    settings : Settings
+    start : tuple (system, x, tangent)
+        The first point of the run, to recognise a closed branch.
+    fold : TestFunction, optional
+        The tangent's component of the primary parameter; None where folds are not looked for.
+    """
+
+    def __init__(self, segment: Segment, settings: Settings, start: Start, fold: TestFunction | None) -> None:
+        self.segment, self.settings, self.start, self.fold = segment, settings, start, fold
+        self.branch_points = BranchPointSearch(segment)
+        self._found: list[SpecialPoint] | None = None
+
+    # --- does the step stay on its branch? -----------------------------------------------------------------------
+
+    def doubt(self) -> str:
+        """Return why the step may have left its branch, or passes more than one point where branches cross; "" where not.
+
+        A change of the determinant's sign without a branch point means that Newton's method left the branch; so does one of the
+        trivial quantity without a zero of it on the branch.
+        """
+        if self._own_home is not None:
+            return ""  # the equations are singular there, and what they say of other points is blurred
+        count, clear = self.branch_points.count if self.settings.branch_points else (0, True)
+        if not clear:
+            return "the linearized equations come close to singular: branch points may have been passed"
+        if self._home is not None and not self._home.is_located:
+            return f"{self.settings.trivial} changes its sign, and no zero of it was found on the branch"
+        if not self.settings.branch_points:
+            return ""
+        if count > 1:
+            located, what = self.branch_points.multiple.is_located, f"{count} branch points in one step were not told apart"
+        else:
+            located = not self.branch_points.sign_changes or self.branch_points.simple.is_located
+            what = _STRAYS
+        return "" if located else what
+
+    def strays(self, tests: Iterable[TestFunction]) -> str:
+        """Return why the step may have left its branch by its folds and, where branch points are not looked for, by its sign.
+
+        Where the parameter turns on the branch, a fold is located. The determinant changes its sign where branches cross,
+        labelled or not, and where a kind of problem knows its equations to be singular. Otherwise Newton's method left the
+        branch: another arm of it beside a fold is passed the other way.
+        """
+        primary: Any = self.fold and self.fold.name
+        for point in self.special_points(tests) if self._folds else []:
+            if point.stop is not None:
+                break  # what lies beyond the end of the run is none of its branch
+            if not point.is_located and any(point is fold for fold in self._folds):
+                return f"{primary} turns, and no fold was found on the branch"
+        if self.settings.branch_points or self._own_home is not None or not self.branch_points.sign_changes:
+            return ""
+        for point in self.special_points(tests):
+            ends = point.stop is not None and not (point.test is not None and point.test.limit)
+            if point.is_located and (point.label == "BP" or ends):
+                return ""
+        return "" if self.branch_points.simple.is_located else _STRAYS
+
+    # --- special points ------------------------------------------------------------------------------------------
+
+    def special_points(self, tests: Iterable[TestFunction]) -> list[SpecialPoint]:
+        """Return the special points inside the step, in order; they are looked for once.
+
+        Raises
+        ------
+        ConvergenceError
+            A point inside the step that is needed to tell is not found.
+        """
+        if self._found is None:
+            self._found = self._searched(tests)
+        return self._found
+
+    def _searched(self, tests: Iterable[TestFunction]) -> list[SpecialPoint]:
+        found: list[SpecialPoint] = []
+        home = self._home
+        if home is not None:
+            found.append(home)
+        elif self.settings.branch_points and self.branch_points.count[0] > 1:
+            found.append(self.branch_points.multiple)
+        elif self.settings.branch_points and self.branch_points.sign_changes:
+            found.append(self.branch_points.simple)
+        crossings = [point for point in found if point.is_located]
+        for test in tests:
+            found += self._zeros(test, crossings)
+        found += [fold for fold in self._folds if not self._same_place(fold, found)]
+        found = [point for point in found if not self._at_the_start(point)]
+        closed = self._closed()
+        if closed is not None:
+            found.insert(0, closed)  # the first point once more, which was labelled already
+        return _in_order(found)
+
+    def _at_the_start(self, point: SpecialPoint) -> bool:
+        """Return whether a special point is the first point of the run once more."""
+        state = self.segment.state
+        near = max(_AT_START * self.segment.step, _BLURRED if state.singular else 0.0)
+        return state.accepted == 0 and point.stop is None and point.at < near
+
+    # --- folds ---------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _folds(self) -> list[SpecialPoint]:
+        """Folds with respect to the primary parameter, in order."""
+        if self.fold is None:
+            return []
+        return FoldSearch(self.segment, self.fold, self._pitchfork).find()
+
+    @property
+    def turns(self) -> bool:
+        """The primary parameter turns inside the step, be it where branches cross."""
+        return bool(self._folds)
+
+    def _pitchfork(self) -> SpecialPoint | None:
+        """Return the fold of a pitchfork, right at the branch point inside the step; None if there is none."""
+        fold: Any = self.fold
+        if self._home is not None:
+            found = dataclasses.replace(self._home, stop=None)
+        elif self.settings.branch_points and self.branch_points.sign_changes:
+            found = self.branch_points.simple
+        else:
+            return None
+        if not isinstance(found.details, BranchPoint) or not found.details.tangents:
+            return None
+        component = found.details.tangents[0][self.segment.trial.system.parameter_index(fold.name)]
+        stationary = abs(component) < _STATIONARY
+        return dataclasses.replace(found, label=fold.label, name=fold.name, test=fold) if stationary else None
+
+    # --- zeros of test functions ---------------------------------------------------------------------------------
+
+    def _zeros(self, test: TestFunction, crossings: list[SpecialPoint]) -> list[SpecialPoint]:
+        """Return the zeros of a test function, looked for between the folds. At a fold or branch point they lie right there."""
+        if test.asks is not None and not test.asks(self.segment):
+            return []
+        if test.search is not None:
+            points: list[SpecialPoint] | None = test.search(self.segment, self._knots)
+            if points is not None:
+                return points
+        state = self.segment.state
+        same = [point for point in (*self._folds, *crossings) if self._coincides(test, point)]
+        found = [self._at_special(test, point) for point in same if test.confirm is None or test.confirm(point.trial)]
+        for left, right in self._pieces(test, same):
+            before, after = left[1].value(test), right[1].value(test)
+            if state.accepted == 0 and left[0] == 0 and abs(before) < _ON_ZERO * abs(after):
+                before = 0.0  # the first point lies on the zero
+            if not test.passed(before, after):
+                continue
+            point = self.segment.locate(test, left, right)
+            if not point.is_located and (special := self._nearly(test, crossings)) is not None:
+                point = self._at_special(test, special)
+            again = any(abs(point.at - other.at) < _CLOSE * self.segment.step for other in same)
+            if not again and (test.confirm is None or test.confirm(point.trial)):
+                found.append(point)
+            if test.terminal:
+                break
+        return found
+
+    def _coincides(self, test: TestFunction, point: SpecialPoint) -> bool:
+        """Return whether a test function vanishes at a special point of the step."""
+        if self._at_the_start(point) or not point.is_located:
+            return False
+        largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
+        return bool(abs(point.trial.value(test)) <= _COINCIDENT * largest)
+
+    def _nearly(self, test: TestFunction, crossings: list[SpecialPoint]) -> SpecialPoint | None:
+        """Return the branch point at which a test function vanishes up to the discretization: nothing is located beside it."""
+        largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
+        return next((point for point in crossings if abs(point.trial.value(test)) <= _NEARLY * largest), None)
+
+    def _at_special(self, test: TestFunction, point: SpecialPoint) -> SpecialPoint:
+        """Return the zero of a test function that lies at a special point."""
+        details = None if test.describe is None else test.describe(point.trial)
+        return SpecialPoint(point.at, test.label, test.name, point.trial, stop_of(test), details, test, same_as=point)
+
+    def _pieces(self, test: TestFunction, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
+        """Return the pieces of the step between the folds, without what is right beside some special points."""
+        segment, aside = self.segment, _BESIDE * self.segment.step
+        between = self._looked_at(test, self._knots) if test.looks else self._knots
+        if not same:
+            return list(itertools.pairwise(between))
+        knots, cut = [], [point.at for point in same]
+        for place in between:
+            if not any(abs(place[0] - at) <= aside for at in cut) or place[0] in (0.0, segment.step):
+                knots.append(place)
+        beside = [s for at in cut for s in (at - aside, at + aside) if 0 < s < segment.step]
+        knots = sorted([*knots, *((s, segment.near(s)) for s in beside)], key=lambda place: place[0])
+        pairs = itertools.pairwise(knots)
+        return [(left, right) for left, right in pairs if not any(left[0] < at < right[0] for at in cut)]
+
+    def _looked_at(self, test: TestFunction, knots: list[Place]) -> list[Place]:
+        """Return the knots and, where a test function changes its sign inside the step more than once, places between them."""
+        inside = [self.segment.step * part / (test.looks + 1) for part in range(1, test.looks + 1)]
+        known = [
+            *((s, trial.value(test)) for s, trial in knots),
+            *((s, test.function(self.segment.guessed(s))) for s in inside),
+        ]
+        signs = np.sign([value for _, value in sorted(known)])
+        if np.count_nonzero(np.diff(signs)) <= 1:
+            return knots
+        return sorted([*knots, *((s, self.segment.near(s)) for s in inside)], key=lambda place: place[0])
+
+    @functools.cached_property
+    def _knots(self) -> list[Place]:
+        """Return places, each behind the one before, between which a test function has one zero at most, if all is seen."""
+        segment = self.segment
+        folds = [(fold.at, fold.trial) for fold in self._folds if 0 < fold.at < segment.step]
+        return [(0.0, segment.beginning()), *folds, (segment.step, segment.trial)]
+
+    # --- ends ----------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _own_home(self) -> SpecialPoint | None:
+        """The end of the branch that the kind of problem knows."""
+        return self.segment.trial.system.home(self.segment)
+
+    @functools.cached_property
+    def _home(self) -> SpecialPoint | None:
+        """The end of a branch inside the step."""
+        return self._trivial_end if self._own_home is None else self._own_home
+
+    @functools.cached_property
+    def _trivial_end(self) -> SpecialPoint | None:
+        """The end of a branch on the trivial one, where ``settings.trivial`` crosses zero; not located without a zero there.
+
+        It is the branch point inside the step if the quantity is zero there, else the quantity's zero. Either must lie on the
+        cubic through both ends of the step: elsewhere it belongs to another branch.
+        """
+        segment, name = self.segment, self.settings.trivial
+        before, trial = segment.before, segment.trial
+        if name is None or not crossed(before, trial, name, segment.newton):
+            return None
+        stop = Stop(Reason.TRIVIAL_BRANCH, f"returned to the trivial branch ({name} = 0)")
+        if not self.settings.branch_points or self.branch_points.sign_changes:
+            point = self.branch_points.simple
+            if self._is_home(point):
+                return dataclasses.replace(point, label="EP", name="trivial branch", stop=stop)
+        test = TestFunction("EP", "trivial branch", lambda there: there[name], terminal=True)
+        point = segment.locate(test, (segment.low, before), (segment.step, trial))
+        if self._is_home(point):
+            return dataclasses.replace(point, stop=stop)
+        stop = Stop(Reason.NO_CONVERGENCE, f"{name} changed its sign, but no zero of it was found on the branch", _ADVICE)
+        return SpecialPoint(segment.step, "MX", "trivial branch", trial, stop, is_located=False)
+
+    def _is_home(self, point: SpecialPoint) -> bool:
+        """Return whether the trivial quantity vanishes at a point on the branch."""
+        segment, name = self.segment, self.settings.trivial
+        assert name is not None
+        largest = max(abs(segment.before[name]), abs(segment.trial[name]))
+        zero = max(_TRIVIAL * largest, round_off(point.trial, name, segment.newton))
+        if not point.is_located or abs(point.trial[name]) > zero:
+            return False
+        return segment.passes_by(point.trial.x, point.at)
+
+    def may_close(self) -> bool:
+        """Return whether the first point of the run may lie in this step."""
+        segment = self.segment
+        if segment.state.accepted < FEWEST:
+            return False
+        return not is_elsewhere(self.start, segment.beginning(), segment.trial, segment.step)
+
+    def _closed(self) -> SpecialPoint | None:
+        """Return the end of a branch that comes back to its first point."""
+        segment = self.segment
+        state, trial, step = segment.state, segment.trial, segment.step
+        home, x, tangent = self.start
+        if not self.may_close():
+            return None
+        if home is not state.system:
+            carry = home.carrier(state.system)
+            x, tangent = carry(x), carry(tangent)
+            if home.scales is not state.system.scales:
+                tangent = tangent / np.sqrt(inner(state.system, tangent, tangent))
+        size = state.system.state_size
+        if np.max(np.abs(x[size:] - trial.x[size:])) > REACH * step:
+            return None
+        x = state.system.lifted(x, trial.x)
+        first, (leaving,) = state.system.in_phase(x, (tangent,), trial.x)
+        passed = [inner(state.system, end - first, leaving) for end in (state.x, trial.x)]
+        if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, leaving) < _SAME_WAY:
+            return None
+        at = step * passed[0] / (passed[0] - passed[1])
+        off = segment.guess(at) - first
+        if np.sqrt(inner(state.system, off, off)) > _BACK * step:
+            return None
+        there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
+        return SpecialPoint(at, "EP", "closed", there, Stop(Reason.CLOSED, "the branch closed on its first point"))
+
+    def _same_place(self, fold: SpecialPoint, found: list[SpecialPoint]) -> bool:
+        """Return whether a fold is no special point of its own: the parameter also turns where branches cross, and at a cusp.
+
+        Close to a crossing the tangent is the less certain the closer, so "at" means within a small part of the step.
+        """
+        others = [other for other in found if other.label in ("BP", "CP") or other is self._home or other.turns_back]
+        if fold.label != "LP" or not others:
+            return False
+        if not fold.is_located:  # the equations are singular at the crossing: nothing else was found
+            return True
+        near = _SAME + _SAME_SHARE * self.segment.step
+        close = [other for other in others if np.max(np.abs(fold.trial.x - other.trial.x)) < near]
+        return any(not self._is_beside(fold, other) for other in close)
+
+    def _is_beside(self, fold: SpecialPoint, crossing: SpecialPoint) -> bool:
+        """Return whether a fold near a branch point is another point, as the parameter does not turn at that.
+
+        With the rate c there, and the fold at a distance d, it differs by c d / 2.
+        """
+        if not isinstance(crossing.details, BranchPoint) or not crossing.details.tangents:
+            return False
+        at = self.segment.trial.system.parameter_index(fold.name)
+        rate, p = crossing.details.tangents[0][at], crossing.trial.x[at]
+        change, expected = fold.trial.x[at] - p, rate * (fold.at - crossing.at) / 2
+        if abs(rate) < _STATIONARY or abs(change) < _STANDS * (1 + abs(p)):
+            return False
+        return bool(1 / _EXPLAINED < change / expected < _EXPLAINED)
+
+
+def is_elsewhere(start: Start, before: Trial, trial: Trial, step: float) -> bool:
+    """Return whether the first point of a run is certainly not in a step: it is too far from both ends together.
+
+    Without this each step would carry the first point to its mesh and bring it in phase.
+    """
+    system, (home, x, _) = trial.system, start
+    if home.scales is not system.scales:
+        return False
+    first, size = x[home.state_size :].tolist(), system.state_size
+    if sum(math.dist(first, end.x[size:].tolist()) for end in (before, trial)) > REACH * step:
+        return True  # the free parameters are
+    kept, ends = home.lasting(x), (system.lasting(end.x) for end in (before, trial))
+    return sum(math.dist(kept, end) for end in ends) > REACH * step
+
+
+def _in_order(points: list[SpecialPoint]) -> list[SpecialPoint]:
+    """Return special points in order of their places; of those at one place the ones without a test function and folds first.
+
+    Others stay as given.
+    """
+    ranked = sorted(points, key=lambda point: point.test is not None and point.test.label != "LP")
+    rank = {id(point): number for number, point in enumerate(ranked)}
+    along = sorted(ranked, key=lambda point: point.at)
+    groups: list[list[SpecialPoint]] = []
+    for point in along:
+        if groups and point.at - groups[-1][-1].at < _AT_ONCE:
+            groups[-1].append(point)
+        else:
+            groups.append([point])
+    return [point for group in groups for point in sorted(group, key=lambda point: rank[id(point)])]

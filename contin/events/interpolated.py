@@ -1,0 +1,189 @@
+"""A zero of test functions at a point where the equations are singular: interpolated from points of the curve around it.
+
+A curve of folds that comes to a pitchfork goes on smoothly (as its mirror image), but its equations are singular there, and
+Newton's method leaves an error of the square root of round-off or worse. Points beside it are as exact as any others. The curve
+is a smooth function of the distance along a tangent, so a polynomial through points on both sides of the zero gives it:
+
+1. Take points at Chebyshev nodes around the place where a straight line through the ends of the step has its zero.
+2. Find the zero of the polynomial through the values of the test function, near the middle.
+3. Evaluate the polynomial through the points there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from contin.arrays import Array
+from contin.collocation.basis import interpolation
+from contin.core.newton import Newton, rounded_off
+from contin.core.protocol import Carrier, Discretization, inner
+from contin.core.state import State, standing_at
+from contin.core.step import located
+from contin.core.trial import Linearization, Trial
+from contin.errors import ConvergenceError
+from contin.events.root import find_zero
+from contin.events.segment import Segment
+
+#: Numbers of nodes, even: none is right at the zero. The second number is for the error estimate.
+_NODES = 12, 10
+#: Half the width of the interval of the nodes as parts of the step: narrow ones suffer from nodes that are close to the zero,
+#: wide ones from bends of the curve. The one with the smallest estimated error is taken.
+_WIDTHS = (2.0, 1.0, 0.5, 0.25)
+#: Points that an extrapolation goes through, at most, and points without one, which lie close to the beginning of the step.
+_BEHIND, _FEWEST = 6, 2
+#: At the zero of the first test function the others are below this part of their largest value.
+_TOGETHER = 1e-3
+
+#: Functions of a trial point.
+Functions = Sequence[Callable[[Trial], float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """The places of the nodes on the tangent of a state: an interval, by its middle and half its width, and their number."""
+
+    state: State
+    middle: float
+    width: float
+    count: int
+
+    @property
+    def places(self) -> Array:
+        """Chebyshev nodes, as distances along the tangent."""
+        return np.asarray(self.middle + self.width * np.sort(chebyshev.chebpts1(self.count)), dtype=float)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of the interval."""
+        return self.middle - self.width, self.middle + self.width
+
+
+@dataclass(frozen=True, eq=False)
+class InterpolatedZero:
+    """A common zero of test functions, between points of a curve.
+
+    Attributes
+    ----------
+    trial : Trial
+        The point, with the tangent of the polynomial.
+    at : float
+        Distance along the state's tangent.
+    window : Window
+    points : ndarray, shape (count, size)
+        x at the nodes.
+    functions : sequence of callable
+        The first one has its zero there.
+    newton_error : float
+        Largest error that Newton's method has left of a point, relative to 1 + |x|: so near to a singular point, zeros on two
+        meshes may agree better.
+    """
+
+    trial: Trial
+    at: float
+    window: Window
+    points: Array
+    functions: Functions
+    newton_error: float
+
+    @property
+    def noise(self) -> Array:
+        """By how much the unknowns of the nearest of the points change by round-off, shape (size,)."""
+        nearest, system = int(np.abs(self.window.places - self.at).argmin()), self.trial.system
+        return rounded_off(system, self.points[nearest], (system.weights * self.window.state.tangent,))
+
+    def again(self, system: Discretization, carry: Carrier, newton: Newton) -> InterpolatedZero:
+        """Return the same zero on another mesh, with another number of nodes: the change is the error of both.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        old = self.window
+        state = standing_at(system, carry(old.state.x), carry(old.state.tangent), old.state.step)
+        window = Window(state, self.at, old.width, _NODES[old.count == _NODES[0]])
+        through = _polynomial(old, self.points)
+        points = [located(state, carry(through(place)), float(place), newton) for place in window.places]
+        return _interpolated(window, points, self.functions)
+
+
+def interpolated_zero(segment: Segment, functions: Functions, near: float) -> InterpolatedZero | None:
+    """Return the common zero of test functions inside a step; None where there is none, or no points around it are found."""
+    best, least = None, np.inf
+    for share in _WIDTHS:
+        try:
+            windows = [Window(segment.state, near, share * segment.step, count) for count in _NODES]
+            found, other = (_around(segment, window, functions) for window in windows)
+        except ConvergenceError:
+            continue
+        change = float(np.abs(found.trial.x - other.trial.x).max())
+        if change < least:
+            best, least = found, change
+    return best
+
+
+def _around(segment: Segment, window: Window, functions: Functions) -> InterpolatedZero:
+    """Return the zero from points that are found one after the other, each from an extrapolation of those before.
+
+    The end of the step may be so near to the zero that neither its tangent nor its factors are of use.
+    """
+    state, points = segment.state, list[Trial]()
+    places = window.places
+    for number, place in enumerate(places):
+        known = slice(max(0, number - _BEHIND), number)  # those right behind
+        if number < _FEWEST:
+            guess = state.x + place * state.tangent
+        else:
+            guess = _through(places[known], points[known], place)
+        points.append(located(state, guess, float(place), segment.newton))
+    return _interpolated(window, points, functions)
+
+
+def _through(places: Array, points: Sequence[Trial], place: float) -> Array:
+    """Return the polynomial through points at a place beyond them, shape (size,)."""
+    weights = 1 / np.prod(places[:, None] - places + np.eye(len(places)), axis=1)
+    guess: Array = interpolation(places, weights, np.array([place]))[0] @ np.array([point.x for point in points])
+    return guess
+
+
+def _interpolated(window: Window, points: Sequence[Trial], functions: Functions) -> InterpolatedZero:
+    """Return the zero from the points at the nodes.
+
+    Raises
+    ------
+    ConvergenceError
+        The functions have no common zero in the middle half of the window.
+    """
+    values = np.array([[function(point) for function in functions] for point in points])
+    test = _polynomial(window, values)
+    left, right = (
+        (place, float(test(place)[0])) for place in (window.middle - window.width / 2, window.middle + window.width / 2)
+    )
+    if not left[1] * right[1] < 0:
+        raise ConvergenceError("no zero in the middle half of the window")
+    at = find_zero(lambda place: float(test(place)[0]), left, right, np.finfo(float).eps * window.width)
+    if np.any(np.abs(test(at)) > _TOGETHER * np.abs(values).max(axis=0)):
+        raise ConvergenceError("the test functions have no common zero")
+    unknowns = np.array([point.x for point in points])
+    through = _polynomial(window, unknowns)
+    along, system = through(at, 1), window.state.system
+    tangent = np.asarray(along, dtype=float) / float(np.sqrt(inner(system, along, along)))
+    trial = Trial(system, through(at), Linearization(tangent, np.nan))
+    return InterpolatedZero(trial, at, window, unknowns, functions, max(point.newton_error for point in points))
+
+
+def _polynomial(window: Window, rows: Array) -> Callable[..., Array]:
+    """Return the polynomial through rows (count, m) at the nodes: a function of the place, and of the order of a derivative."""
+    scaled = (window.places - window.middle) / window.width
+    first = rows.mean(axis=0)  # what is common to all would bring its round-off
+    weights = chebyshev.chebfit(scaled, rows - first, window.count - 1)
+
+    def value(place: float, order: int = 0) -> Array:
+        derived = chebyshev.chebder(weights, order)
+        found: Array = np.asarray(chebyshev.chebval((place - window.middle) / window.width, derived))
+        return found + first if order == 0 else found
+
+    return value

@@ -1,0 +1,305 @@
+"""Error estimates of special points: each is located again on finer meshes, until it no longer moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.core.newton import Newton
+from contin.core.protocol import Carrier, Discretization, inner
+from contin.core.settings import Settings
+from contin.core.settling import ROUNDS
+from contin.core.state import standing_at
+from contin.core.step import located
+from contin.core.trial import Linearization, TestFunction, Trial
+from contin.errors import ConvergenceError
+from contin.events.branch_point import BranchPoint, locate_branch_point, rounded_off
+from contin.events.interpolated import InterpolatedZero
+from contin.events.multiple_point import MultiplePoint, locate_multiple_point
+from contin.events.segment import SpecialPoint
+
+#: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
+_FAR = 0.05
+#: Jumps of second derivatives at mesh points, relative to the largest, that show a corner where halving the mesh leaves more
+#: than the second number of them. Smooth solutions leave a half at degree 2, a quarter at degree 3.
+BENT, _FALLS = 1e-4, 0.7
+#: Cosine between the kernels of a branch point on two meshes, below which they are two points.
+_SAME_KERNEL = 0.9
+#: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
+_HALVINGS = 4
+#: An error is given as no less than so many units in the last place of the largest parameter.
+_UNITS = 16
+#: The secant method begins with a step of this length; it ends with one below the second number or, failing, after so many.
+_FIRST, _LAST, _SECANTS = 1e-3, 1e-9, 12
+#: Where it fails, the place is known as far as the function grows on both sides, with different signs: distances at which it
+#: is looked at grow by the first factor, its values at least by the second. Round-off does not grow, and a square root does by
+#: 3.2. The ± is too large by the square of the first at most.
+_WIDER, _GROWS = 10.0, 3.0
+#: Largest change of an unknown over which the slope of a test function is taken: the cube root of round-off.
+_ASIDE = 1e-5
+#: Rates of a parameter below this on both sides of a fold are round-off: on a plateau it changes by 1e-15 on the first step.
+_FLAT = 1e-12
+#: A step of it that leads further than this from the point of the coarser mesh, in units of the arclength, ends it, too.
+_AWAY = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A special point on the finest mesh that it was located on.
+
+    Attributes
+    ----------
+    trial : Trial
+    errors : dict
+        By how much its free parameters differ from those on the mesh before; NaN where it could not be located again.
+    details : object
+    is_lost : bool
+        It was looked for, and is not there. Where Newton's method fails, nothing is known: the point is not lost.
+    """
+
+    trial: Trial
+    errors: dict[str, float]
+    details: Any
+    is_lost: bool = False
+
+
+class _Elsewhere(ConvergenceError):
+    """What was found again is another point, or nothing: the one that was looked for is not there."""
+
+
+#: A special point on another mesh: the point, its details, and how far from it along the branch its place may be.
+_Found = tuple[Trial, Any, float]
+
+
+def refined(point: SpecialPoint, settings: Settings) -> Refined:
+    """Locate a special point again on a mesh halved until its free parameters agree to the mesh tolerance.
+
+    Without a mesh the point is located once more from where it is: what then changes is the error of its location. A point that
+    is not the coarse one again (far from it, another kernel, or further off than the mesh before) is dropped; one for which
+    Newton's method fails stays as it is, and has no errors. On a mesh of more
+    than ``max_intervals`` intervals only the estimate is made: the point stays on the one before.
+    """
+    trial, details, last = point.trial, point.details, np.inf
+    errors = dict.fromkeys(trial.system.free, np.nan)
+    if isinstance(details, MultiplePoint) and details.x is None:
+        return Refined(trial, errors, details, is_lost=True)
+    try:
+        trial, details, left = _on_switches(point, (trial, details, 0.0), settings.newton)
+    except ConvergenceError:
+        return Refined(trial, errors, details, is_lost=True)
+    is_lost = False
+    for _ in range(_HALVINGS):
+        coarse = trial.system
+        finer = coarse.refined()
+        system, carry = finer or (coarse, np.array)
+        try:
+            again = _again(point, trial, details, (system, carry), settings.newton)
+            better, found, left = _on_switches(point, again, settings.newton)
+        except ConvergenceError as error:
+            is_lost = last == np.inf and isinstance(error, _Elsewhere)
+            break
+        system = better.system
+        steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
+        size = 1 + np.abs(better.x[system.state_size :])
+        steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
+        if isinstance(found, BranchPoint):
+            left = left + rounded_off(system, found, settings.newton)[system.state_size :]
+        if np.any(steps > _FAR * size) or np.max(steps / size) > last:
+            is_lost = last == np.inf
+            break
+        settled, steps = np.maximum(settings.mesh.tolerance * size, left) >= steps, steps + left
+        known = steps + _split(found, system)  # a curve of branch points has one unknown more
+        sizes = known[: len(system.free)] * system.free_scales
+        errors, last = dict(zip(system.free, map(float, sizes))), np.max(steps / size)
+        if finer is not None and _is_bent(trial, better):
+            return Refined(trial, dict.fromkeys(errors, np.nan), details, is_lost=True)
+        if finer is None or (system.intervals > settings.mesh.max_intervals and settings.mesh.every):
+            break  # such a mesh serves the estimate only
+        trial, details = better, found
+        if np.all(settled):
+            break
+    return Refined(trial, _with_cut_off(errors, trial, point.test, settings), details, is_lost)
+
+
+def _with_cut_off(errors: dict[str, float], trial: Trial, test: TestFunction | None, settings: Settings) -> dict[str, float]:
+    """Return the errors of the free parameters, and what cutting off an infinite time adds to them.
+
+    A special point moves along the branch, too, to where its test function vanishes again, a first point to where the primary
+    parameter has its value; a fold stays where it is.
+    """
+    system, along = trial.system, trial.tangent
+    moves = system.cut_off_errors(trial.x, trial.factors) if np.isfinite(along).all() else np.empty((0, system.size))
+    if not len(moves) or not np.isfinite(moves).all():
+        return errors
+    if test is None:
+        primary = settings.primary or system.free[0]
+        test = TestFunction("EP", "start", lambda trial: trial[primary])
+    if test.label != "LP":
+        size = float(np.abs(along).max())
+        slope = _change(test, trial, along * (_ASIDE / size)) * size
+        for move in moves:
+            largest = float(np.abs(move).max())
+            move -= along * (_change(test, trial, move * (_ASIDE / largest)) * largest / slope if largest and slope else 0.0)
+    added = np.abs(moves[:, system.state_size :]).sum(axis=0)[: len(system.free)] * system.free_scales
+    return {name: error + float(more) for (name, error), more in zip(errors.items(), added)}
+
+
+def _change(test: TestFunction, trial: Trial, move: Array) -> float:
+    """Return by how much a test function changes from a point to one beside it, over the distance of differences."""
+    ends = [test.function(Trial.without_tangent(trial.system, trial.x + way * move)) for way in (1, -1)]
+    return (ends[0] - ends[1]) / (2 * _ASIDE)
+
+
+def _is_bent(trial: Trial, better: Trial) -> bool:
+    """Return whether functions in Python have a corner or a jump: errors of second derivatives do not fall on a finer mesh.
+
+    Two meshes may agree there by chance: a corner close beside a mesh point is seen by neither.
+    """
+    first, again = trial.system.bends(trial.x), better.system.bends(better.x)
+    if first is None or again is None:
+        return False
+    return bool(again.max() > max(BENT, _FALLS * first.max()))
+
+
+def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Trial, Any, Any]:
+    """Return a special point on a mesh with points where conditions that the solution decides switch.
+
+    Returned last is how far its free parameters may be from their values: by how much they changed when mesh points were moved
+    there the last time, and what they change along the branch over the distance that its place is known to.
+
+    Raises
+    ------
+    ConvergenceError
+        It was not found on such a mesh, or the places do not settle.
+    """
+    trial, details, apart = found
+    moves: Any = 0.0
+    for _ in range(ROUNDS):
+        moved = trial.system.on_switches(trial.x, closely=True)
+        if moved is None:
+            break
+        before = trial.x[trial.system.state_size :]
+        trial, details, apart = _again(point, trial, details, moved, newton)
+        moves = np.abs(trial.x[trial.system.state_size :] - before)
+    if apart:
+        moves = moves + apart * np.abs(trial.tangent[trial.system.state_size :])
+    return trial, details, moves
+
+
+def _split(details: Any, system: Discretization) -> Any:
+    """Return by how much free parameters differ between a multiple point and the simple ones that it may consist of.
+
+    Of a zero that was interpolated: the error that Newton's method, or round-off, has left of the points around it.
+    """
+    if isinstance(details, InterpolatedZero):
+        left = details.newton_error * (1 + np.abs(details.trial.x[system.state_size :]))
+        return np.maximum(left, details.noise[system.state_size :])
+    if not isinstance(details, MultiplePoint):
+        return 0.0
+    return details.spread * np.abs(details.tangents[0][system.state_size :])
+
+
+def _again(point: SpecialPoint, trial: Trial, details: Any, finer: tuple[Discretization, Carrier], newton: Newton) -> _Found:
+    """Return the special point and its details on another mesh.
+
+    Raises
+    ------
+    ConvergenceError
+        It was not found, or another one was.
+    """
+    system, carry = finer
+    if isinstance(details, MultiplePoint):
+        home = system.weights * carry(details.tangents[0])
+        again = locate_multiple_point(system, carry(trial.x), home, details.dimension, newton)
+        assert again.x is not None
+        return Trial(system, again.x, Linearization(carry(trial.tangent), np.nan)), again, 0.0
+    if isinstance(details, InterpolatedZero):
+        zero = details.again(system, carry, newton)
+        return zero.trial, zero, 0.0
+    if isinstance(details, BranchPoint) or (point.label == "BP" and point.test is None):
+        found = _branch_point_again(system, carry, trial.x, details, newton)
+        return Trial(system, found.x, Linearization(carry(trial.tangent), np.nan)), found, 0.0
+    zero_again, apart = _zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton)
+    return zero_again, details, apart
+
+
+def _branch_point_again(
+    system: Discretization, carry: Carrier, x: Array, details: BranchPoint | None, newton: Newton
+) -> BranchPoint:
+    """Return the branch point with the same kernel on another mesh; the nearest one where no kernel is known."""
+    if details is None:
+        return locate_branch_point(system, carry(x), newton)
+    kernel = np.array([carry(vector) for vector in details.kernel])
+    found = locate_branch_point(system, carry(x), newton, kernel)
+    overlap = found.kernel @ (system.weights * kernel[:, : system.size]).T
+    if np.linalg.svd(overlap, compute_uv=False)[-1] < _SAME_KERNEL:
+        raise _Elsewhere("another branch point was found on the finer mesh")
+    return found.along(system, carry(details.tangents[0])) if details.tangents else found
+
+
+def _zero_again(
+    system: Discretization, x: Array, tangent: Array, test: TestFunction | None, newton: Newton
+) -> tuple[Trial, float]:
+    """Return the zero of a test function near x, by the secant method along the tangent; without one, x corrected.
+
+    With how far off it may lie: where round-off of the function ends the secant method, the sign of the function decides.
+
+    Raises
+    ------
+    ConvergenceError
+        Newton's method fails, or there is no zero.
+    """
+    state = standing_at(system, x, tangent / np.sqrt(inner(system, tangent, tangent)), 1.0)
+
+    def at(s: float) -> Trial:
+        trial = located(state, x + s * state.tangent, s, newton)
+        for _ in range(ROUNDS):
+            moved = trial.system.on_switches(trial.x, closely=True)
+            if moved is None:
+                break
+            carry = system.carrier(moved[0])
+            base, along = carry(x), carry(state.tangent)
+            there = standing_at(moved[0], base, along / np.sqrt(inner(moved[0], along, along)), 1.0)
+            trial = located(there, moved[1](trial.x), s, newton)
+        return trial
+
+    trial = here = at(0.0)
+    if test is None:
+        return trial, 0.0
+    s, last, value = _FIRST, 0.0, test.function(trial)
+    for _ in range(_SECANTS):
+        if value == 0:
+            return trial, 0.0
+        trial, before = at(s), value
+        value = test.function(trial)
+        if test.label == "LP" and max(abs(before), abs(value)) < _FLAT:
+            return trial, 0.0  # the parameter stands still all around: its value there is that of the fold
+        if abs(s - last) < _LAST:
+            return trial, 0.0
+        if value == before:
+            break  # it does not depend on the place, and is not zero
+        s, last = s - value * (s - last) / (value - before), s
+        if abs(s) > _AWAY:
+            break  # such a zero is another one, or the function is round-off
+    return here, _known_to(lambda s: test.function(at(s)))
+
+
+def _known_to(function: Callable[[float], float]) -> float:
+    """Return the distance from which on a function grows on both sides of zero, with different signs.
+
+    Raises
+    ------
+    ConvergenceError
+        There is none: the function has no zero there, or is round-off.
+    """
+    apart, values = _LAST, np.zeros(2)
+    while apart <= _AWAY:
+        before, values = values, np.array([function(-apart), function(apart)])
+        if before[0] * before[1] < 0 and np.all(values / before > _GROWS):
+            return apart
+        apart *= _WIDER
+    raise _Elsewhere("the point was not found again on the finer mesh")

@@ -1,0 +1,281 @@
+"""The piece of a curve inside a step: points of it at any distance, and zeros of test functions on it."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from contin.arrays import Array
+from contin.core.newton import Newton, correct
+from contin.core.protocol import inner
+from contin.core.settling import settled
+from contin.core.small import corrected_small
+from contin.core.state import Reason, State, Stop
+from contin.core.step import located
+from contin.core.trial import Linearization, TestFunction, Trial, linearization
+from contin.errors import ConvergenceError
+from contin.events.root import find_zero
+
+#: Part of a step, and part of the corrector's tolerance of it, to which a zero is located: round-off of the place and, of the
+#: function, what the corrector leaves.
+_PRECISE, _SHARE = 1e-12, 1e-2
+#: Part of a step to which the place is known from which Newton's method begins that holds an unknown: it does the rest.
+_ROUGH = 1e-3
+#: Points of the curve lie no further off the cubic than this part of the step; others belong to another branch.
+_OFF = 0.1
+#: Least cosine between the tangents at both ends that the cubic is made with: accepted steps turn by less.
+LEAST_COSINE = 0.1
+
+#: Where on a step: the distance along the state's tangent, and the point.
+Place = tuple[float, Trial]
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """A point located inside a step.
+
+    Attributes
+    ----------
+    at : float
+        Distance from the beginning of the step, along the tangent there.
+    label, name : str
+        As in `TestFunction`.
+    trial : Trial
+    stop : Stop, optional
+        The run ends here.
+    details : object
+        As in `contin.Point`.
+    test : TestFunction, optional
+        Vanishes here.
+    same_as : SpecialPoint, optional
+        The fold or branch point that lies at the same place and is located better.
+    errors : mapping of str to float, optional
+        Errors of the free parameters, where they are known from how the point was found.
+    is_lost : bool
+        It was looked for on a finer mesh, and is not there.
+    is_located : bool
+        It was found, and not only bracketed.
+    """
+
+    at: float
+    label: str
+    name: str
+    trial: Trial
+    stop: Stop | None = None
+    details: Any = None
+    test: TestFunction | None = None
+    same_as: SpecialPoint | None = None
+    errors: Mapping[str, float] | None = None
+    is_lost: bool = False
+    is_located: bool = True
+
+    @property
+    def full_name(self) -> str:
+        """The name, for users: a "possible" one of a point that was only bracketed."""
+        return self.name if self.is_located else f"possible {self.name}".strip()
+
+    @property
+    def is_simple(self) -> bool:
+        """It was located, and one eigenvalue or pair is critical there."""
+        return self.is_located and isinstance(self.details, dict) and self.details.get("pairs") == 1
+
+    @property
+    def closes(self) -> bool:
+        """The branch closes here: it is the first point once more."""
+        return self.stop is not None and self.stop.reason == Reason.CLOSED
+
+    @property
+    def is_trivial(self) -> bool:
+        """The branch ends here, on the trivial one."""
+        return self.stop is not None and self.stop.reason == Reason.TRIVIAL_BRANCH
+
+    @property
+    def turns_back(self) -> bool:
+        """The curve ends here, on a symmetric solution: beyond, it is its own mirror image."""
+        return self.stop is not None and self.stop.reason == Reason.PITCHFORK
+
+
+class Segment:
+    """The piece of a curve between the state of a run and the corrected point at the end of a step.
+
+    Parameters
+    ----------
+    state : State
+    before : tuple (float, Trial)
+        Where test functions start from: the state's point or, where that is a branch point, one close to it; and its distance
+        along the state's tangent.
+    trial : Trial
+        The end, at ``step`` along the state's tangent.
+    step : float
+    newton : Newton
+    settles : bool
+        Points are settled (`contin.core.settling`).
+    """
+
+    def __init__(self, state: State, before: Place, trial: Trial, step: float, newton: Newton, settles: bool = False) -> None:
+        self.settles = settles
+        self.state, self.trial, self.step, self.newton = state, trial, step, newton
+        self.low, self.before = before
+        self._last: Place | None = None
+        #: Factors that the step left. Searches may take new ones; a resumed run, without factors of its first point from
+        #: Newton's method, does so in other steps.
+        self._factors = trial.factors if trial.is_linearized else None
+
+    @property
+    def is_moved(self) -> bool:
+        """The end is another point on a mesh with points where conditions switch."""
+        return self.trial.settled is not self.trial
+
+    def at(self, distance: float) -> Trial:
+        """Return the point of the curve at a distance along the state's tangent.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        if self._last is not None and self._last[0] == distance:
+            return self._last[1]
+        guess, factors = self.guess(distance), self.trial.factors if self._factors is None else self._factors
+        if self._last is not None:  # off the cubic by about as much as the last one was
+            place, last = self._last
+            guess = guess + last.x - self.guess(place)
+            factors = last.factors if last.is_linearized else factors
+        there = located(self.state, guess, distance, self.newton, factors)
+        if self.settles:
+            there = settled(there, self.state.tangent, self.newton)
+        self._last = distance, there
+        return there
+
+    def guess(self, distance: float) -> Array:
+        """Return the cubic through both ends and their tangents at a distance, shape (size,)."""
+        s = distance / self.step
+        found: Array = np.array([1.0, s, s * s, s * s * s]) @ self._cubic
+        return found
+
+    def direction(self, distance: float) -> Array:
+        """Return the derivative of the cubic at a distance, by the part of the step, shape (size,)."""
+        s = distance / self.step
+        found: Array = np.array([0.0, 1.0, 2 * s, 3 * s * s]) @ self._cubic
+        return found
+
+    @functools.cached_property
+    def _cubic(self) -> Array:
+        """The coefficients of the cubic by powers of the part of the step, shape (4, size)."""
+        state, trial, step = self.state, self.trial, self.step
+        ahead = trial.x - state.x
+        rate = step / max(inner(state.system, state.tangent, trial.tangent), LEAST_COSINE)
+        a, b = state.tangent * step, trial.tangent * rate
+        return np.array([state.x, a, 3 * ahead - 2 * a - b, a + b - 2 * ahead])
+
+    def passes_by(self, x: Array, at: float) -> bool:
+        """Return whether x lies near the cubic at a distance along the state's tangent, and not on another branch."""
+        gap = x - self.guess(at)
+        return float(np.sqrt(inner(self.state.system, gap, gap))) < _OFF * self.step
+
+    def guessed(self, distance: float) -> Trial:
+        """Return the cubic at a distance as a trial, with the state's tangent."""
+        return Trial(self.state.system, self.guess(distance), Linearization(self.state.tangent, float("nan")))
+
+    def near(self, distance: float) -> Trial:
+        """Return the point of the curve or, where Newton's method fails (close to a singular point), that of the cubic."""
+        try:
+            return self.at(distance)
+        except ConvergenceError:
+            return self.guessed(distance)
+
+    @property
+    def precision(self) -> float:
+        """Distance to which zeros are located."""
+        return max(_PRECISE, _SHARE * self.newton.tolerance) * self.step
+
+    def beginning(self) -> Trial:
+        """Return the state's point, be it a branch point."""
+        state = self.state
+        if not state.singular:
+            return self.before
+        return Trial(state.system, state.x, Linearization(state.tangent, state.sign))
+
+    def locate(self, test: TestFunction, left: Place, right: Place, guess: float | None = None) -> SpecialPoint:
+        """Return the zero of a test function between two places; where location fails, the second one, which is not located."""
+        (a, first), (b, last) = left, right
+        ends, is_located = (first.value(test), last.value(test)), True
+        try:
+            if test.holds_one_of(first.system.free) and ends[0] * ends[1] < 0:
+                held = self._held(test, left, right)
+                if held is not None:
+                    return SpecialPoint(held[0], test.label, test.name, held[1], stop_of(test), None, test)
+            if np.sign(ends[0]) == np.sign(ends[1]) or ends[0] == 0:  # a limit that the run starts on
+                at, there = a, first
+            else:
+                at = find_zero(lambda s: test.function(self.at(s)), (a, ends[0]), (b, ends[1]), self.precision, guess)
+                there = self.at(at)
+        except ConvergenceError:
+            at, there, is_located = b, last, False
+        details = None if test.describe is None else test.describe(there)
+        return SpecialPoint(at, test.label, test.name, there, stop_of(test), details, test, is_located=is_located)
+
+    def _held(self, test: TestFunction, left: Place, right: Place) -> Place | None:
+        """Return the place between two where a free parameter has a value, with that held; None if it is not found.
+
+        It begins where the cubic has the value. It finds no other place than one between the two, near the cubic.
+        """
+        assert test.value is not None
+        state, system = self.state, self.state.system
+        at = system.parameter_index(test.column)
+        value = test.value / system.free_scales[at - system.state_size]
+        one, two, three, four = self._cubic[:, at].tolist()
+
+        def gap(distance: float) -> float:
+            s = distance / self.step
+            return float(one + s * (two + s * (three + s * four)) - value)
+
+        ends = (left[0], gap(left[0])), (right[0], gap(right[0]))
+        if not ends[0][1] * ends[1][1] < 0:
+            return None
+        row = np.zeros(system.size)
+        row[at] = 1.0
+        try:
+            there = self._corrected(self.guess(find_zero(gap, *ends, _ROUGH * self.step)), row, value)
+        except ConvergenceError:
+            return None
+        place = inner(system, state.tangent, there.x - state.x)
+        inside = left[0] < place < right[0] and self.passes_by(there.x, place)
+        if not inside or (self.settles and system.on_switches(there.x) is not None):
+            return None
+        return place, there
+
+    def _corrected(self, guess: Array, row: Array, value: float) -> Trial:
+        """Return the point of the curve where a row has a value, with its tangent along the state's.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        system, state = self.state.system, self.state
+        small = corrected_small(system, guess, row, value, self.newton)
+        if small is None:
+            done = correct(system, guess, row, value, self.newton)
+            return Trial(system, done.x, lambda: linearization(system, done.x, state.row), done.iterations, done.error)
+        side = math.copysign(1.0, inner(system, state.tangent, small.tangent))  # the determinant goes with row.tangent
+        return Trial(system, small.x, Linearization(side * small.tangent, side * small.sign), small.iterations, small.error)
+
+
+def stop_of(test: TestFunction) -> Stop | None:
+    """Return the reason why a run ends at a zero of a test function; None where it goes on."""
+    if not test.terminal:
+        return None
+    if test.limit:
+        return Stop(Reason.LIMIT, f"reached {test.name}")
+    return Stop(Reason.EVENT, f"met {test.name}", event=test.name)
+
+
+def with_details(point: SpecialPoint, stop: Stop) -> SpecialPoint:
+    """Return a special point with the numbers that the reason of the end brings, unless it has details of another kind."""
+    if not stop.details or not isinstance(point.details, (dict, type(None))):
+        return point
+    return replace(point, details={**(point.details or {}), **stop.details})

@@ -1,0 +1,81 @@
+"""Test functions of user zeros, limits and folds, and what the coefficient of a normal form adds to a special point."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from contin.core.trial import TestFunction, Trial
+from contin.events.coefficient import Coefficient
+from contin.events.segment import Place, Segment, SpecialPoint
+from contin.names import value_names
+
+#: A point lies outside a limit where it is further off than this part of the way from the point before: it was located there to
+#: round-off otherwise.
+_OUTSIDE = 1e-6
+
+
+def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
+    """Return the test functions of points where a parameter or functional takes given values (AUTO's UZ).
+
+    A value that is given twice counts once. Different values have different names.
+    """
+    return [_user_zero(name, value, text) for name, values in zeros.items() for value, text in value_names(values).items()]
+
+
+def _user_zero(name: str, value: float, text: str) -> TestFunction:
+    return TestFunction("UZ", f"{name} = {text}", lambda trial: trial[name] - value, column=name, value=value)
+
+
+def limits(intervals: Mapping[str, Sequence[float]]) -> list[TestFunction]:
+    """Return the test functions that end a run where a parameter or functional reaches an end of its interval."""
+    result = []
+    for name, (low, high) in intervals.items():
+        texts = value_names((low, high))
+        result += [_limit(name, low, texts[low], -1), _limit(name, high, texts[high], 1)]
+    return result
+
+
+def _limit(name: str, value: float, text: str, side: int) -> TestFunction:
+    """Return the one of the upper (``side`` +1) or lower (-1) end."""
+
+    def function(trial: Trial) -> float:
+        return side * (trial[name] - value)
+
+    return TestFunction("EP", f"{name} = {text}", function, terminal=True, limit=True, column=name, value=value)
+
+
+def within_limits(segment: Segment, points: list[SpecialPoint], ends: Sequence[TestFunction]) -> list[SpecialPoint]:
+    """Return the special points of a step up to where it first leaves the limits, which may have been seen at a point only.
+
+    A quantity that passes its limit and comes back in one step has the same sign at both ends of the step.
+    """
+    last: Place = (segment.low, segment.before)
+    for number, point in enumerate(points):
+        if point.stop is not None:
+            break
+        for test in ends:
+            value, before = test.function(point.trial), last[1].value(test)
+            if before < 0 and value > _OUTSIDE * (abs(before) + value):
+                return [*points[:number], segment.locate(test, last, (point.at, point.trial))]
+        last = (point.at, point.trial)
+    return points
+
+
+def fold(name: str) -> TestFunction:
+    """Return the test function of folds with respect to a free parameter: its component of the tangent (AUTO's LP)."""
+    return TestFunction("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name)
+
+
+def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient) -> SpecialPoint:
+    """Return a special point with the coefficient in its details and, but for folds, what it means in its name.
+
+    The error is that of the derivatives, and what the coefficient differs from that on the mesh of the run. A coefficient that
+    is nothing but error is left out, and its error is stated.
+    """
+    found = found._replace(error=found.error + abs(found.value - coarse.value))
+    value, error = ({} if found.is_meaningless else {"normal_form": found.value}), found.error
+    details = {**(point.details or {}), **value, "normal_form_error": error}
+    attracts, repels = found.side * found.value < -error, found.side * found.value > error
+    kind = ", supercritical" if attracts else ", subcritical" if repels else ""
+    return dataclasses.replace(point, name=point.name + kind * (point.label != "LP"), details=details)

@@ -1,0 +1,147 @@
+"""Equations that are singular everywhere: some depend on each other, or states occur only together, as in differences.
+
+The null vectors that the Jacobian has at several places alike: w^T F_u = 0 everywhere says that w.F is a constant, F_u v = 0
+everywhere that a solution u comes with all u + c v.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.equilibria.system import Algebraic
+from contin.linalg.dense import DenseFactors
+
+#: More states are not looked at: 1000 take a tenth of a second, and five where the equations are singular.
+MOST_STATES = 1000
+#: Places that are compared: with three, null vectors that differ by a thousandth do not pass for the same.
+_PLACES, _SEED = 3, 7
+#: How far these are apart, relative to 1 + |u|. Ten times nearer, null vectors that turn slowly would count as fixed; ten times
+#: further, more places are outside of the domain of the equations.
+_APART = 0.1
+#: A singular value is zero below so many units in the last place of the largest, times the size of the matrix.
+_ZERO_UNITS = 10.0
+#: Parts of a null vector below this are round-off, and so is the value of a combination of equations relative to its terms.
+_LEAST = 1e-9
+#: Components below this part of the largest are no pivots: above round-off of null vectors, and below any factor that is meant.
+_PIVOT = 1e-6
+#: Terms of a combination that are written out.
+_TERMS = 6
+
+
+def dependence(system: Algebraic, x: Array) -> str:
+    """Return which equations are dependent near x, or which states occur only together, as a sentence with advice; or ""."""
+    if system.size != system.state_size or system.size > MOST_STATES:
+        return ""
+    with np.errstate(all="ignore"):
+        matrix = _balanced(system.jacobian(x))[0]
+        if not DenseFactors(matrix).reciprocal_condition <= _zero(len(matrix)):
+            return ""
+        places = _around(system, x)
+    if len(places) < _PLACES:
+        return ""
+    matrices = [system.jacobian(place) for place in places]
+    equations = _reduced(_null_vectors(np.hstack(matrices).T))
+    states = _reduced(_null_vectors(np.vstack(matrices)))
+    return _of_equations(system, places, equations, bool(len(states))) or _of_states(system, states)
+
+
+def _around(system: Algebraic, x: Array) -> list[Array]:
+    """Return places near x where the equations are defined; above x first, where logarithms and roots are."""
+    random, found = np.random.default_rng(_SEED), []
+    for sign in (1.0, 1.0, 1.0, -1.0, -1.0, -1.0):
+        place = x + sign * _APART * (1 + np.abs(x)) * random.uniform(0.1, 1.0, x.size)
+        with contextlib.suppress(ArithmeticError, ValueError):
+            if np.isfinite(system.jacobian(place)).all() and np.isfinite(system.residual(place)).all():
+                found.append(place)
+    return found[:_PLACES]
+
+
+def _balanced(matrix: Array) -> tuple[Array, Array]:
+    """Return a matrix with rows and columns of size one, and what its columns were divided by."""
+    rows = np.abs(matrix).max(axis=1, keepdims=True)
+    matrix = matrix / np.where(rows > 0, rows, 1.0)
+    columns = np.abs(matrix).max(axis=0)
+    columns = np.where(columns > 0, columns, 1.0)
+    return matrix / columns, columns
+
+
+def _zero(size: int) -> float:
+    """Return the smallest singular value of a matrix of this size that is not round-off, of 1 for the largest."""
+    return float(_ZERO_UNITS * size * np.finfo(float).eps)
+
+
+def _null_vectors(matrix: Array) -> Array:
+    """Return a basis of the v with matrix v = 0, as rows."""
+    balanced, columns = _balanced(matrix)
+    _, values, vectors = np.linalg.svd(balanced)
+    found: Array = vectors[values <= _zero(len(values)) * values[0]] / columns
+    return found
+
+
+def _reduced(vectors: Array) -> Array:
+    """Return the basis in reduced echelon form, which does not depend on the one given; small numbers are zero."""
+    vectors, number = vectors.copy(), 0
+    for place in range(vectors.shape[1]):
+        if number == len(vectors):
+            break
+        chosen = number + int(np.abs(vectors[number:, place]).argmax())
+        if abs(vectors[chosen, place]) > _PIVOT * np.abs(vectors[number:]).max():
+            vectors[[number, chosen]] = vectors[[chosen, number]]
+            vectors[number] /= vectors[number, place]
+            others = np.arange(len(vectors)) != number
+            vectors[others] -= vectors[others, place, None] * vectors[number]
+            number += 1
+    found: Array = np.where(np.abs(vectors) > _LEAST, vectors, 0.0)
+    return found
+
+
+def _first(vector: Array) -> int:
+    return int(np.flatnonzero(vector)[0])
+
+
+def _of_equations(system: Algebraic, places: Sequence[Array], vectors: Array, is_shifted: bool) -> str:
+    """Return what is said of combinations of equations that are constants."""
+    if not len(vectors):
+        return ""
+    numbers, names = [f"equation {i + 1}" for i in range(vectors.shape[1])], system.named_states
+    residuals = np.array([system.residual(place) for place in places])
+    for vector in vectors:
+        terms = vector * residuals
+        value = float(terms.sum(axis=1).mean())
+        if abs(value) > _LEAST * np.abs(terms).max():
+            what = f"{_written(vector, numbers)} is {value:.6g} whatever the states are"
+            return f"residual: {what}: there is no solution, unless a parameter takes this number to zero"
+    combined = checks.listed(_written(vector, numbers) for vector in vectors)
+    replaced = checks.listed(numbers[_first(vector)] for vector in vectors)
+    totals = checks.listed(_written(vector, names) for vector in vectors)
+    what = f"{combined} {'is' if len(vectors) == 1 else 'are'} 0 whatever the states are"
+    condition = "a condition that fixes" if len(vectors) == 1 else f"{len(vectors)} conditions that fix"
+    held = " (or holds one state)" if is_shifted else ""
+    return f"residual: {what}: put {condition} {totals}, where the equations are rates of these{held}, in place of {replaced}"
+
+
+def _of_states(system: Algebraic, vectors: Array) -> str:
+    if not len(vectors):
+        return ""
+    names = system.named_states
+    moved = [f"{name} by {part:.6g}" for name, part in zip(names, vectors[0]) if part]
+    text = ", ".join(moved[:_TERMS]) + (", ..." if len(moved) > _TERMS else "")
+    held = names[_first(vectors[0])]
+    what = f"residual: no equation changes when states change together ({text})"
+    return f"{what}: add the equation that {held} is held, and free a parameter"
+
+
+def _written(vector: Array, names: Sequence[str]) -> str:
+    """Return a combination of names, such as "x + 2 y"."""
+    text = ""
+    places = np.flatnonzero(vector)
+    for i in places[:_TERMS]:
+        size = "" if abs(abs(vector[i]) - 1) < _LEAST else f"{abs(vector[i]):.6g} "
+        sign = "-" if vector[i] < 0 else "+"
+        text += f" {sign} {size}{names[i]}" if text else f"{'-' if vector[i] < 0 else ''}{size}{names[i]}"
+    return text + (" + ..." if len(places) > _TERMS else "")

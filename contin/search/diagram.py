@@ -1,0 +1,420 @@
+"""Connected branches: follow one, leave it at every branch point, and so on to a given depth."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Unpack
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.boundary.variational import VariationalProblem
+from contin.continuation.progress import Progress
+from contin.continuation.run import Continuation
+from contin.core.protocol import Discretization, inner
+from contin.core.settings import Options, Settings, settings_with
+from contin.core.state import Reason, Stop
+from contin.cycles.maps import MapSystem
+from contin.cycles.statement import PERIOD, ROUNDS, CycleProblem
+from contin.cycles.system import CycleCollocation, PeriodicCollocation
+from contin.equilibria.statement import AlgebraicProblem
+from contin.equilibria.system import Algebraic
+from contin.errors import ConvergenceError, ProblemError
+from contin.events.branch_point import BranchPoint
+from contin.events.multiple_point import MultiplePoint
+from contin.functions.signature import argument_count
+from contin.problems.angles import whole_rounds, winding_names
+from contin.results import plot
+from contin.results.branch import Branch
+from contin.results.point import Point, system_of
+from contin.search.cycle_starts import switched, switches
+
+Symmetry = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass
+class Junction:
+    """A branch point, Hopf point or period doubling of a diagram: the point, its depth, and which half-branches were followed.
+
+    At Hopf points and period doublings the second branch has one half: the other one is the same cycles, half a period later.
+    ``taken[i]`` maps +1 and -1 to the number of the branch that runs along tangent i that way. ``failed`` lists the switches
+    that did not work, as (tangent, way, reason); ``also`` the points of other branches at the same place.
+    """
+
+    point: Point
+    depth: int
+    taken: list[dict[int, int]]
+    failed: list[tuple[int, int, str]] = field(default_factory=list)
+    also: list[Point] = field(default_factory=list)
+
+
+#: Branches that the text of a diagram shows: it fits on a screen.
+_SHOWN = 20
+
+
+@dataclass
+class Diagram:
+    """Branches, and the junctions where they meet.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, diagram, solve
+    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+    >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+    >>> [len(found.branches), *(junction.point.label for junction in found.junctions)]
+    [4, 'BP']
+    """
+
+    branches: list[Branch] = field(default_factory=list)
+    junctions: list[Junction] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        count, junctions = len(self.branches), len(self.junctions)
+        lines = [f"  {number}: {branch!r}" for number, branch in enumerate(self.branches[:_SHOWN])]
+        if count > _SHOWN:
+            lines.append(f"  ... {count - _SHOWN} more")
+        head = f"Diagram of {count} branch{'es' * (count != 1)} and {junctions} junction{'s' * (junctions != 1)}"
+        return "\n".join([head, *lines])
+
+    def plot(self, x: str | None = None, y: str | None = None, axes: Any = None) -> Any:
+        """Draw all branches into one figure: equilibria and cycles with their stability, marks at labelled points.
+
+        Parameters
+        ----------
+        x, y : str, optional
+            As in `contin.Branch.plot`. Where cycles are among the branches, ``y`` is a state, the first one by default.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; a figure of its own without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, diagram, solve
+        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+        >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+        >>> found.plot("a", "x").get_xlabel()
+        'a'
+        """
+        drawn = [branch.points for branch in self.branches if branch.points]
+        cycles = [points[0].system for points in drawn if isinstance(points[0].system, PeriodicCollocation)]
+        if cycles and y is None:
+            y = cycles[0].problem.state_names[0]
+        for points in drawn:
+            axes = plot.plot(points, x, y, axes)
+        return axes
+
+    def graph(self) -> Any:
+        """Return the diagram as a ``networkx.MultiGraph``.
+
+        Nodes are special points (attributes: label, name, parameters and functionals), shared where branches meet; edges are
+        the pieces of branches between them (attributes: branch, points, parameter and functional columns).
+
+        Raises
+        ------
+        ImportError
+            networkx is not installed.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem, diagram, solve
+        >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+        >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+        >>> graph = found.graph()
+        >>> sorted(label for _, label in graph.nodes(data="label"))
+        ['BP', 'EP', 'EP', 'EP', 'EP', 'EP', 'EP']
+        """
+        try:
+            import networkx
+        except ImportError as error:
+            raise ImportError("graph needs networkx, which is not installed: pip install networkx") from error
+
+        graph = networkx.MultiGraph()
+        for number, junction in enumerate(self.junctions):
+            graph.add_node(_name(junction, number), label=junction.point.label, depth=junction.depth, **_values(junction.point))
+        for number, branch in enumerate(self.branches):
+            last, since = None, []
+            for place, point in enumerate(branch.points):
+                since.append(place)
+                if not point.label and place + 1 < len(branch.points):
+                    continue
+                node = self._node(point) or f"branch{number}.{place}"
+                if node not in graph:
+                    graph.add_node(node, label=point.label, name=point.name, **_values(point))
+                if last is not None:
+                    columns = {name: branch.column(name)[since] for name in _values(point)}
+                    graph.add_edge(last, node, branch=number, points=len(since), **columns)
+                last, since = node, [place]
+        return graph
+
+    def _node(self, point: Point) -> str | None:
+        for number, junction in enumerate(self.junctions):
+            if any(point is other for other in (junction.point, *junction.also)):
+                return _name(junction, number)
+        return None
+
+
+def _name(junction: Junction, number: int) -> str:
+    return f"{junction.point.label}{number}"
+
+
+def _is_end(point: Point) -> bool:
+    """Return whether a Hopf point or period doubling is where a branch of cycles ends that begins there."""
+    system = point.system
+    if point.label == "HB":
+        return isinstance(system, PeriodicCollocation)
+    return isinstance(system, (PeriodicCollocation, MapSystem)) and system.is_doubled(point.x)
+
+
+def _values(point: Point) -> dict[str, float]:
+    return {**point.parameters, **point.functionals}
+
+
+class _Explorer:
+    """The search of `diagram`: branches and junctions so far."""
+
+    def __init__(self, settings: Settings, symmetries: Sequence[Symmetry], tolerance: float, progress: Progress) -> None:
+        self.settings, self.tolerance, self.progress = settings, tolerance, progress
+        self.symmetries = [lambda t, u: u, *symmetries]
+        self.result = Diagram()
+
+    def run(self, system: Discretization, x: Array, depth: int) -> Diagram:
+        """Follow both ways from the start, then leave every junction of less than ``depth``."""
+        for direction in (1, -1):
+            settings = dataclasses.replace(self.settings, direction=direction)
+            self._follow(self._run(system, x, settings), 0)
+        done = 0
+        while done < len(self.result.junctions):
+            junction = self.result.junctions[done]
+            done += 1
+            if junction.depth >= depth:
+                continue
+            if switches(junction.point):
+                self._switch(junction)
+                continue
+            for which, tangent in enumerate(junction.point.details.tangents):
+                for way in (1, -1):
+                    if way not in junction.taken[which]:
+                        self._leave(junction, which, way, tangent)
+        return self.result
+
+    def _leave(self, junction: Junction, which: int, way: int, tangent: Array) -> None:
+        point, number = junction.point, len(self.result.branches)
+        for place, side in ((which, way), *self._images(point, way * tangent)):
+            junction.taken[place].setdefault(side, number)
+        try:
+            self._follow(self._run(point.system, point.x, self.settings, way * tangent), junction.depth + 1, junction)
+        except ConvergenceError as error:
+            junction.failed.append((which, way, str(error)))
+
+    def _switch(self, junction: Junction) -> None:
+        """Follow the cycles that begin at a Hopf point or period doubling."""
+        if junction.taken[1]:
+            return
+        junction.taken[1][1] = len(self.result.branches)
+        try:
+            system, x, tangent = switched(junction.point)
+            self._follow(self._run(system, x, self.settings, tangent), junction.depth + 1, junction)
+        except ConvergenceError as error:
+            junction.failed.append((1, 1, str(error)))
+
+    def _run(self, system: Discretization, x: Array, settings: Settings, tangent: Array | None = None) -> Continuation:
+        """Return a run; settings that name columns of the other kind of branch (equilibria, cycles) do not count."""
+        known = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
+        limits, zeros = ({name: given[name] for name in given if name in known} for given in (settings.limits, settings.zeros))
+        return Continuation(system, x, dataclasses.replace(settings, limits=limits, zeros=zeros), tangent)
+
+    def _follow(self, run: Continuation, depth: int, origin: Junction | None = None) -> None:
+        """Follow one run to its end, or to a known branch. Half-branches that it passes at junctions count as taken."""
+        number, branch = len(self.result.branches), Branch()
+        self.result.branches.append(branch)
+        for place, point in enumerate(self.progress.watch(run, f"branch {number + 1}, depth {depth}: ")):
+            branch.points.append(point)
+            if place == 0 and origin is not None:
+                origin.also.append(point)
+            elif self._is_known(point, number, depth) and run.stop is None:
+                branch.stop = Stop(Reason.KNOWN_BRANCH, "came to a branch that was followed before")
+                break
+        branch.stop, branch.notes = branch.stop or run.stop, run.notes
+
+    def _is_known(self, point: Point, number: int, depth: int) -> bool:
+        """Note a point that a run passes, if it is one to leave a branch at; return True if the way ahead was followed."""
+        begins = switches(point)
+        if isinstance(point.details, (BranchPoint, MultiplePoint)) and not begins:
+            return bool(point.details.tangents) and self._arrived(point, number, depth)
+        return begins and self._met(point, number, depth)
+
+    def _met(self, point: Point, number: int, depth: int) -> bool:
+        """Note a Hopf point or period doubling on a run; return True if it is known already."""
+        for junction in self.result.junctions:
+            if junction.point.label == point.label and self._same(junction.point, point):
+                junction.also.append(point)
+                if point.system.size != junction.point.system.size or type(point.system) is not type(junction.point.system):
+                    junction.taken[1].setdefault(1, number)
+                return True
+        if _is_end(point):
+            return False
+        self.result.junctions.append(Junction(point, depth, [{1: number, -1: number}, {}]))
+        return False
+
+    def _same(self, known: Point, point: Point) -> bool:
+        """Return whether two points with one label are one: in all columns or, at the end of the branch begun there, in some.
+
+        A cycle that has shrunk has the coordinates of the Hopf point, one that goes twice round the columns of the period
+        doubling, but for the period.
+        """
+        ours, theirs = _values(known), _values(point)
+        if isinstance(known.system, Algebraic) and isinstance(point.system, CycleCollocation):
+            states = known.system.states(known.x).ravel()
+            ours |= {f"max_{name}": value for name, value in zip(known.system.problem.state_names, states)}
+        angles = getattr(known.system.problem, "angles", {})
+        names = [name for name in ours if name in theirs and name != ROUNDS and name not in winding_names(angles)]
+        factor = 2.0 if _is_end(point) and point.label == "PD" else 1.0
+        for name in names:
+            mine = ours[name] * (factor if name == PERIOD else 1.0)
+            apart = np.array([theirs[name] - mine])
+            apart = apart - whole_rounds(apart, np.array([angles.get(name.removeprefix("max_").removeprefix("min_"), 0.0)]))
+            if abs(float(apart[0])) > self.tolerance * (1 + abs(mine)):
+                return False
+        return True
+
+    def _arrived(self, point: Point, number: int, depth: int) -> bool:
+        """Note a branch point that a run passes; return True if the way ahead was followed before."""
+        for junction in self.result.junctions:
+            image = self._match(junction.point, point)
+            if image is None:
+                continue
+            which, way = image
+            junction.also.append(point)
+            junction.taken[which].setdefault(-way, number)
+            if way in junction.taken[which]:
+                return True
+            junction.taken[which][way] = number
+            return False
+        ahead = {1: number, -1: number}
+        self.result.junctions.append(Junction(point, depth, [ahead, *({} for _ in point.details.tangents[1:])]))
+        return False
+
+    def _match(self, known: Point, point: Point) -> tuple[int, int] | None:
+        """Return (tangent, way) of a known junction along which the branch of ``point`` goes, if they are images."""
+        a, b = known.system, point.system
+        carry, there = b.carrier(a), _seen(a, known.x)
+        here, ahead = _seen(a, carry(point.x)), _seen(a, carry(point.details.tangents[0]))
+        parameters = slice(a.state_size, None)
+        if np.any(np.abs(there[parameters] - here[parameters]) > self.tolerance * (1 + np.abs(here[parameters]))):
+            return None
+        for symmetry in self.symmetries:
+            image, (turned,) = a.in_phase(_image(a, symmetry, here), (_image(a, symmetry, ahead),), there)
+            gap = image - there
+            if np.sqrt(inner(a, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(a, there, there))):
+                continue
+            cosines = [inner(a, turned, tangent) for tangent in known.details.tangents]
+            which = int(np.argmax(np.abs(cosines)))
+            return which, int(np.sign(cosines[which]) or 1)
+        return None
+
+    def _images(self, point: Point, direction: Array) -> list[tuple[int, int]]:
+        """Return (tangent, way) of the half-branches at ``point`` that are images of the one along ``direction``."""
+        system, result = point.system, []
+        here, direction = _seen(system, point.x), _seen(system, direction)
+        for symmetry in self.symmetries:
+            image, (turned,) = system.in_phase(_image(system, symmetry, here), (_image(system, symmetry, direction),), here)
+            gap = image - here
+            if np.sqrt(inner(system, gap, gap)) > self.tolerance * (1 + np.sqrt(inner(system, here, here))):
+                continue
+            cosines = [inner(system, turned, tangent) for tangent in point.details.tangents]
+            which = int(np.argmax(np.abs(cosines)))
+            result.append((which, int(np.sign(cosines[which]) or 1)))
+        return result
+
+
+def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
+    """Return the image of unknowns; of a variational problem the states x have one, multipliers are zero (`_seen`)."""
+    states = system.states(x).copy()
+    visible = states[:, : getattr(system.problem, "dimension", states.shape[1])]
+    visible[:] = symmetry(system.nodes, visible.copy())
+    return np.concatenate([(states / system.scales.states).ravel(), x[system.state_size :]])
+
+
+def _seen(system: Any, x: Array) -> Array:
+    """Return unknowns without multipliers: these follow from the others, and change their sign under symmetries."""
+    problem = system.problem
+    if not isinstance(problem, VariationalProblem):
+        return x
+    x = x.copy()
+    x[: system.state_size].reshape(-1, len(problem.state_names))[:, problem.dimension :] = 0.0
+    x[[system.parameter_index(name) for name in problem.multipliers]] = 0.0
+    return x
+
+
+def diagram(
+    start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, depth: int = 2,
+    symmetries: Sequence[Symmetry] = (), tolerance: float = 1e-5, progress: bool | None = None, **options: Unpack[Options],
+) -> Diagram:  # fmt: skip
+    """Follow every branch that can be reached from a solution, to a given depth.
+
+    Branches are left at branch points, and at Hopf points and period doublings, where cycles begin.
+
+    Parameters
+    ----------
+    start : Point
+    settings : Settings, optional
+        Or any of its fields by name. Give limits: they end branches that go off. From equilibria, ``limits`` and ``zeros`` may
+        name columns of cycles, too.
+    free : sequence of str, optional
+        Free parameters, if they shall differ from those of ``start``.
+    depth : int
+        Largest number of those points between ``start``'s branch and the others: 0 follows that branch alone.
+    symmetries : sequence of callable
+        Maps ``s(t, states) -> states`` of solutions to solutions (nodes t, states (K, n), same parameters), for states whose
+        parameters they leave alone: images of a branch count as that branch. Of autonomous cycles, shifts in time need no map.
+        Those of a `VariationalProblem` map the states x, without multipliers; the ones that it declares count, too.
+    tolerance : float
+        Relative distance below which two branch points are one.
+    progress : bool, optional
+        As in `trace`.
+
+    Returns
+    -------
+    Diagram
+        Failed switches are recorded at their junction.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve
+    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
+    >>> found = diagram(solve(pitchfork, [0.0], {"a": -1.0}), free=["a"], limits={"a": (-1, 1)})
+    >>> [str(branch.stop) for branch in found.branches]
+    ['reached a = 1', 'reached a = -1', 'reached a = 1', 'reached a = 1']
+    """
+    checks.instance("start", start, Point, "a Point")
+    checks.whole("depth", depth, 0, 1000)
+    checks.number("tolerance", tolerance, 0)
+    for symmetry in checks.sequence("symmetries", symmetries, "functions"):
+        if argument_count(checks.function("symmetries", symmetry)) != 2:
+            raise ProblemError(f"symmetries: {checks.shown(symmetry)} must take 2 arguments, times (K,) and states (K, n)")
+    settings = settings_with(settings, options)
+    symmetries = [*symmetries, *getattr(system_of(start, "start").problem, "symmetries", {}).values()]
+    system, x = (
+        (start.system, start.x) if free is None else system_of(start, "start").with_free(checks.names("free", free), start.x)
+    )
+    _check_columns(system.problem, settings)
+    return _Explorer(settings, symmetries, tolerance, Progress(progress)).run(system, x, depth)
+
+
+def _check_columns(problem: Any, settings: Settings) -> None:
+    """Require that limits and zeros name columns of the problem or, of equilibria, of the cycles that begin there."""
+    known = [*problem.parameters, *problem.functionals]
+    if isinstance(problem, AlgebraicProblem):
+        known += problem.state_names
+    if isinstance(problem, AlgebraicProblem) and problem.dynamics:
+        cycles = CycleProblem.of(problem)
+        known += [name for name in (*cycles.parameters, *cycles.functionals) if name not in known]
+    for name in (*settings.limits, *settings.zeros):
+        if name not in known:
+            raise ProblemError(f"{name!r} is no column of this problem ({checks.listed(known)})")

@@ -1,0 +1,193 @@
+"""First guesses: the discretized problem and the vector of unknowns that a user's guess stands for."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.boundary.segmented import SegmentedProblem
+from contin.boundary.statement import BoundaryValueProblem
+from contin.boundary.system import Collocation
+from contin.boundary.variational import VariationalProblem
+from contin.core.system import System
+from contin.cycles.maps import MapSystem
+from contin.cycles.statement import CycleProblem
+from contin.cycles.system import PeriodicCollocation
+from contin.equilibria.statement import AlgebraicProblem
+from contin.errors import ProblemError
+from contin.kinds import algebraic, discretized
+from contin.names import exact_text
+from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
+from contin.results.point import Point
+from contin.search.multipliers import with_guessed_multipliers
+
+#: A mesh point of a guess that lies closer to the end of the part that is computed is left out. Ten times
+#: larger, the first mesh has a longer interval there; it is adapted in any case.
+_LEAST_INTERVAL = 1e-3
+
+Guess = Callable[[float], Any] | Point | Sequence[float] | tuple[Sequence[float] | Array, Any] | None
+
+
+@dataclass(frozen=True)
+class Options:
+    """Parameters and first mesh of a solution; as in `contin.solve`."""
+
+    parameters: Mapping[str, float]
+    free: Sequence[str]
+    intervals: int
+    degree: int
+
+
+@functools.singledispatch
+def first_guess(problem: Any, guess: Guess, options: Options) -> tuple[System, Array]:
+    """Return the discretized problem and a vector of unknowns for a guess. Each kind of problem registers its own.
+
+    Raises
+    ------
+    ProblemError
+        A problem of an unknown kind, or a guess that does not fit.
+    """
+    raise ProblemError(f"problem: {checks.shown(problem)} must be a BoundaryValueProblem or AlgebraicProblem")
+
+
+@first_guess.register
+def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tuple[System, Array]:
+    system = algebraic(problem, options.free, options.parameters)
+    given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
+    count = len(problem.state_names)  # a map takes one point of a cycle, too
+    states = np.zeros(count) if given is None else _numbers(given)
+    if states.size != count:
+        states = _numbers(given, system.state_size)
+    x = system.pack(states, {**problem.parameters, **options.parameters})
+    return system.with_rounds_of(x, options.parameters) if isinstance(system, MapSystem) else (system, x)
+
+
+#: Part of the domain by which the times of a guess may miss its ends: cos(pi/2) is 6e-17.
+_SLACK = 1e-9
+
+
+@first_guess.register
+def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Options) -> tuple[System, Array]:
+    a, b = problem.domain
+    mesh = np.linspace(a, b, options.intervals + 1)
+    order = problem.order if isinstance(problem, CycleProblem) else 1
+    if isinstance(guess, Point):
+        mesh = _mesh_of(_meshed(guess), order)
+    elif _is_pair(guess):
+        given, slack = _numbers(guess[0]), _SLACK * (b - a)
+        if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a + slack or not given[-1] >= b - slack:
+            raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
+    system = discretized(problem, mesh, options.degree, options.free, options.parameters)
+    if not isinstance(guess, Point):
+        system = system.on_breaks()
+    if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
+        return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
+    periods = periods_of(problem)
+    states = _sampled(guess, system.nodes / order, len(problem.state_names), periods)
+    if periods.any():
+        system, states = _with_rounds(system, states, options)
+    x = system.pack(states, {**problem.parameters, **options.parameters})
+    return system.with_reference(x), x
+
+
+def _continuous(states: Array, periods: Array | None) -> Array:
+    """Return states (K, n) whose angles do not jump by whole rounds from one to the next, as values between -pi and pi do."""
+    if periods is None or not periods.any():
+        return states
+    jumps = whole_rounds(np.diff(states, axis=0), periods)
+    found: Array = states - np.concatenate([np.zeros((1, states.shape[1])), np.cumsum(jumps, axis=0)])
+    return found
+
+
+def _with_rounds(system: Collocation, states: Array, options: Options) -> tuple[Collocation, Array]:
+    """Return an orbit with the winding numbers of a guess, unless they are given, and its states.
+
+    Of angles that are given to rotate, and do not, those rounds are added, uniformly.
+    """
+    problem: Any = system.problem
+    periods, symmetry = periods_of(problem), getattr(problem, "symmetry", np.eye(len(problem.states)))
+    read = windings(problem.angles, problem.state_names, states[-1] - symmetry @ states[0])
+    given = {name: value for name, value in options.parameters.items() if name in read}
+    for name, value in given.items():
+        if not read[name]:
+            place = problem.state_names.index(name.removeprefix(WINDING))
+            states[:, place] += system.nodes * value * periods[place]
+    found: Collocation = system.with_parameters({**read, **given})
+    return found, states
+
+
+@first_guess.register
+def _of_segments(problem: SegmentedProblem, guess: Any, options: Options) -> tuple[System, Array]:
+    """A list with a guess for each segment: its states, constant or as a function of s; or a guess of all states, on [0, 1]."""
+    if isinstance(guess, list) and any(callable(each) or isinstance(each, (list, tuple, np.ndarray)) for each in guess):
+        if len(guess) != len(problem.pieces):
+            raise ProblemError(f"guess: {len(guess)} guesses, must be one for each of the {len(problem.pieces)} segments")
+        guess = problem.guessed(guess, {**problem.parameters, **options.parameters})
+    return _of_boundary_value(problem, guess, options)
+
+
+def _sampled(guess: Guess, nodes: Array, count: int, periods: Array | None = None) -> Array:
+    """Return the states of a guess at the nodes, shape (K, count); angles, of these periods, are made continuous."""
+    if isinstance(guess, Point):
+        states = _meshed(guess).evaluate(guess.x, nodes * _order(guess.system))
+        if states.shape[1] != count:
+            raise ProblemError(f"guess: a Point of {states.shape[1]} states for a problem of {count}")
+        return states
+    if callable(guess):
+        try:
+            values = [guess(t) for t in nodes]
+        except Exception as error:  # a user's function may raise anything
+            raise ProblemError(f"guess cannot be called: {type(error).__name__}: {error}") from error
+        return _continuous(np.array([_numbers(value, count) for value in values]), periods)
+    if _is_pair(guess):
+        t, columns = _numbers(guess[0]), _numbers(guess[1])
+        if columns.size != len(t) * count:
+            raise ProblemError(f"guess: {columns.size} numbers for {len(t)} places t and {count} states")
+        known = _continuous(columns.reshape(len(t), count), periods)
+        return np.stack([np.interp(nodes, t, column) for column in known.T], axis=1)
+    if guess is None:
+        raise ProblemError("guess: a boundary value problem needs one (a function of t, arrays, or numbers)")
+    return np.tile(_numbers(guess, count), (len(nodes), 1))
+
+
+def _numbers(values: Any, count: int | None = None) -> Array:
+    """Return a guess as an array of numbers, shape (count,) where that is given."""
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ProblemError(f"guess: {checks.shown(values)} must be numbers") from None
+    if count is not None and array.size != count:
+        raise ProblemError(f"guess: {array.size} numbers, must be the {count} states")
+    return array if count is None else array.ravel()
+
+
+def _meshed(guess: Point) -> Collocation:
+    """Return the system of a guess that is a solution of a boundary value problem."""
+    if not isinstance(guess.system, Collocation):
+        raise ProblemError("guess: a Point must be a solution of a boundary value problem")
+    return guess.system
+
+
+def _order(system: Any) -> int:
+    """Return into how many parts a symmetry divides a cycle; one part is the interval that is computed."""
+    return system.order if isinstance(system, PeriodicCollocation) else 1
+
+
+def _mesh_of(system: Collocation, order: int) -> Array:
+    """Return the mesh of a guess for a problem with a symmetry of this order, on the part that is computed."""
+    parts = _order(system)
+    if parts == order:
+        return system.mesh
+    whole = np.unique(np.arange(parts)[:, None] + system.mesh) * order / parts
+    return np.append(whole[whole < 1 - _LEAST_INTERVAL], 1.0)
+
+
+def _is_pair(guess: Guess) -> TypeGuard[tuple[Any, Any]]:
+    """Return whether a guess is (t, states)."""
+    return isinstance(guess, tuple) and len(guess) == 2 and isinstance(guess[0], (list, tuple, np.ndarray))

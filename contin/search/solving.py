@@ -1,0 +1,273 @@
+"""One solution near a guess: correct it, adapt the mesh to it, correct again."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.boundary.second_variation import degeneracy, dependent_conditions
+from contin.boundary.statement import BoundaryValueProblem
+from contin.boundary.system import Collocation
+from contin.boundary.variational import VariationalProblem
+from contin.collocation.basis import DEGREES
+from contin.collocation.degree import CYCLE_DEGREE, usual_degree
+from contin.collocation.mesh import MOST_INTERVALS, MeshControl
+from contin.connections.statement import ConnectionProblem
+from contin.core.newton import Corrected, Newton, approached, correct
+from contin.core.settling import ROUNDS
+from contin.core.system import System
+from contin.cycles.statement import PERIOD, CycleProblem
+from contin.equilibria.statement import AlgebraicProblem
+from contin.equilibria.system import Algebraic
+from contin.errors import ConvergenceError, ProblemError
+from contin.problems.angles import winding_names
+from contin.problems.statement import forget_changed, with_multipliers
+from contin.results.point import Point, point_of, system_of, underlying
+from contin.search.deflation import correct_away
+from contin.search.dependence import dependence
+from contin.search.guess import Guess, Options, first_guess
+
+#: Rounds of correcting and adapting the mesh; each settles most of what is left.
+_ROUNDS = 4
+#: Equilibria that are nearer to each other than this part of the orbit's size are one.
+_SAME = 1e-6
+
+
+def solve(
+    problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess = None, parameters: Mapping[str, float] | None = None, *,
+    free: Sequence[str] = (), intervals: int = 20, degree: int | None = None, mesh: MeshControl | None = None,
+    newton: Newton = Newton(), others: Sequence[Point] = (),
+) -> Point:  # fmt: skip
+    """Return one solution near a guess, on a mesh adapted to it.
+
+    Parameters
+    ----------
+    problem : BoundaryValueProblem or AlgebraicProblem
+    guess : callable, pair of arrays, sequence of numbers, Point, or None
+        ``guess(t)`` returns the states at t; a pair is t (K,) and states (K, n); n numbers are constant states; a point is a
+        solution of a problem with the same states; None stands for zeros.
+    parameters : mapping of str to float
+        Values that differ from the defaults (of the problem, or of the guess if it is a point).
+    free : sequence of str
+        Parameters to be found along with the states, for problems with more conditions than states. Of an autonomous
+        `CycleProblem`, a parameter to be found in place of the period, which is held: in a family of a conservative system
+        the period does not follow from the parameters.
+    intervals : int
+        Of the first mesh, which is uniform unless the guess has one.
+    degree : int, optional
+        Of the collocation, 2 to 8. By default that of the guess, if it has one; otherwise it follows from the number of states
+        and the tolerance of the mesh: 7 for up to 5 states, down to 4 for more states and larger tolerances; 4 for cycles.
+    mesh : MeshControl, optional
+        How the mesh adapts; ``MeshControl(every=0)`` keeps the first one.
+    others : sequence of Point
+        Known solutions to stay away from (deflation, Farrell, Birkisson & Funke 2015).
+
+    Returns
+    -------
+    Point
+        With ``free`` as given: pass it to `trace` with the free parameters of a curve.
+
+    Raises
+    ------
+    ConvergenceError, ProblemError
+
+    Examples
+    --------
+    >>> equation = AlgebraicProblem(lambda u, p: (u.x**2 - p.a,), ["x"], {"a": 4.0})
+    >>> root = solve(equation, [1.0])
+    >>> round(float(root.x[0]), 12), round(float(solve(equation, root, others=[root]).x[0]), 12)
+    (2.0, -2.0)
+    """
+    control = MeshControl() if mesh is None else mesh
+    _check_options(problem, intervals, degree, control, newton)
+    _check_others(problem, others)
+    forget_changed(problem)
+    parameters, free = _checked(parameters), with_multipliers(problem, free)
+    if isinstance(guess, Point):
+        guess = underlying(guess)
+        read = winding_names(getattr(problem, "angles", {}))  # off the guess, as of all others
+        parameters = {**{name: value for name, value in guess.parameters.items() if name not in read}, **parameters}
+    held = _check_count(problem, free)
+    options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))
+    system, x = first_guess(problem, guess, options)
+    if not np.isfinite(x).all():
+        raise ProblemError("guess: its values must be finite numbers")
+    return _leading_on(solved(system, x, control, newton, others, held))
+
+
+def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
+    """Return the degree where none is given."""
+    if isinstance(guess, Point):
+        return guess.system.degree
+    if isinstance(problem, CycleProblem):
+        return CYCLE_DEGREE
+    return usual_degree(len(problem.state_names), control.tolerance)
+
+
+def solved(
+    system: System, x: Array, control: MeshControl, newton: Newton, others: Sequence[Point] = (), held: str | None = None
+) -> Point:
+    """Return the solution near a vector of unknowns, on a mesh adapted to it; one of the free parameters may be held.
+
+    Raises
+    ------
+    ConvergenceError, ProblemError
+    """
+
+    def corrected(system: System, x: Array) -> Corrected:
+        return _corrected(system, x, others, newton) if held is None else _holding(system, x, held, newton)
+
+    for _ in range(_ROUNDS):
+        done = corrected(system, x)
+        if control.every:
+            system, done = _on_switches(system, done, corrected)
+        adapted = system.adapted(done.x, control)
+        if adapted is None:
+            break
+        system, carry = adapted
+        x = carry(done.x)
+    else:
+        done = corrected(system, x)
+    _check_determined(system, done.x)
+    return point_of(system, done.x, done.iterations, done.error)
+
+
+def _on_switches(system: System, done: Corrected, corrected: Callable[[System, Array], Corrected]) -> tuple[System, Corrected]:
+    """Return a solution on a mesh with points where conditions on states switch; the last one that Newton's method finds."""
+    for _ in range(ROUNDS):
+        moved = system.on_switches(done.x)
+        if moved is None:
+            break
+        other, carry = moved
+        try:
+            done = corrected(other, carry(done.x))
+        except ConvergenceError:
+            break
+        system = other
+    return system, done
+
+
+def _holding(system: System, x: Array, name: str, newton: Newton) -> Corrected:
+    """Return the solution near x with the value of a free parameter that x has.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    row = np.zeros(system.size)
+    row[system.parameter_index(name)] = 1.0
+    return correct(system, x, row, row @ x, newton, sizes=system.magnitudes)
+
+
+def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton) -> Corrected:
+    """Return the solution near x.
+
+    Raises
+    ------
+    ProblemError
+        Newton's method fails at a guess that makes a variational problem singular; the message says why.
+    ConvergenceError
+    """
+    try:
+        return correct_away(system, x, others, newton) if others else correct(system, x, newton=newton, sizes=system.magnitudes)
+    except ConvergenceError:
+        if not others:
+            for place in approached(system, x):
+                with contextlib.suppress(ConvergenceError):
+                    return correct(system, place, newton=newton, sizes=system.magnitudes)
+        reason = ""
+        if isinstance(system, Algebraic):
+            reason = dependence(system, x)
+        elif isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
+            reason = degeneracy(system, x)
+            reason += reason and ": no solution was found from this guess"
+        if reason:
+            raise ProblemError(reason) from None
+        raise
+
+
+def _check_determined(system: System, x: Array) -> None:
+    """Check that a solution does not come with others around it, of which round-off chose one.
+
+    Raises
+    ------
+    ProblemError
+    """
+    reason = ""
+    if isinstance(system, Algebraic):
+        reason = dependence(system, x)
+    elif isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
+        reason = dependent_conditions(system, x)
+    if reason:
+        raise ProblemError(reason)
+
+
+def _check_options(problem: object, intervals: object, degree: object, control: object, newton: object) -> None:
+    checks.instance("problem", problem, (BoundaryValueProblem, AlgebraicProblem), "a BoundaryValueProblem or AlgebraicProblem")
+    checks.whole("intervals", intervals, 1, MOST_INTERVALS)
+    if degree is not None:
+        checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
+    checks.instance("mesh", control, MeshControl, "a MeshControl")
+    checks.instance("newton", newton, Newton, "a Newton")
+
+
+def _leading_on(found: Point) -> Point:
+    """Return a solution; check that an orbit between two equilibria does not return to the first one.
+
+    Raises
+    ------
+    ProblemError
+    """
+    problem: Any = found.system.problem
+    if not isinstance(problem, ConnectionProblem) or problem.homoclinic:
+        return found
+    count, names = len(problem.state_names), problem.multipliers
+    first, last = (np.array([found[name] for name in part]) for part in (names[:count], names[count:]))
+    if np.abs(first - last).max() <= _SAME * float(np.ptp(found.system.states(found.x), axis=0).max()):
+        place = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(problem.state_names, first))
+        raise ProblemError(
+            f"stable: both ends of the orbit are at the equilibrium {place}; leave out stable for a homoclinic orbit, or give "
+            f"a guess of the last equilibrium ({', '.join(names[count:])})"
+        )
+    return found
+
+
+def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:
+    """Return the free parameter that is held because another one is found in its place, if there is one.
+
+    Raises
+    ------
+    ProblemError
+        Too many or too few parameters are free.
+    """
+    needed = problem.free_size - 1
+    if needed < 0:
+        there = len(problem.state_names) + needed
+        kind = "equations" if isinstance(problem, AlgebraicProblem) else "boundary and integral conditions"
+        raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
+    if isinstance(problem, CycleProblem) and PERIOD in free and len(free) == needed + 1:
+        return PERIOD
+    if len(free) != needed:
+        raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
+    return None
+
+
+def _check_others(problem: BoundaryValueProblem | AlgebraicProblem, others: Sequence[Point]) -> None:
+    for other in checks.sequence("others", others, "Point"):
+        checks.instance("others", other, Point, "a Point")
+        if system_of(other, "others").problem.states != problem.states:
+            raise ProblemError("others: must be solutions of this problem")
+
+
+def _checked(parameters: Mapping[str, float] | None) -> dict[str, float]:
+    """Return the values of parameters that a user gives."""
+    if parameters is None:
+        return {}
+    for name, value in checks.mapping("parameters", parameters, "numbers").items():
+        checks.number(f"parameters: {checks.plain(name)}", value)
+    return dict(parameters)

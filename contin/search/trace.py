@@ -1,0 +1,135 @@
+"""A run from a point of a branch."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Unpack
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.continuation.progress import Progress, follow_until_interrupted
+from contin.continuation.run import Continuation
+from contin.core.settings import Options, Settings, settings_with
+from contin.core.system import System
+from contin.errors import ConvergenceError, ProblemError
+from contin.events.branch_point import BranchPoint, locate_branch_point
+from contin.events.multiple_point import MultiplePoint
+from contin.linalg.orientation import oriented_along
+from contin.problems.statement import forget_changed
+from contin.results.branch import Branch
+from contin.results.point import Point, underlying
+from contin.search.connection_starts import from_non_central, leaves_saddle_node
+from contin.search.cycle_starts import switched, switches
+
+#: A branch point lies no further from where folds meet it, relative to 1 + its size: both are located to 1e-9 or better.
+_HERE = 1e-5
+
+
+def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str] | None = None, branch: int | None = None,
+          progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
+    """Follow the branch through a point, or away from a branch point, to its end.
+
+    Ctrl-C ends the run: the branch so far is returned.
+
+    Parameters
+    ----------
+    start : Point
+        Of `solve`, of another branch, or read back.
+    settings : Settings, optional
+        Or any of its fields by name.
+    free : sequence of str, optional
+        Free parameters, if they shall differ from those of ``start``; the first is the primary one. From a point of a curve in
+        two parameters they lead to the branch of solutions through it (where folds meet a branch point, to those that cross
+        there). With ``branch=1`` at HB and PD, those of the new branch.
+    branch : int, optional
+        Which branch to take from a branch point: 0 the one that ``start`` was found on, 1 the other one. ``direction=-1`` takes
+        the opposite way. At NCH, 1 is the curve of homoclinic orbits to the saddle-node or, from there, to the saddle. By
+        default the one that it was found on, with ``direction`` that of the primary parameter.
+    progress : bool, optional
+        Show one line on standard error while the run is under way: by default where standard error is a terminal.
+
+    Raises
+    ------
+    ProblemError, ConvergenceError
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve
+    >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": -1.0})
+    >>> trivial = trace(solve(pitchfork, [0.0]), free=["a"], limits={"a": (-1, 1)})
+    >>> forked = trace(trivial.labelled("BP")[0], branch=1, limits={"a": (-1, 1)})
+    >>> print(round(abs(forked.points[-1].x[0]), 9))
+    1.0
+    """
+    checks.instance("start", start, Point, "a Point")
+    settings, shown = settings_with(settings, options), Progress(progress)
+    start = start if free is None else _solution(start, checks.names("free", free))
+    system: Any = start.system
+    x = start.x
+    if isinstance(system, System) and forget_changed(system.problem):
+        system = system.with_parameters({})
+    if branch is not None:
+        checks.whole("branch", branch, 0, 10)
+    if branch == 1 and switches(start):
+        cycles, x, tangent = switched(start, free)
+        return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
+    if branch == 1 and leaves_saddle_node(start):
+        if free is not None:
+            raise ProblemError("free: the curve that leaves at NCH has the parameters of the one it was found on; leave it out")
+        orbits, x, tangent = from_non_central(start)
+        return follow_until_interrupted(Continuation(orbits, x, settings, settings.direction * tangent, singular=False), shown)
+    if free is not None and checks.names("free", free) != system.free:
+        system, x = system.with_free(free, x)
+    if branch is None:
+        return follow_until_interrupted(Continuation(system, x, settings, _own_tangent(start, system, settings)), shown)
+    tangent = settings.direction * _tangent(start, system, branch)
+    return follow_until_interrupted(Continuation(system, x, settings, tangent), shown)
+
+
+def _solution(start: Point, free: Sequence[str]) -> Point:
+    """Return the solution itself of a point of a curve; where folds meet a branch point, as that point of its branches."""
+    found = underlying(start)
+    if found is start or start.label != "BP":
+        return found
+    system, x = found.system.with_free(free, found.x)  # type: ignore[attr-defined]
+    try:
+        point = locate_branch_point(system, x)
+    except ConvergenceError:
+        return found
+    if not np.abs(point.x - x).max() < _HERE * (1 + np.abs(x).max()):
+        return found  # as at a fold in the other parameter
+    return dataclasses.replace(found, label=start.label, name=start.name, x=point.x, system=system, details=point)
+
+
+def _own_tangent(start: Point, system: Any, settings: Settings) -> Array | None:
+    """Return the tangent of the branch that a branch point was found on, oriented; None at other points."""
+    if not isinstance(start.details, (BranchPoint, MultiplePoint)) or not start.details.tangents or system is not start.system:
+        return None  # elsewhere the equations tell it
+    tangent: Array = start.details.tangents[0]
+    rate = tangent[system.parameter_index(settings.primary or system.free[0])]
+    return settings.direction * oriented_along(tangent, rate)
+
+
+def _tangent(start: Point, system: Any, branch: int) -> Array:
+    """Return a tangent of a branch point, in the free parameters of a system: those of the point, in any order.
+
+    Raises
+    ------
+    ProblemError
+        The start is no branch point, or one in other parameters, or has fewer branches.
+    """
+    if not isinstance(start.details, (BranchPoint, MultiplePoint)):
+        raise ProblemError("branch: the start is not a branch point")
+    if set(system.free) != set(start.system.free):
+        own = ", ".join(start.system.free)
+        raise ProblemError(f"free: {', '.join(system.free)} must be {own}, with which the branch point was found")
+    if not 0 <= branch < len(start.details.tangents):
+        raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
+    tangent: Array = start.details.tangents[branch]
+    if isinstance(start.system, System):
+        at = [start.system.parameter_index(name) for name in system.free]
+        tangent = np.concatenate([tangent[: system.state_size], tangent[at]])
+    return tangent

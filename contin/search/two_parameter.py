@@ -1,0 +1,295 @@
+"""Curves of special points in two parameters, and in more."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Unpack
+
+import numpy as np
+
+from contin import checks
+from contin.arrays import Array
+from contin.connections.events import own_test_of
+from contin.connections.system import ConnectionCollocation
+from contin.continuation.progress import Progress, follow_until_interrupted
+from contin.continuation.run import Continuation
+from contin.core.settings import Options, Settings, settings_with
+from contin.core.system import System
+from contin.core.trial import TestFunction
+from contin.cycles.curves import DoublingCurve, TorusCurve
+from contin.cycles.map_curves import MapDoublingCurve, MapTorusCurve
+from contin.cycles.maps import MapSystem
+from contin.cycles.system import PeriodicCollocation
+from contin.defining.branch_point_curve import BranchPointCurve
+from contin.defining.event_curve import EventCurve
+from contin.defining.extended import Extended
+from contin.defining.extremum_curve import ExtremumCurve
+from contin.defining.fold_curve import FoldCurve
+from contin.equilibria.hopf_curve import HopfCurve
+from contin.equilibria.lyapunov import critical_pair
+from contin.equilibria.system import Algebraic
+from contin.errors import ProblemError
+from contin.events.branch_point import BranchPoint
+from contin.results.branch import Branch
+from contin.results.point import Point
+from contin.search.codimension_two import leaving
+from contin.search.cycle_starts import doubles, frequency_of
+
+
+def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
+          event: TestFunction | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
+          progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
+    """Follow the curve of special points of one kind through one of them, in two parameters or more.
+
+    From a point of such a curve, without a further parameter, it goes on; ``kind`` takes another one that leaves there.
+
+    Parameters
+    ----------
+    start : Point
+        A labelled point of a branch: LP, BP, HB (of equilibria), PD, TR, an extremum (EX), or where a column has a value (UZ,
+        EP); of homoclinic orbits IFS, OFS, NCH, ..., too. Or one of a curve, followed with one parameter more: an extremum of
+        its own column, the fold of a curve of folds with respect to its first parameter, a user zero, or of codimension two.
+    second : str, optional
+        The parameter that is free beside those of the branch.
+    settings : Settings, optional
+        Or any of its fields by name. Defaults: ``primary``, of which folds are labelled, is ``second``; no ``branch_points``.
+    free : pair of str, optional
+        Both parameters, in place of ``second``; the first one replaces that in which the start was found.
+    event : TestFunction, optional
+        The one of yours (``test_functions``) that labelled the start.
+    hold : str, optional
+        A column that keeps the value of any start, such as ``"period"``; ``branch_points=True`` labels where curves cross.
+    kind : str, optional
+        From BT, GH, ZH, HH: ``"LP"``, ``"HB"``, ``"TR"`` or ``"homoclinic"``, as in `Point.curves`; some begin a little beside.
+    branch : int
+        With ``kind="TR"`` at a double Hopf point: 0 for the cycles of the pair on whose curve it was found, 1 for the other.
+    progress : bool, optional
+        As in `trace`.
+
+    Returns
+    -------
+    Branch
+        Labels: LP (the curve turns); CP, BP, BT, GH, ZH and HH of equilibria; CP, GPD, CH, R1 to R4, LPPD and LPTR of cycles;
+        EX, an extremum in one parameter more. Columns: ``frequency`` and ``lyapunov`` of Hopf points, ``normal_form`` of period
+        doublings and torus bifurcations, ``angle`` of the latter. The last entry of x on curves of BP is their imperfection.
+
+    Raises
+    ------
+    ProblemError
+        The start is none of these, or a name is no parameter.
+
+    Examples
+    --------
+    >>> from contin import AlgebraicProblem, solve, trace
+    >>> cusp = AlgebraicProblem(lambda u, p: (u.x**3 - p.b * u.x + p.a,), ["x"], {"a": 2.0, "b": 1.0})
+    >>> fold = trace(solve(cusp, [-1.5]), free=["a"], direction=-1, limits={"a": (-2, 3)}).labelled("LP")[0]
+    >>> folds = curve(fold, "b", direction=-1, limits={"b": (-1, 2)})
+    >>> [(point.label, abs(point["b"]) < 1e-9) for point in folds.labelled("CP")]
+    [('CP', True)]
+    """
+    checks.instance("start", start, Point, "a Point")
+    shown, new = Progress(progress), any(each is not None for each in (second, free, event, hold))
+    goes_on = isinstance(start.system, Extended) and not new
+    _check(event, hold, kind, branch, goes_on)
+    names = start.system.free if goes_on else _free_parameters(start, second, free)
+    settings = settings_with(settings, {"branch_points": False, "primary": names[-1], **options})
+    if goes_on:
+        return _from_curve(start, kind, branch, settings, shown)
+    return follow_until_interrupted(Continuation(*_first_of_curve(start, names, event, hold), settings), shown)
+
+
+def _check(event: object, hold: object, kind: object, branch: object, goes_on: bool) -> None:
+    checks.instance("event", event, (TestFunction, type(None)), "a TestFunction")
+    checks.instance("kind", kind, (str, type(None)), "a name")
+    checks.whole("branch", branch, 0, 1)
+    if kind is not None and not goes_on:
+        raise ProblemError("kind: is for points of codimension two of a curve, without a further parameter or event")
+    if hold is not None and event is not None:
+        raise ProblemError("hold: must be left out where event is given")
+
+
+def _from_curve(start: Point, kind: str | None, branch: int, settings: Settings, shown: Progress) -> Branch:
+    """Follow the curve of a point further, or another one that leaves there. The first point has the label of the start."""
+    if kind is None:
+        return follow_until_interrupted(Continuation(start.system, start.x, settings), shown)
+    system, x, tangent = leaving(start, kind, branch)
+    beside = tangent is not None and kind != "HB"
+    found = follow_until_interrupted(Continuation(system, x, settings, tangent, singular=False), shown)
+    if not beside:
+        found.points[0] = dataclasses.replace(found.points[0], label=start.label, name=start.name)
+    return found
+
+
+def _free_parameters(start: Point, second: str | None, free: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the free parameters of a curve: that in which the start was found first, the second parameter last."""
+    system: Any = start.system
+    if len(system.free) != system.problem.free_size:
+        raise ProblemError("start: must be a point of a branch, with the free parameters of a curve")
+    known = tuple(system.problem.parameters)
+    branch = isinstance(system, System)
+    found_in = start.column if start.label == "LP" and start.column and branch else system.free[0]
+    if (second is None) == (free is None):
+        raise ProblemError("curve: give the second parameter, or free=[first, second]")
+    if free is None:
+        assert second is not None
+        checks.instance("second", second, str, "a name")
+        if second in system.free or second not in known:
+            raise ProblemError(f"second: {second!r} must be a parameter that is not free ({', '.join(known)})")
+        pair: tuple[str, ...] = (found_in, second)
+    else:
+        pair = tuple(checks.names("free", free))
+    others = [name for name in system.free if name != found_in]
+    allowed = [name for name in known if name not in others] if branch else list(known)
+    if len(pair) != 2 or len({*pair} & {*allowed}) != 2:
+        raise ProblemError(f"free: {', '.join(pair)} must be two of the parameters {', '.join(allowed)}")
+    return (pair[0], *others, pair[1])
+
+
+#: An extended system, and its first vector of unknowns.
+_First = tuple[Extended, Array]
+
+
+def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | None, hold: str | None) -> _First:
+    """Return the extended system of the kind of a point.
+
+    Raises
+    ------
+    ProblemError
+        It is of no kind that can be followed.
+    """
+    base, x = start.system.with_free(names, start.x)  # type: ignore[attr-defined]
+    if event is not None:
+        return _event(start, base, x, event)
+    if hold is not None:
+        return _value(_holding(start, hold), base, x)
+    for kind in _KINDS if isinstance(start.system, System) else _KINDS_ON_CURVES:
+        found = kind(start, base, x)
+        if found is not None:
+            return found
+    raise ProblemError(f"start: a point labelled {start.label or 'nothing'!r} must be {_STARTS}")
+
+
+def _branch_points(start: Point, base: System, x: Array) -> _First | None:
+    return (BranchPointCurve(base), np.append(x, 0.0)) if isinstance(start.details, BranchPoint) else None
+
+
+def _folds(start: Point, base: System, x: Array) -> _First | None:
+    return (FoldCurve(base), x) if start.label == "LP" and start.column else None
+
+
+def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
+    if start.label != "HB" or not isinstance(base, Algebraic):
+        return None
+    frequency = critical_pair(base.jacobian(x), frequency_of(start)).frequency
+    return HopfCurve(base.as_field(), size=frequency**2), np.append(x, 1.0)
+
+
+def _doublings(start: Point, base: System, x: Array) -> _First | None:
+    if not doubles(start):
+        return None
+    if isinstance(base, MapSystem):
+        return MapDoublingCurve(base), x
+    return (DoublingCurve(base), x) if isinstance(base, PeriodicCollocation) else None
+
+
+def _tori(start: Point, base: System, x: Array) -> _First | None:
+    if start.label != "TR" or not isinstance(base, (PeriodicCollocation, MapSystem)):
+        return None
+    angle = frequency_of(start)
+    if angle is None:
+        values = base.eigenvalues(x)
+        angle = abs(values[np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))].imag)
+    return (MapTorusCurve if isinstance(base, MapSystem) else TorusCurve)(base), np.append(x, np.cos(angle))
+
+
+def _extrema(start: Point, base: System, x: Array) -> _First | None:
+    return (ExtremumCurve(base, start.column), x) if start.label == "EX" and start.column else None
+
+
+def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
+    """An extremum along a curve of extrema; a fold with respect to the parameter of a curve of folds is one, too."""
+    if isinstance(base, ExtremumCurve):
+        objective = base.objective
+    elif isinstance(base, FoldCurve) and isinstance(base.base, System):
+        objective = base.free[0]
+    else:
+        return None
+    if start.label not in ("EX", "LP") or start.column != objective:
+        return None
+    return ExtremumCurve(base.base, objective), x[: base.base.size]
+
+
+def _values(start: Point, base: Any, x: Array) -> _First | None:
+    """A point where a column has a given value."""
+    value = start.value
+    if value is None or not abs(start[start.column] - value) <= _LOCATED * (1 + abs(value)):
+        return None
+    return _value(start, base, x)
+
+
+def _holding(start: Point, column: str) -> Point:
+    """Return the point as one where a column has a given value, the one that it has.
+
+    Raises
+    ------
+    ProblemError
+        There is no such column.
+    """
+    checks.instance("hold", column, str, "the name of a column")
+    known = (*start.parameters, *start.functionals, *start.system.named_states)
+    if column not in known:
+        raise ProblemError(f"hold: {checks.shown(column)} is no column; there are {checks.listed(known)}")
+    return dataclasses.replace(start, column=column, value=start[column])
+
+
+def _value(start: Point, base: Any, x: Array) -> _First:
+    """The value of a column."""
+    column, value = start.column, start.value
+    assert value is not None
+    known = base.column_gradient(x, column) is not None
+    gradient = (lambda system, x: system.column_gradient(x, column)) if known else None
+    return EventCurve(base, lambda trial: trial[column] - value, gradient), x
+
+
+def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
+    """A point that a test function of its curve has labelled."""
+    for test in start.system.events():
+        if (test.label, test.name) == (start.label, start.name):
+            return EventCurve(base, test.function), x
+    return None
+
+
+def _of_homoclinic_orbits(start: Point, base: Any, x: Array) -> _First | None:
+    """A special point of a curve of homoclinic orbits, which has two free parameters already."""
+    if not isinstance(base, ConnectionCollocation) or not base.problem.homoclinic:
+        return None
+    test = own_test_of(start.label, base, x)
+    return None if test is None else (EventCurve(base, test.function, label=test.label), x)
+
+
+def _event(start: Point, base: Any, x: Array, event: TestFunction) -> _First:
+    """A zero of a user's test function.
+
+    Raises
+    ------
+    ProblemError
+        It is no zero of that.
+    """
+    found = EventCurve(base, event.function)
+    here, slope = found.value(x), found.gradient(x)
+    if not abs(here) <= _LOCATED * (1 + float(np.abs(slope) @ (1 + np.abs(x)))):
+        raise ProblemError(f"event: {event.name!r} is {here:.6g} at the start; it must be the function that labelled it")
+    return found, x
+
+
+#: A value at a located point differs from the one that was looked for by less than this, relative to 1 + its size.
+_LOCATED = 1e-6
+#: What a start may be, in words, and in the order in which it is asked.
+_STARTS = (
+    "one of LP, BP, HB (of equilibria), PD, TR, EX, a special point of homoclinic orbits, or one where a column has a value "
+    "(UZ, EP); "
+    "for one of your own test functions, give it as event"
+)
+_KINDS = (_branch_points, _folds, _hopf_points, _doublings, _tori, _extrema, _values, _of_homoclinic_orbits)
+_KINDS_ON_CURVES = (_extrema_of_extrema, _values, _of_codimension_two)
