@@ -13,11 +13,9 @@ from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature
 from contin.problems.angles import Angles, angle_periods, check_periodic, winding_names
+from contin.problems.own_names import TIME
 from contin.problems.statement import check_statement
 from contin.problems.vector_field import check_field, found_elsewhere, returning, scaled
-
-#: The name, among the parameters, of the time that the computed part of the orbit takes.
-TIME = "time"
 
 
 class ConnectionProblem(BoundaryValueProblem):

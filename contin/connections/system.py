@@ -13,7 +13,7 @@ from contin.boundary.conditions import Conditioned
 from contin.boundary.system import Collocation
 from contin.collocation.mesh import MeshControl
 from contin.connections.events import homoclinic_points, named
-from contin.connections.statement import TIME, ConnectionProblem
+from contin.connections.statement import ConnectionProblem
 from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
@@ -22,6 +22,7 @@ from contin.errors import ConvergenceError
 from contin.events.segment import SpecialPoint
 from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
+from contin.problems.own_names import TIME
 
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
 _MOVED = 1e-6

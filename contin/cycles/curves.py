@@ -19,11 +19,11 @@ from contin.core.trial import TestFunction, Trial
 from contin.cycles.multiplier_curves import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.cycles.normal_forms import NormalForms
 from contin.cycles.round import Round
-from contin.cycles.statement import PERIOD
 from contin.cycles.system import PeriodicCollocation
 from contin.defining.extended import Borders
 from contin.defining.fold_curve import FoldCurve, shrinking
 from contin.events.coefficient import Coefficient
+from contin.problems.own_names import PERIOD
 
 #: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
 _DOUBLE = 1e-3

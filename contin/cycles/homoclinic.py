@@ -18,11 +18,11 @@ from contin.arrays import Array, ComplexArray
 from contin.core.newton import correct
 from contin.core.state import Stop
 from contin.core.trial import TestFunction, Trial, linearization
-from contin.cycles.statement import PERIOD
 from contin.errors import ConvergenceError
 from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
 from contin.problems.angles import whole_rounds
+from contin.problems.own_names import PERIOD
 
 if TYPE_CHECKING:
     from contin.cycles.system import CycleCollocation

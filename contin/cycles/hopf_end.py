@@ -21,10 +21,10 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.state import Reason, Stop
 from contin.core.trial import TestFunction, Trial
-from contin.cycles.statement import PERIOD
 from contin.errors import ConvergenceError
 from contin.events.root import find_zero
 from contin.events.segment import Segment, SpecialPoint
+from contin.problems.own_names import PERIOD
 
 if TYPE_CHECKING:
     from contin.cycles.system import CycleCollocation

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from contin.arrays import Function
-from contin.cycles.statement import ROUNDS
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments
 from contin.problems.angles import Angles, angle_periods, check_periodic, winding_names
+from contin.problems.own_names import ROUNDS
 from contin.problems.statement import check_statement
 
 

@@ -16,7 +16,6 @@ from contin.cycles.folds import events_on_folds
 from contin.cycles.map_normal_forms import at_special_point
 from contin.cycles.map_statement import MapProblem
 from contin.cycles.phase import map_in_phase
-from contin.cycles.statement import ROUNDS, rounds_of
 from contin.cycles.system import is_opposite, is_pair
 from contin.equilibria.system import Algebraic
 from contin.events.coefficient import Coefficient
@@ -24,6 +23,7 @@ from contin.events.segment import SpecialPoint
 from contin.functions.batch import Batch
 from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
+from contin.problems.own_names import ROUNDS, rounds_of
 
 #: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
 _SHRUNK = 1e-7

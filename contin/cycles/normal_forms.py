@@ -37,9 +37,9 @@ from contin.arrays import Array
 from contin.core.multilinear import of_complex
 from contin.cycles.floquet import has_double_one
 from contin.cycles.round import Round, Solver
-from contin.cycles.statement import PERIOD
 from contin.events.coefficient import Coefficient
 from contin.events.segment import SpecialPoint
+from contin.problems.own_names import PERIOD
 
 if TYPE_CHECKING:
     from contin.cycles.system import PeriodicCollocation

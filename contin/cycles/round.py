@@ -38,7 +38,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from contin.arrays import Array
-from contin.cycles.statement import PERIOD
+from contin.problems.own_names import PERIOD
 
 if TYPE_CHECKING:
     from contin.cycles.system import PeriodicCollocation

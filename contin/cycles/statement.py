@@ -19,16 +19,13 @@ from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature
 from contin.problems.angles import WINDING, Angles, angle_periods, check_periodic, winding_names
+from contin.problems.own_names import PERIOD, ROUNDS
 from contin.problems.statement import check_statement
 from contin.problems.vector_field import check_field, found_elsewhere, of_parameters, returning, scaled
 
 #: What is said of a field with other arguments.
 _FORCED = "must be a function of (t, u, p), as a period is given"
 _AUTONOMOUS = "must be a function of (u, p); one of (t, u, p) needs a period"
-#: The name of the period: of an autonomous field a parameter, of a forced one a column.
-PERIOD = "period"
-#: Of a forced field, the parameter that says after how many periods of the forcing the cycle closes.
-ROUNDS = "rounds"
 
 #: The period of a forcing: a number, the name of a parameter, or a function of the parameters.
 Period = float | str | Callable[[Any], Any]
@@ -258,22 +255,6 @@ def _turn(symmetry: Any, forced: bool, count: int) -> Array:
 
 #: The cycles of vector fields that are still used: to state them anew would make their functions ready again.
 _STATED: weakref.WeakKeyDictionary[AlgebraicProblem, CycleProblem] = weakref.WeakKeyDictionary()
-
-
-def rounds_of(free: Sequence[str], parameters: Mapping[str, float]) -> int:
-    """Return the number of rounds after which a cycle of a forced system, or of a map, closes.
-
-    Raises
-    ------
-    ProblemError
-        It is no whole number, or free.
-    """
-    rounds = parameters[ROUNDS]
-    if ROUNDS in free:
-        raise ProblemError(f"free: {ROUNDS} must not be free, as it is a whole number")
-    if not (rounds >= 1 and rounds == int(rounds)):
-        raise ProblemError(f"parameters: {ROUNDS} = {checks.shown(rounds)} must be a whole number from 1")
-    return int(rounds)
 
 
 def _scaled_by_forcing(field: Function, period: Function) -> Function:

@@ -17,12 +17,12 @@ from contin.core.system import System
 from contin.core.trial import Trial
 from contin.cycles.floquet import Floquet, floquet
 from contin.cycles.maps import MapSystem
-from contin.cycles.statement import PERIOD
 from contin.cycles.system import PeriodicCollocation
 from contin.defining.extended import Extended
 from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.phase_loads import phase_loads
+from contin.problems.own_names import PERIOD
 from contin.results import portrait
 from contin.results.profile import Profile
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.connections.events import crossing, ending
-from contin.connections.statement import TIME, ConnectionProblem
+from contin.connections.statement import ConnectionProblem
 from contin.connections.system import ConnectionCollocation
 from contin.core.trial import Trial, linearization
 from contin.errors import ProblemError
 from contin.problems.angles import winding_names
+from contin.problems.own_names import TIME
 from contin.results.point import Point
 
 #: Part of the tangent along which the sense of the new curve is looked at: differences of what is known to 1e-10.

@@ -11,9 +11,10 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.cycles.statement import PERIOD, ROUNDS, CycleProblem
+from contin.cycles.statement import CycleProblem
 from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds, winding_names
+from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
 from contin.search.solving import solve
 

@@ -14,7 +14,7 @@ from contin.collocation.degree import CYCLE_DEGREE
 from contin.collocation.mesh import MeshControl
 from contin.core.scales import usual
 from contin.cycles.maps import MapSystem
-from contin.cycles.statement import PERIOD, ROUNDS, CycleProblem
+from contin.cycles.statement import CycleProblem
 from contin.cycles.system import CycleCollocation, PeriodicCollocation
 from contin.equilibria.lyapunov import CriticalPair, critical_pair
 from contin.equilibria.system import Algebraic
@@ -22,6 +22,7 @@ from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.kinds import discretized
 from contin.problems.angles import windings
+from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
 
 #: A state of an equilibrium that is smaller than this part of the largest, or than this, may be round-off, and has no size.

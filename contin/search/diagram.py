@@ -18,7 +18,7 @@ from contin.core.protocol import Discretization, inner
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.state import Reason, Stop
 from contin.cycles.maps import MapSystem
-from contin.cycles.statement import PERIOD, ROUNDS, CycleProblem
+from contin.cycles.statement import CycleProblem
 from contin.cycles.system import CycleCollocation, PeriodicCollocation
 from contin.equilibria.statement import AlgebraicProblem
 from contin.equilibria.system import Algebraic
@@ -27,6 +27,7 @@ from contin.events.branch_point import BranchPoint
 from contin.events.multiple_point import MultiplePoint
 from contin.functions.signature import argument_count
 from contin.problems.angles import whole_rounds, winding_names
+from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results import plot
 from contin.results.branch import Branch
 from contin.results.point import Point, system_of

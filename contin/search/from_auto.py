@@ -14,12 +14,13 @@ from contin.collocation.basis import basis, interpolation
 from contin.continuation.run import Continuation, follow
 from contin.core.settings import Settings
 from contin.core.system import System
-from contin.cycles.statement import PERIOD, ROUNDS, CycleProblem
+from contin.cycles.statement import CycleProblem
 from contin.equilibria.statement import AlgebraicProblem
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.kinds import discretized
 from contin.problems.angles import windings
+from contin.problems.own_names import PERIOD, ROUNDS
 from contin.problems.statement import with_multipliers
 from contin.results.auto_07p import AutoSolution
 from contin.results.point import Point

@@ -11,16 +11,16 @@ from contin import checks
 from contin.arrays import Array
 from contin.collocation.degree import usual_degree
 from contin.collocation.mesh import MeshControl
-from contin.connections.statement import TIME, ConnectionProblem
+from contin.connections.statement import ConnectionProblem
 from contin.connections.system import ConnectionCollocation
 from contin.core.newton import Newton
 from contin.cycles.homoclinic import equilibrium_beside
-from contin.cycles.statement import PERIOD
 from contin.cycles.system import CycleCollocation
 from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.linalg.orientation import first_least
 from contin.problems.angles import periods_of, whole_rounds, winding_names, windings
+from contin.problems.own_names import PERIOD, TIME
 from contin.results.point import Point
 from contin.search.grown_orbit import grown_orbit
 from contin.search.solving import solved

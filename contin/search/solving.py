@@ -21,11 +21,12 @@ from contin.connections.statement import ConnectionProblem
 from contin.core.newton import Corrected, Newton, approached, correct
 from contin.core.settling import ROUNDS
 from contin.core.system import System
-from contin.cycles.statement import PERIOD, CycleProblem
+from contin.cycles.statement import CycleProblem
 from contin.equilibria.statement import AlgebraicProblem
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.angles import winding_names
+from contin.problems.own_names import PERIOD
 from contin.problems.statement import forget_changed, with_multipliers
 from contin.results.point import Point, point_of, system_of, underlying
 from contin.search.deflation import correct_away

@@ -19,10 +19,11 @@ from __future__ import annotations
 import numpy as np
 
 from contin.arrays import Array
-from contin.connections.statement import TIME, ConnectionProblem
+from contin.connections.statement import ConnectionProblem
 from contin.connections.system import ConnectionCollocation
 from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
+from contin.problems.own_names import TIME
 
 #: First mesh, and half of the time in units of 1 / e: cut off there, the orbit ends at a distance of 2e-5 of its size.
 _INTERVALS, _DEGREE, _HALF = 40, 4, 7.0
