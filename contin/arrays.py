@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,3 +17,5 @@ Mask = NDArray[np.bool_]
 Pattern = NDArray[np.bool_]
 #: A user's function, which the engine compiles.
 Function = Callable[..., Any]
+#: Points of a mesh, as a user gives them.
+Places = Sequence[float] | Array

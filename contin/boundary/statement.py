@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 
 from contin import checks
-from contin.arrays import Function
+from contin.arrays import Function, Places
+from contin.boundary.system import Collocation
+from contin.core.scales import Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature, argument_count, result_count
@@ -94,6 +96,13 @@ class BoundaryValueProblem(Restated):
             raise ProblemError(f"rhs returns {self._counts['rhs']} values for the {len(self.state_names)} states {given}")
         known = (*self.parameters, *self.state_names)
         object.__setattr__(self, "phases", checks.chosen("phases", self.phases, known))
+
+    def discretized(
+        self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
+        degree: int = 0,
+    ) -> Collocation:  # fmt: skip
+        """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
+        return Collocation(self, mesh, degree, free, parameters, scales)
 
     def events(self) -> list[TestFunction]:
         """Return the test functions that the statement brings."""

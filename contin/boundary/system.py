@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contin.arrays import Array, Indices
-from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.assembly import Bordering, Tables, assemble, at_points, collocate, fill_phase_row
 from contin.collocation.basis import basis, interpolation
 from contin.collocation.defect import Defect
@@ -33,6 +32,7 @@ from contin.linalg.layout import Blocks, Layout, layout
 from contin.linalg.segments import run, share
 
 if TYPE_CHECKING:
+    from contin.boundary.statement import BoundaryValueProblem
     from contin.core.trial import TestFunction
 
 

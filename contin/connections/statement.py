@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from contin import checks
-from contin.arrays import Function
+from contin.arrays import Function, Places
 from contin.boundary.statement import BoundaryValueProblem
+from contin.connections.system import ConnectionCollocation
+from contin.core.scales import Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, Signature
@@ -119,6 +121,13 @@ class ConnectionProblem(BoundaryValueProblem):
     def _signatures(self) -> Mapping[str, Arguments]:
         """Return the arguments of the functions."""
         return {"field": Signature(self.state_names, tuple(self.parameters), times=False).arguments}
+
+    def discretized(
+        self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
+        degree: int = 0,
+    ) -> ConnectionCollocation:  # fmt: skip
+        """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
+        return ConnectionCollocation(self, mesh, degree, free, parameters, scales)
 
     @property
     def multipliers(self) -> tuple[str, ...]:

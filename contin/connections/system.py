@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from contin.boundary.conditions import Conditioned
 from contin.boundary.system import Collocation
 from contin.collocation.mesh import MeshControl
 from contin.connections.events import homoclinic_points, named
-from contin.connections.statement import ConnectionProblem
 from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
@@ -23,6 +22,9 @@ from contin.events.segment import SpecialPoint
 from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
 from contin.problems.own_names import TIME
+
+if TYPE_CHECKING:
+    from contin.connections.statement import ConnectionProblem
 
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
 _MOVED = 1e-6

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from contin.arrays import Function
+from contin.arrays import Function, Places
+from contin.core.scales import Scales
+from contin.cycles.maps import MapSystem
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
@@ -75,6 +77,13 @@ class MapProblem(AlgebraicProblem):
         super().__init__(map, states, parameters, {} if functionals is None else functionals, dynamics=False, angles=angles)
         if self.equation_size != len(self.state_names):
             raise ProblemError(f"map returns {self.equation_size} values for the {len(names)} states {', '.join(names)}")
+
+    def discretized(
+        self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
+        degree: int = 0,
+    ) -> MapSystem:  # fmt: skip
+        """Return F(x) = 0 with these free parameters and sizes; there is no mesh."""
+        return MapSystem(self, free, parameters, scales)
 
     def _check_angles(self) -> None:
         if self.angles and self.equation_size == len(self.state_names):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from contin.core.trial import TestFunction
 from contin.cycles.floquet import doubled, doubling, torus
 from contin.cycles.folds import events_on_folds
 from contin.cycles.map_normal_forms import at_special_point
-from contin.cycles.map_statement import MapProblem
 from contin.cycles.phase import map_in_phase
 from contin.cycles.system import is_opposite, is_pair
 from contin.equilibria.system import Algebraic
@@ -24,6 +23,9 @@ from contin.functions.batch import Batch
 from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
 from contin.problems.own_names import ROUNDS, rounds_of
+
+if TYPE_CHECKING:
+    from contin.cycles.map_statement import MapProblem
 
 #: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
 _SHRUNK = 1e-7

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array, Function
+from contin.arrays import Array, Function, Places
 from contin.boundary.statement import BoundaryValueProblem
+from contin.core.scales import Scales
 from contin.cycles.symmetry import averaged, check_equivariance, check_lattice, image, order_of, symmetry_matrix
+from contin.cycles.system import CycleCollocation, ForcedCollocation, PeriodicCollocation
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
@@ -154,6 +156,21 @@ class CycleProblem(BoundaryValueProblem):
         of_field = Signature(states, parameters, times=self.period is not None).arguments
         of_means = Signature(states, tuple(self.parameters), times=self.period is not None).arguments
         return {"field": of_field, "functionals": of_means, "period": [parameters]}
+
+    def discretized(
+        self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
+        degree: int = 0,
+    ) -> PeriodicCollocation:  # fmt: skip
+        """Return F(x) = 0 with these free parameters and sizes, on a mesh.
+
+        Examples
+        --------
+        >>> problem = CycleProblem(lambda u, p: (u.v, -p.k * u.x), ["x", "v"], {"k": 4.0})
+        >>> problem.discretized(["k", "period"], {"period": 3.0}, mesh=[0, 0.5, 1], degree=4)
+        CycleCollocation(2 intervals of degree 4, states x, v; free k, period)
+        """
+        kind = CycleCollocation if self.period is None else ForcedCollocation
+        return kind(self, mesh, degree, free, parameters, scales)
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:

@@ -7,7 +7,7 @@ import math
 import threading
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,6 @@ from contin.cycles.hopf_end import AMPLITUDE, COLLAPSED, hopf_point_inside, shru
 from contin.cycles.monodromy import DRIFTED, Monodromy, fill_multipliers, monodromy_of
 from contin.cycles.normal_forms import at_special_point
 from contin.cycles.phase import cycle_in_phase, forced_cycle_in_phase, lasting
-from contin.cycles.statement import CycleProblem
 from contin.errors import ProblemError
 from contin.events.coefficient import Coefficient
 from contin.events.segment import Segment, SpecialPoint
@@ -40,6 +39,9 @@ from contin.linalg.periodic import log_eigenvalues_along
 from contin.linalg.transitions import interval_matrices
 from contin.problems.angles import check_windings, gain, periods_of, whole_rounds
 from contin.problems.own_names import PERIOD, rounds_of
+
+if TYPE_CHECKING:
+    from contin.cycles.statement import CycleProblem
 
 #: A pair on the unit circle that is this near to -1, as an angle, is no torus bifurcation: round-off of a double one is its
 #: square root.

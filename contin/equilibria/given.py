@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contin.arrays import Array
-from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
+
+if TYPE_CHECKING:
+    from contin.equilibria.statement import AlgebraicProblem
 
 #: Length of differences of fourth order, relative to 1 + |u|; half of it serves the error estimate. Errors are below 1e-10 of
 #: the sizes of the terms.

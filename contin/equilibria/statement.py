@@ -13,7 +13,9 @@ from typing import Any, cast
 import numpy as np
 
 from contin import checks
-from contin.arrays import Array, Function
+from contin.arrays import Array, Function, Places
+from contin.core.scales import Scales
+from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.functions import round_off
 from contin.functions.batch import Batch
@@ -94,6 +96,13 @@ class AlgebraicProblem(Restated):
     def _check_angles(self) -> None:
         if self.angles:
             check_periodic("residual", self.batch("residual"), self.angles, self.parameters)
+
+    def discretized(
+        self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
+        degree: int = 0,
+    ) -> Algebraic:  # fmt: skip
+        """Return F(x) = 0 with these free parameters and sizes; there is no mesh."""
+        return Algebraic(self, free, parameters, scales)
 
     @property
     def state_names(self) -> tuple[str, ...]:

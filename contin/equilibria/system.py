@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from contin.core.trial import TestFunction
 from contin.equilibria.folds import events_on_folds
 from contin.equilibria.given import check_given
 from contin.equilibria.lyapunov import at_hopf_point
-from contin.equilibria.statement import AlgebraicProblem
 from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
 from contin.events.segment import SpecialPoint
@@ -28,6 +27,9 @@ from contin.linalg.factors import Factors
 from contin.linalg.rightmost import nearest, rightmost
 from contin.linalg.sparse import SparseFactors
 from contin.problems.angles import whole_rounds
+
+if TYPE_CHECKING:
+    from contin.equilibria.statement import AlgebraicProblem
 
 
 class Algebraic(System):

@@ -34,7 +34,6 @@ from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint
 from contin.events.multiple_point import MultiplePoint
 from contin.files import write_whole
-from contin.kinds import algebraic, discretized
 from contin.results.branch import Branch
 from contin.results.point import Point
 
@@ -235,9 +234,7 @@ def _base(
     sizes = {name.removeprefix("scale_").removesuffix(str(i)): array for name, array in arrays.items()
              if name.startswith("scale_") and name.rstrip("0123456789") + str(i) == name}  # fmt: skip
     scales = Scales.of_arrays(sizes) if sizes else None
-    if isinstance(problem, AlgebraicProblem):
-        return algebraic(problem, head["free"], values, scales)
-    return discretized(problem, arrays[f"mesh{i}"], head["degrees"][i], head["free"], values, scales)
+    return problem.discretized(head["free"], values, scales, arrays.get(f"mesh{i}", ()), head["degrees"][i])
 
 
 def _column_of(row: dict[str, Any], parameters: Mapping[str, float]) -> tuple[str, float | None]:

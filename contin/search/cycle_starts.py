@@ -20,7 +20,6 @@ from contin.equilibria.lyapunov import CriticalPair, critical_pair
 from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint, locate_branch_point
-from contin.kinds import discretized
 from contin.problems.angles import windings
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
@@ -147,7 +146,7 @@ def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array
     problem, turn, gained = system.problem, system.problem.symmetry, system.gains[1]
     further = windings(problem.angles, problem.state_names, gained + turn @ gained)
     parameters = {**point.parameters, longer: factor * point.parameters[longer], **further}
-    twice: Any = discretized(problem.doubled(), mesh, system.degree, system.free, parameters, system.scales)
+    twice: Any = problem.doubled().discretized(system.free, parameters, system.scales, mesh, system.degree)
     states = system.states(x)
     x = twice.pack(np.concatenate([states, states[1:] @ turn.T + gained]), parameters)
     found = locate_branch_point(twice.with_reference(x), x)

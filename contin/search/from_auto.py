@@ -18,7 +18,6 @@ from contin.cycles.statement import CycleProblem
 from contin.equilibria.statement import AlgebraicProblem
 from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
-from contin.kinds import discretized
 from contin.problems.angles import windings
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.problems.statement import with_multipliers
@@ -114,7 +113,7 @@ def _system(problem: Any, solution: AutoSolution, free: Sequence[str], values: M
     if not degree:
         raise ProblemError("solution: is an equilibrium; state the problem as an AlgebraicProblem")
     mesh = a + (b - a) * solution.t[::degree]
-    system = discretized(problem, mesh, degree, free, values)
+    system = problem.discretized(free, values, None, mesh, degree)
     x = system.pack(_at_nodes(solution), values)
     return system.with_reference(x), x
 

@@ -21,7 +21,6 @@ from contin.cycles.statement import CycleProblem
 from contin.cycles.system import PeriodicCollocation
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
-from contin.kinds import algebraic, discretized
 from contin.names import exact_text
 from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
 from contin.results.point import Point
@@ -58,7 +57,7 @@ def first_guess(problem: Any, guess: Guess, options: Options) -> tuple[System, A
 
 @first_guess.register
 def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tuple[System, Array]:
-    system = algebraic(problem, options.free, options.parameters)
+    system = problem.discretized(options.free, options.parameters)
     given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
     count = len(problem.state_names)  # a map takes one point of a cycle, too
     states = np.zeros(count) if given is None else _numbers(given)
@@ -83,7 +82,7 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
         given, slack = _numbers(guess[0]), _SLACK * (b - a)
         if not given.size or not np.all(np.diff(given) > 0) or not given[0] <= a + slack or not given[-1] >= b - slack:
             raise ProblemError(f"guess: its t must increase and cover the domain {exact_text(a)} ... {exact_text(b)}")
-    system = discretized(problem, mesh, options.degree, options.free, options.parameters)
+    system = problem.discretized(options.free, options.parameters, None, mesh, options.degree)
     if not isinstance(guess, Point):
         system = system.on_breaks()
     if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):

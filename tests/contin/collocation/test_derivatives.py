@@ -9,7 +9,6 @@ from contin import AlgebraicProblem, BoundaryValueProblem, ConnectionProblem, Cy
 from contin.core.differences import derivative
 from contin.core.protocol import Discretization
 from contin.core.system import System
-from contin.kinds import algebraic, discretized
 
 MESH = np.array([0, 0.3, 0.55, 1.0])
 
@@ -21,7 +20,7 @@ def boundary_value():
         ["u", "v"], {"a": 0.7, "b": 0.4, "c": 1.1}, integrals=lambda t, u, p: (u.u**2 * u.v - p.c * p.a,),
         functionals={"work": lambda t, u, p: p.a * u.u**2 * u.v},
     )  # fmt: skip
-    return discretized(problem, MESH, 3, ["c", "a"], {})
+    return problem.discretized(["c", "a"], {}, None, MESH, 3)
 
 
 def scaled(system):
@@ -35,7 +34,7 @@ def cycle(**options):
         lambda u, p: (p.mu * u.x - u.y - u.x**3 * p.c, u.x * (1 + u.y**2) + p.mu * u.y - u.y**3), ["x", "y"],
         {"mu": 0.4, "c": 1.2}, functionals={"work": lambda u, p: p.mu * u.x**2 * u.y}, **options,
     )  # fmt: skip
-    system = discretized(problem, MESH, 3, ["mu", "period"], {"period": 3.0})
+    system = problem.discretized(["mu", "period"], {"period": 3.0}, None, MESH, 3)
     return system.with_reference(
         system.pack(np.random.default_rng(9).standard_normal((system.nodes.size, 2)), problem.parameters)
     )
@@ -46,7 +45,7 @@ def forced():
         lambda t, u, p: (u.y, -u.x**3 - p.c * u.y + p.a * math.cos(p.w * t)), ["x", "y"], {"a": 0.4, "c": 1.2, "w": 1.3},
         period=lambda p: 2 * math.pi / p.w,
     )  # fmt: skip
-    return discretized(problem, MESH, 3, ["w"], {})
+    return problem.discretized(["w"], {}, None, MESH, 3)
 
 
 def connection(stable):
@@ -57,7 +56,7 @@ def connection(stable):
 
     problem = ConnectionProblem(field, ["u", "v", "w"], {"a": 0.25, "c": 0.3}, unstable=1, stable=stable)
     ends = dict(zip(problem.multipliers, (0.1, 0.05, -0.1, 1.1, 0.05, 0.1)))  # near saddles
-    system = discretized(problem, MESH, 3, ["a", "c", *problem.multipliers], {"time": 2.0, **ends})
+    system = problem.discretized(["a", "c", *problem.multipliers], {"time": 2.0, **ends}, None, MESH, 3)
     x = system.pack(np.random.default_rng(9).standard_normal((system.nodes.size, 3)) / 4, {**problem.parameters, **ends})
     return system.with_reference(x), x
 
@@ -67,12 +66,12 @@ def equations():
         lambda u, p: (u.x**2 * u.y - p.a * math.exp(u.x), math.sin(u.x * u.y) + p.a**2 * u.y), ["x", "y"], {"a": 0.4, "b": 1.0},
         functionals={"work": lambda u, p: p.a * u.x**2 * u.y},
     )  # fmt: skip
-    return algebraic(problem, ["a"], {})
+    return problem.discretized(["a"], {})
 
 
 def henon():
     problem = MapProblem(lambda u, p: (1 - p.a * u.x**2 + u.y, p.b * math.sin(u.x)), ["x", "y"], {"a": 0.6, "b": 0.3})
-    return algebraic(problem, ["a", "b"], {"rounds": 3})
+    return problem.discretized(["a", "b"], {"rounds": 3})
 
 
 SYSTEMS = {
