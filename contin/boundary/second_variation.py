@@ -295,7 +295,7 @@ def second_variation(system: Collocation, x: Array) -> SecondVariation | None:
 
 def _intervals(system: Collocation, x: Array) -> tuple[_Pieces, Array] | None:
     """Return the single intervals, with all components of v, and dx at their Gauss points, shape (N, d, n, n + d k)."""
-    n = system.problem.dimension  # type: ignore[attr-defined]
+    n = system.problem.dimension
     h, d = np.diff(system.mesh), system.degree
     jacobian = _jacobian(system, x).reshape(len(h), d, -1, 2 * n)
     a, hll, hxx = jacobian[:, :, :n, :n], jacobian[:, :, :n, n:], -jacobian[:, :, n : 2 * n, :n]

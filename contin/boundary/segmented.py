@@ -126,8 +126,7 @@ class SegmentedProblem(BoundaryValueProblem):
         pieces = _pieces(given, parameters)
         if argument_count(checks.function("boundary", boundary)) != 3:
             raise ProblemError("boundary must take 3 arguments, (a, b, p)")
-        object.__setattr__(self, "segments", given)
-        object.__setattr__(self, "pieces", pieces)
+        self._keep(segments=given, pieces=pieces)
         super().__init__(
             _side_by_side([segment.rhs for segment in given], pieces), _between(boundary, pieces), _names(pieces), parameters,
             functionals=_sums(given, pieces),
@@ -163,7 +162,23 @@ class SegmentedProblem(BoundaryValueProblem):
         begin = float(piece.begin(values))
         return begin, begin + float(piece.length(values))
 
-    def guessed(self, guesses: Sequence[Any], parameters: Mapping[str, float]) -> Callable[[float], Array]:
+    def whole_guess(self, guess: Any, parameters: Mapping[str, float]) -> Any:
+        """Return a guess of all states, on [0, 1], of a list with one for each segment: constant, or a function of s.
+
+        Raises
+        ------
+        ProblemError
+            Another number of them.
+        """
+        if not isinstance(guess, list) or not any(
+            callable(each) or isinstance(each, (list, tuple, np.ndarray)) for each in guess
+        ):
+            return guess
+        if len(guess) != len(self.pieces):
+            raise ProblemError(f"guess: {len(guess)} guesses, must be one for each of the {len(self.pieces)} segments")
+        return self._joined(guess, parameters)
+
+    def _joined(self, guesses: Sequence[Any], parameters: Mapping[str, float]) -> Callable[[float], Array]:
         """Return the states of all segments as a function of the place in [0, 1], from a guess for each segment."""
         known: list[Any] = []
         for index, (guess, piece) in enumerate(zip(guesses, self.pieces)):

@@ -6,11 +6,12 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from contin import checks
-from contin.arrays import Function, Places
+from contin.arrays import Array, Function, Places
 from contin.boundary.system import Collocation
+from contin.collocation.degree import usual_degree
 from contin.core.scales import Scales
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
@@ -86,7 +87,7 @@ class BoundaryValueProblem(Restated):
     phases: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
+        self._keep(states=check_statement(self.states, self.parameters, self.functionals))
         ends = tuple(checks.sequence("domain", self.domain, "two finite numbers, the first the smaller"))
         numbers = len(ends) == 2 and all(checks.is_number(end) and math.isfinite(end) for end in ends)
         if not (numbers and ends[0] < ends[1]):
@@ -95,7 +96,7 @@ class BoundaryValueProblem(Restated):
             given = ", ".join(self.state_names[:8])
             raise ProblemError(f"rhs returns {self._counts['rhs']} values for the {len(self.state_names)} states {given}")
         known = (*self.parameters, *self.state_names)
-        object.__setattr__(self, "phases", checks.chosen("phases", self.phases, known))
+        self._keep(phases=checks.chosen("phases", self.phases, known))
 
     def discretized(
         self, free: Sequence[str], parameters: Mapping[str, float], scales: Scales | None = None, mesh: Places = (),
@@ -103,6 +104,22 @@ class BoundaryValueProblem(Restated):
     ) -> Collocation:  # fmt: skip
         """Return F(x) = 0 with these free parameters and sizes, on a mesh."""
         return Collocation(self, mesh, degree, free, parameters, scales)
+
+    def whole_guess(self, guess: Any, parameters: Mapping[str, float]) -> Any:
+        """Return a guess of all states for one that a user gives."""
+        return guess
+
+    def usual_degree(self, tolerance: float) -> int:
+        """Return the degree of a mesh where none is given."""
+        return usual_degree(len(self.state_names), tolerance)
+
+    def degenerate(self, system: Collocation, x: Array) -> str:
+        """Return why Newton's method may have failed at a guess x; see `Discretization.degenerate`."""
+        return ""
+
+    def undetermined(self, system: Collocation, x: Array) -> str:
+        """Return why a solution x comes with others around it; see `Discretization.undetermined`."""
+        return ""
 
     def events(self) -> list[TestFunction]:
         """Return the test functions that the statement brings."""

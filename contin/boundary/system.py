@@ -613,6 +613,14 @@ class Collocation(System):
         """Return those of the statement."""
         return self.problem.events()
 
+    def degenerate(self, x: Array) -> str:
+        """Return what the statement says."""
+        return self.problem.degenerate(self, x)
+
+    def undetermined(self, x: Array) -> str:
+        """Return what the statement says."""
+        return self.problem.undetermined(self, x)
+
     @property
     def index(self) -> TestFunction | None:
         """That of the statement."""

@@ -10,8 +10,9 @@ from typing import Any
 from contin import checks
 from contin.arrays import Array, Function
 from contin.boundary.canonical import Canonical, Variation, canonical
-from contin.boundary.second_variation import INDEX, legendre
+from contin.boundary.second_variation import INDEX, degeneracy, dependent_conditions, legendre
 from contin.boundary.statement import BoundaryValueProblem
+from contin.boundary.system import Collocation
 from contin.core.trial import TestFunction
 from contin.errors import ProblemError
 from contin.functions.batch import Batch
@@ -133,9 +134,7 @@ class VariationalProblem(BoundaryValueProblem):
             tuple(parameters), tuple(float(starts.get(name, 0.0)) for name in control_names),
         )  # fmt: skip
         derived = canonical(variation)
-        object.__setattr__(self, "variation", variation)
-        object.__setattr__(self, "canonical", derived)
-        object.__setattr__(self, "symmetries", dict(symmetries or {}))
+        self._keep(variation=variation, canonical=derived, symmetries=dict(symmetries or {}))
         for name in self.multipliers:
             if name in parameters:
                 raise ProblemError(f"parameters: {name} is the name of a multiplier, which is a parameter by itself")
@@ -158,6 +157,15 @@ class VariationalProblem(BoundaryValueProblem):
     def events(self) -> list[TestFunction]:
         """Return that of Legendre's condition: where it fails, the energy is not convex in the controls."""
         return [legendre()]
+
+    def degenerate(self, system: Collocation, x: Array) -> str:
+        """Return what makes the equations singular at a guess x."""
+        reason = degeneracy(system, x)
+        return reason and f"{reason}: no solution was found from this guess"
+
+    def undetermined(self, system: Collocation, x: Array) -> str:
+        """Return that conditions repeat or contradict each other at a solution x."""
+        return dependent_conditions(system, x)
 
     @property
     def index(self) -> TestFunction:

@@ -106,15 +106,11 @@ class ConnectionProblem(BoundaryValueProblem):
         signature = Signature(names, (*parameters, *own), times=False)
         field = returning(field, signature)
         check_field(field, signature, "must be a function of (u, p)")
-        object.__setattr__(self, "field", field)
-        object.__setattr__(self, "homoclinic", homoclinic)
-        object.__setattr__(self, "angles", periods)
-        object.__setattr__(self, "unstable", unstable)
-        object.__setattr__(self, "saddle_node", saddle_node)
-        object.__setattr__(self, "stable", count - unstable - saddle_node if stable is None else stable)
+        self._keep(field=field, homoclinic=homoclinic, angles=periods, unstable=unstable, saddle_node=saddle_node)
+        self._keep(stable=count - unstable - saddle_node if stable is None else stable)
         rhs, boundary = scaled(field, TIME), _at_rest(field, names, homoclinic)
         super().__init__(rhs, boundary, names, {**parameters, TIME: 1.0, **dict.fromkeys(own[1:], 0.0)})
-        object.__setattr__(self, "functionals", {"gap": found_elsewhere})
+        self._keep(functionals={"gap": found_elsewhere})
         if periods:
             check_periodic("field", self.batch("vector field"), periods, self.parameters)
 

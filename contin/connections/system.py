@@ -12,12 +12,13 @@ from contin.arrays import Array, Indices
 from contin.boundary.conditions import Conditioned
 from contin.boundary.system import Collocation
 from contin.collocation.mesh import MeshControl
-from contin.connections.events import homoclinic_points, named
+from contin.connections.events import homoclinic_points, named, own_test_of
 from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
 from contin.core.trial import TestFunction, Trial
-from contin.errors import ConvergenceError
+from contin.defining.event_curve import EventCurve
+from contin.errors import ConvergenceError, ProblemError
 from contin.events.segment import SpecialPoint
 from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 #: The references are renewed where an orbit differs from the one they were taken at by more than this part of its size.
 _MOVED = 1e-6
+#: Equilibria that are nearer to each other than this part of the orbit's size are one.
+_SAME = 1e-6
 #: Number of places whose subspaces are kept: a step asks for those of a few iterates.
 _KEPT = 8
 
@@ -404,6 +407,30 @@ class ConnectionCollocation(Conditioned):
     def events(self) -> list[TestFunction]:
         """Return those of special homoclinic orbits; those of a given time, and orbits between two equilibria, have none."""
         return homoclinic_points(self) if self.problem.homoclinic and TIME not in self.free else []
+
+    def check_solution(self, x: Array) -> None:
+        """Check that an orbit between two equilibria does not return to the first one.
+
+        Raises
+        ------
+        ProblemError
+        """
+        problem = self.problem
+        if problem.homoclinic:
+            return
+        count, names = len(problem.state_names), problem.multipliers
+        first, last = (np.array([self.parameter(x, name) for name in part]) for part in (names[:count], names[count:]))
+        if np.abs(first - last).max() <= _SAME * float(np.ptp(self.states(x), axis=0).max()):
+            place = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(problem.state_names, first))
+            raise ProblemError(
+                f"stable: both ends of the orbit are at the equilibrium {place}; leave out stable for a homoclinic orbit, or "
+                f"give a guess of the last equilibrium ({', '.join(names[count:])})"
+            )
+
+    def defining(self, point: Any, x: Array) -> tuple[EventCurve, Array] | None:
+        """Return that of special homoclinic orbits."""
+        test = own_test_of(point.label, self, x) if self.problem.homoclinic else None
+        return None if test is None else (EventCurve(self, test.function, label=test.label), x)
 
     def events_on_curves(self) -> list[TestFunction]:
         """Return those of homoclinic orbits that are special in another way, too."""

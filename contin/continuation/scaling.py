@@ -70,7 +70,7 @@ _HIGHEST = 5
 
 
 def scaled(
-    system: Discretization, x: Array, row: Array, linear: Linearization, primary: str, settings: Settings
+    system: Any, x: Array, row: Array, linear: Linearization, primary: str, settings: Settings
 ) -> tuple[Discretization, Array]:
     """Return the system with sizes of states and parameters taken from a first point, and x for it.
 
@@ -78,7 +78,7 @@ def scaled(
 
     Unchanged where it has sizes already, or where all are of order one.
     """
-    if not isinstance(system, System) or not system.scales.are_one:
+    if system.on_curve or not system.scales.are_one:
         return system, x
     problem, states = system.problem, list(system.problem.states)
     names, stated = [*states, *system.free], settings.scales
@@ -465,12 +465,12 @@ def _said(name: str, settings: Settings) -> float:
     return min((abs(float(number)) for number in said if number), default=np.inf)
 
 
-def renewed(system: Discretization, x: Array) -> tuple[Discretization, Carrier]:
+def renewed(system: Any, x: Array) -> tuple[Discretization, Carrier]:
     """Return the system with the sizes that values have where a branch begins, and the carrier: smaller ones are past.
 
     A trivial branch that begins at a small load leaves its size to the branches that turn off at loads of order one.
     """
-    if not isinstance(system, System) or system.scales.are_one:
+    if system.on_curve or system.scales.are_one:
         return system, np.array
     names, count, scales = list(system.problem.parameters), len(system.problem.states), system.scales
     largest = system.largest(x)
@@ -483,13 +483,13 @@ def renewed(system: Discretization, x: Array) -> tuple[Discretization, Carrier]:
 
 
 def outgrown(
-    system: Discretization, x: Array, adapted: tuple[Discretization, Carrier] | None = None
+    system: Any, x: Array, adapted: tuple[Discretization, Carrier] | None = None
 ) -> tuple[Discretization, Carrier] | None:
     """Return the system, or one adapted to x, with larger sizes where unknowns have outgrown theirs, and the carrier.
 
     What was adapted, which may be nothing, where there is no need.
     """
-    if not isinstance(system, System) or not np.abs(x).max() > USUAL[1]:
+    if system.on_curve or not np.abs(x).max() > USUAL[1]:
         return adapted  # most steps
     names, count = list(system.problem.parameters), len(system.problem.states)
     states, parameters = system.scales.states, system.scales.parameters.copy()
@@ -498,8 +498,8 @@ def outgrown(
     if max(size.max(), size_of_free.max(initial=0.0)) <= 1:
         return adapted
     parameters[[names.index(name) for name in system.free]] *= np.maximum(1.0, size_of_free)
+    base: Any
     base, carry = adapted or (system, np.array)
-    assert isinstance(base, System)
     other, _ = base.with_scales(carry(x), states * np.maximum(1.0, size), parameters)
     if other is base:
         return adapted

@@ -66,6 +66,10 @@ class Discretization(Equations, Protocol):
         Sizes of states and parameters, by which they are divided in x; None where these are as they are.
     free_scales : ndarray
         Those of the free parameters.
+    order : int
+        Into how many equal parts a symmetry divides a cycle; x holds one of them.
+    leaving : mapping of str to tuple of str
+        Kinds of curves in two parameters that begin at, or pass, points of codimension two, by their label.
     """
 
     problem: Statement
@@ -79,6 +83,8 @@ class Discretization(Equations, Protocol):
     degree: int
     scales: Any
     free_scales: Array
+    order: int = 1
+    leaving: Mapping[str, tuple[str, ...]] = {}
 
     @property
     @abstractmethod
@@ -183,6 +189,50 @@ class Discretization(Equations, Protocol):
     def solution(self) -> Discretization:
         """The problem whose solutions are followed: of a curve in two parameters the one that it is made of, else itself."""
         return self
+
+    @property
+    def on_curve(self) -> bool:
+        """Whether x is a point of a curve in two parameters, and holds more than a solution or less equations."""
+        return self.solution is not self
+
+    @property
+    def is_cycle(self) -> bool:
+        """Whether solutions are periodic orbits, of vector fields or maps."""
+        return False
+
+    def unstable(self, x: Array) -> int | None:
+        """Return the number of unstable eigenvalues, or multipliers of a cycle; None where it is not known."""
+        return None
+
+    def check_solution(self, x: Array) -> None:
+        """Check that a solution is one of the kind that was asked for.
+
+        Raises
+        ------
+        ProblemError
+        """
+        return
+
+    def degenerate(self, x: Array) -> str:
+        """Return why Newton's method may have failed at a guess x, as a sentence; "" where nothing is known."""
+        return ""
+
+    def undetermined(self, x: Array) -> str:
+        """Return why a solution x comes with others around it, of which round-off chose one, as a sentence; "" if not."""
+        return ""
+
+    @property
+    def curves(self) -> Mapping[str, type]:
+        """The extended systems of `defining`, by the label of their points."""
+        return {}
+
+    def defining(self, point: Any, x: Array) -> tuple[Any, Array] | None:
+        """Return the extended system of special points like a labelled one, and its first x; None where there is none.
+
+        ``x`` is the point in this system, which has one free parameter more than a curve of solutions needs. Folds, branch
+        points, extrema and values of columns are no business of the kind.
+        """
+        return None
 
     def events(self) -> list[TestFunction]:
         """Return the test functions that the kind brings, beyond folds and branch points.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -19,11 +19,13 @@ from contin.core.trial import TestFunction, Trial
 from contin.cycles.multiplier_curves import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.cycles.normal_forms import NormalForms
 from contin.cycles.round import Round
-from contin.cycles.system import PeriodicCollocation
 from contin.defining.extended import Borders
 from contin.defining.fold_curve import FoldCurve, shrinking
 from contin.events.coefficient import Coefficient
 from contin.problems.own_names import PERIOD
+
+if TYPE_CHECKING:
+    from contin.cycles.system import PeriodicCollocation
 
 #: Logarithms of two multipliers that are one at a fold differ by less: the square root of their error.
 _DOUBLE = 1e-3
@@ -35,7 +37,7 @@ class CycleCurve(MultiplierCurve):
     @property
     def cycles(self) -> PeriodicCollocation:
         """The underlying system."""
-        return cast(PeriodicCollocation, self.base)
+        return cast("PeriodicCollocation", self.base)
 
     @functools.cached_property
     def _folds(self) -> FoldCurve:

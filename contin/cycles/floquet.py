@@ -27,6 +27,7 @@ from contin.core.trial import TestFunction, Trial, sign_changed
 from contin.cycles.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
 from contin.errors import ConvergenceError
 from contin.events.hopf import hopf, hopf_points, passes
+from contin.events.labelled import frequency_of
 from contin.events.segment import Place, Segment, SpecialPoint
 from contin.events.significance import on_finer_mesh
 
@@ -223,13 +224,13 @@ def doubled(system: PeriodicCollocation | MapSystem, point: SpecialPoint) -> Spe
 
 def _may_double(segment: Segment) -> bool:
     """Return whether there may be period doublings inside a step."""
-    test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
+    test = doubling(segment.trial.system.order)
     return not segment.before.value(test) * segment.trial.value(test) > 0 or _comes_near(segment, MINUS_ONE)
 
 
 def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     """Return the period doublings between places of a step, in order."""
-    test = doubling(segment.trial.system.order)  # type: ignore[attr-defined]
+    test = doubling(segment.trial.system.order)
     known = [trial.value(test) for _, trial in knots]
     if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, MINUS_ONE):
         return []
@@ -340,6 +341,15 @@ def _followed(segment: Segment, at: float, square: float, test: TestFunction) ->
         at, square, _ = _parabola((at - apart, at, at + apart), (values[0], value, values[1]))
         if not square > 0 or not 0 < at < segment.step:
             return None
+
+
+def critical_angle(system: PeriodicCollocation | MapSystem, point: Any, x: Array) -> float:
+    """Return the angle of the pair on the circle at a torus bifurcation x: that of the point or, if unknown, of the nearest."""
+    known = frequency_of(point)
+    if known is not None:
+        return known
+    values = system.eigenvalues(x)
+    return float(abs(values[np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))].imag))
 
 
 def torus() -> TestFunction:

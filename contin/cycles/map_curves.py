@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -20,11 +20,13 @@ from contin.arrays import Array
 from contin.core.system import System
 from contin.core.trial import TestFunction
 from contin.cycles.map_normal_forms import period_doubling, torus
-from contin.cycles.maps import MapSystem
 from contin.cycles.multiplier_curves import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.defining.extended import Borders
 from contin.events.coefficient import Coefficient
 from contin.linalg.dense import DenseFactors
+
+if TYPE_CHECKING:
+    from contin.cycles.maps import MapSystem
 
 
 class MapCurve(MultiplierCurve):
@@ -33,7 +35,7 @@ class MapCurve(MultiplierCurve):
     @property
     def cycles(self) -> MapSystem:
         """The underlying system."""
-        return cast(MapSystem, self.base)
+        return cast("MapSystem", self.base)
 
     @property
     def copy_shape(self) -> tuple[int, Array]:

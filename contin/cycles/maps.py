@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,15 @@ from contin.arrays import Array, ComplexArray, Mask
 from contin.core.rounding import on_circle
 from contin.core.scales import Scales
 from contin.core.trial import TestFunction
-from contin.cycles.floquet import doubled, doubling, torus
+from contin.cycles.floquet import critical_angle, doubled, doubling, torus, unstable
 from contin.cycles.folds import events_on_folds
+from contin.cycles.map_curves import MapDoublingCurve, MapTorusCurve
 from contin.cycles.map_normal_forms import at_special_point
 from contin.cycles.phase import map_in_phase
 from contin.cycles.system import is_opposite, is_pair
 from contin.equilibria.system import Algebraic
 from contin.events.coefficient import Coefficient
+from contin.events.labelled import doubles
 from contin.events.segment import SpecialPoint
 from contin.functions.batch import Batch
 from contin.linalg.periodic import log_eigenvalues
@@ -332,6 +335,26 @@ class MapSystem(Algebraic):
         return self, x
 
     # --- what the kind knows of its branches --------------------------------------------------------------------------
+
+    @property
+    def is_cycle(self) -> bool:
+        """Yes."""
+        return True
+
+    def unstable(self, x: Array) -> int:
+        """Return the number of unstable multipliers."""
+        return unstable(self, x)
+
+    @property
+    def curves(self) -> Mapping[str, type]:
+        """Those of period doublings and torus bifurcations."""
+        return {kind.kind: kind for kind in (MapDoublingCurve, MapTorusCurve)}
+
+    def defining(self, point: Any, x: Array) -> tuple[Any, Array] | None:
+        """Return those of period doublings and torus bifurcations."""
+        if doubles(point):
+            return MapDoublingCurve(self), x
+        return (MapTorusCurve(self), np.append(x, math.cos(critical_angle(self, point, x)))) if point.label == "TR" else None
 
     def events(self) -> list[TestFunction]:
         """Return those of period doublings and torus bifurcations."""

@@ -13,6 +13,7 @@ import numpy as np
 from contin import checks
 from contin.arrays import Array, Function, Places
 from contin.boundary.statement import BoundaryValueProblem
+from contin.collocation.degree import CYCLE_DEGREE
 from contin.core.scales import Scales
 from contin.cycles.symmetry import averaged, check_equivariance, check_lattice, image, order_of, symmetry_matrix
 from contin.cycles.system import CycleCollocation, ForcedCollocation, PeriodicCollocation
@@ -110,8 +111,8 @@ class CycleProblem(BoundaryValueProblem):
     means: Mapping[str, Function]
     period: Function | None
     symmetry: Array
-    order: int
-    angles: Mapping[str, float]
+    #: A period that is free where nothing else needs to be.
+    spare = PERIOD
 
     def __init__(
         self, field: Function, states: Sequence[str], parameters: Mapping[str, float], *,
@@ -136,16 +137,11 @@ class CycleProblem(BoundaryValueProblem):
         check_lattice(turn, names, periods)
         found = None if period is None else of_parameters("period", period, parameters, positive=True)
         rhs = scaled(field, PERIOD, order_of(turn)) if found is None else _scaled_by_forcing(field, found)
-        object.__setattr__(self, "field", field)
-        object.__setattr__(self, "means", means)
-        object.__setattr__(self, "period", found)
-        object.__setattr__(self, "symmetry", turn)
-        object.__setattr__(self, "order", order_of(turn))
-        object.__setattr__(self, "angles", periods)
+        self._keep(field=field, means=means, period=found, symmetry=turn, order=order_of(turn), angles=periods)
         own = {**({ROUNDS: 1.0} if forced else {PERIOD: 1.0}), **windings}
         super().__init__(rhs, _periodic(turn, names, periods), names, {**parameters, **own})
         columns = [*extremes, PERIOD] if forced else extremes
-        object.__setattr__(self, "functionals", {**dict.fromkeys(columns, found_elsewhere), **means})
+        self._keep(functionals={**dict.fromkeys(columns, found_elsewhere), **means})
         if periods:
             check_periodic("field", self.batch("field"), periods, self.parameters)
 
@@ -171,6 +167,16 @@ class CycleProblem(BoundaryValueProblem):
         """
         kind = CycleCollocation if self.period is None else ForcedCollocation
         return kind(self, mesh, degree, free, parameters, scales)
+
+    def usual_degree(self, tolerance: float) -> int:
+        """Return the degree of a mesh where none is given.
+
+        Examples
+        --------
+        >>> CycleProblem(lambda u, p: (u.v, -p.k * u.x), ["x", "v"], {"k": 4.0}).usual_degree(1e-12)
+        4
+        """
+        return CYCLE_DEGREE
 
     @classmethod
     def of(cls, problem: AlgebraicProblem) -> CycleProblem:

@@ -21,7 +21,8 @@ from contin.core.rounding import on_circle
 from contin.core.scales import Scales
 from contin.core.state import Reason, Stop
 from contin.core.trial import TestFunction, Trial
-from contin.cycles.floquet import doubled, doubling, keep_off_one, torus
+from contin.cycles.curves import DoublingCurve, TorusCurve
+from contin.cycles.floquet import critical_angle, doubled, doubling, keep_off_one, torus, unstable
 from contin.cycles.folds import events_on_folds
 from contin.cycles.homoclinic import explained, homoclinic
 from contin.cycles.hopf_end import AMPLITUDE, COLLAPSED, hopf_point_inside, shrunk
@@ -30,6 +31,7 @@ from contin.cycles.normal_forms import at_special_point
 from contin.cycles.phase import cycle_in_phase, forced_cycle_in_phase, lasting
 from contin.errors import ProblemError
 from contin.events.coefficient import Coefficient
+from contin.events.labelled import doubles
 from contin.events.segment import Segment, SpecialPoint
 from contin.functions.batch import Columns
 from contin.linalg.condensation import Factorization
@@ -313,6 +315,26 @@ class PeriodicCollocation(Collocation):
         """Return label and name of a point where multipliers exp(+- i frequency) cross the unit circle; None where none do."""
 
     # --- what the kind knows of its branches --------------------------------------------------------------------------
+
+    @property
+    def is_cycle(self) -> bool:
+        """Yes."""
+        return True
+
+    def unstable(self, x: Array) -> int:
+        """Return the number of unstable multipliers, without the one that is 1."""
+        return unstable(self, x)
+
+    @property
+    def curves(self) -> Mapping[str, type]:
+        """Those of period doublings and torus bifurcations."""
+        return {kind.kind: kind for kind in (DoublingCurve, TorusCurve)}
+
+    def defining(self, point: Any, x: Array) -> tuple[DoublingCurve | TorusCurve, Array] | None:
+        """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
+        if doubles(point):
+            return DoublingCurve(self), x
+        return (TorusCurve(self), np.append(x, math.cos(critical_angle(self, point, x)))) if point.label == "TR" else None
 
     def events(self) -> list[TestFunction]:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""

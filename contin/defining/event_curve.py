@@ -67,7 +67,8 @@ class EventCurve(Extended):
 
     def borders_fit(self, x: Array) -> bool:
         """Return whether the tangents, and null vectors of the underlying curve, have not turned away from their borders."""
-        if isinstance(self.base, Extended) and not self.base.borders_fit(x):
+        base: Any = self.base
+        if base.on_curve and not base.borders_fit(x):
             return False
         if self._gradient is not None:
             return True

@@ -51,6 +51,13 @@ class Extended(Discretization):
 
     #: The label of the special points that the curve consists of.
     kind = ""
+    #: The column of extrema that the curve consists of.
+    objective = ""
+
+    @property
+    def stationary(self) -> str:
+        """The column that is stationary at the points of the curve, among all solutions beside them; "" where there is none."""
+        return self.objective
 
     def __init__(self, base: System, borders: Borders | None, columns: Sequence[str] = ()) -> None:
         for name in columns:
@@ -251,6 +258,17 @@ class _ExtendedStatement:
     def multipliers(self) -> tuple[str, ...]:
         """Those of the problem."""
         return multipliers_of(self.problem)
+
+    @property
+    def angles(self) -> Mapping[str, float]:
+        """Those of the problem."""
+        found: Mapping[str, float] = self.problem.angles
+        return found
+
+    @property
+    def symmetries(self) -> Mapping[str, Any]:
+        """None: images are of solutions."""
+        return {}
 
     @property
     def phases(self) -> tuple[str, ...]:

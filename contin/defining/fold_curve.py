@@ -104,6 +104,11 @@ class FoldCurve(Extended):
         v, w, g = self.null_vectors(x)
         return self.with_own_rows(x, (self.gradient(x, v, w)[None], np.array([g])), rows, columns)
 
+    @property
+    def stationary(self) -> str:
+        """The parameter of the folds."""
+        return "" if self.base.on_curve else self.free[0]
+
     def events(self) -> list[TestFunction]:
         """Return those of cusps (w.F_zz v v = 0), of folds that meet a branch point (w.F_lambda = 0), and of the kind."""
         cusp = TestFunction("CP", "cusp", _bend, search=lambda segment, _: None if _may_be_cusp(segment) else [])

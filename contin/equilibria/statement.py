@@ -8,7 +8,7 @@ import warnings
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -73,9 +73,11 @@ class AlgebraicProblem(Restated):
     jacobian: Function | None = None
     pattern: Any = None
     angles: Any = ()
+    #: There is no t.
+    domain: ClassVar[None] = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "states", check_statement(self.states, self.parameters, self.functionals))
+        self._keep(states=check_statement(self.states, self.parameters, self.functionals))
         checks.truth("dynamics", self.dynamics)
         if self.count is not None:
             checks.whole("count", self.count, 1, MOST_CONDITIONS)
@@ -89,8 +91,8 @@ class AlgebraicProblem(Restated):
             warnings.warn("pattern= has no effect any more, and will go: entries are found by recording, or give jacobian=",
                           DeprecationWarning, stacklevel=3)  # fmt: skip
         if self.dynamics and self.equation_size != len(self.state_names):
-            object.__setattr__(self, "dynamics", False)
-        object.__setattr__(self, "angles", angle_periods(self.angles, self.state_names))
+            self._keep(dynamics=False)
+        self._keep(angles=angle_periods(self.angles, self.state_names))
         self._check_angles()
 
     def _check_angles(self) -> None:

@@ -15,11 +15,14 @@ from contin.core.rounding import may_be_on_axis, off_axis
 from contin.core.scales import Scales, usual
 from contin.core.system import System
 from contin.core.trial import TestFunction
+from contin.equilibria.dependence import dependence
 from contin.equilibria.folds import events_on_folds
 from contin.equilibria.given import check_given
-from contin.equilibria.lyapunov import at_hopf_point
+from contin.equilibria.hopf_curve import HopfCurve
+from contin.equilibria.lyapunov import at_hopf_point, critical_pair
 from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
+from contin.events.labelled import frequency_of
 from contin.events.segment import SpecialPoint
 from contin.functions.batch import Batch, Columns
 from contin.linalg.dense import DenseFactors, eigenvalues
@@ -54,6 +57,8 @@ class Algebraic(System):
     intervals = 0
     degree = 0
     problem: AlgebraicProblem
+    #: Kinds of curves in two parameters that begin at, or pass, points of codimension two.
+    leaving = {"BT": ("LP", "HB", "homoclinic"), "GH": ("LP",), "ZH": ("LP", "HB", "TR"), "HH": ("HB", "TR")}
     #: What angles of a map gain over a cycle.
     gain: Array | None = None
 
@@ -405,6 +410,34 @@ class Algebraic(System):
         """The residual; None of kinds that are made of this one, whose equations may be others, and with a given Jacobian."""
         known: Batch = self._residual
         return known if type(self) is Algebraic and self.problem.jacobian is None else None
+
+    def with_rounds_of(self, x: Array, given: Mapping[str, float]) -> tuple[Algebraic, Array]:
+        """Return the same, and x for it: there are no rounds."""
+        return self, x
+
+    def unstable(self, x: Array) -> int | None:
+        """Return the number of unstable eigenvalues; None of large problems, and where nothing moves in time."""
+        return None if self.is_sparse or not self.problem.dynamics else int(np.count_nonzero(self.eigenvalues(x).real > 0))
+
+    def degenerate(self, x: Array) -> str:
+        """Return which equations are dependent."""
+        return dependence(self, x)
+
+    def undetermined(self, x: Array) -> str:
+        """Return which equations are dependent."""
+        return dependence(self, x)
+
+    @property
+    def curves(self) -> Mapping[str, type]:
+        """That of Hopf points."""
+        return {HopfCurve.kind: HopfCurve}
+
+    def defining(self, point: Any, x: Array) -> tuple[HopfCurve, Array] | None:
+        """Return that of Hopf points."""
+        if point.label != HopfCurve.kind:
+            return None
+        frequency = critical_pair(self.jacobian(x), frequency_of(point)).frequency
+        return HopfCurve(self.as_field(), size=frequency**2), np.append(x, 1.0)
 
     def events_on_folds(self) -> list[TestFunction]:
         """Return those of a second eigenvalue zero, or a pair on the imaginary axis."""

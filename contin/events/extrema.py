@@ -137,9 +137,9 @@ def solutions_of(system: Discretization, x: Array, column: str) -> tuple[System 
     On a branch, that is its own system; on a curve of extrema of the same column, the underlying one, with all its free
     parameters. None on other curves.
     """
-    if isinstance(system, System):
-        return system, x
     curve: Any = system
-    if getattr(curve, "objective", None) == column:
+    if not system.on_curve:
+        return curve, x
+    if curve.objective == column:
         return curve.base, x[: curve.base.size]
     return None, x

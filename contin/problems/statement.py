@@ -41,6 +41,14 @@ class Statement(Protocol):
         """Names and functions of further columns."""
 
     @property
+    def angles(self) -> Any:
+        """Periods of the states that are angles, by name."""
+
+    @property
+    def symmetries(self) -> Any:
+        """Symmetries that are declared, by name."""
+
+    @property
     def free_size(self) -> int:
         """Number of free parameters on a curve of solutions."""
 
@@ -56,6 +64,32 @@ class Restated:
     """
 
     _stated: dict[str, Any]
+
+    #: Periods of the states that are angles, by name.
+    angles: Any = {}
+    #: Symmetries that are declared, by name.
+    symmetries: Mapping[str, Any] = {}
+    #: Into how many equal parts a symmetry divides solutions.
+    order = 1
+    #: A parameter that may be free beyond those that a solution takes: it keeps the value of the guess.
+    spare: str | None = None
+    #: Of problems that are put together from segments: their parts.
+    pieces: tuple[Any, ...] = ()
+
+    @property
+    def dimension(self) -> int:
+        """Number of states that a user sees: without multipliers, which a kind may add."""
+        own: Any = self
+        return len(own.states)
+
+    def usual_degree(self, tolerance: float) -> int:
+        """Return the degree of a mesh where none is given; 0 where there is no mesh."""
+        return 0
+
+    def _keep(self, **values: Any) -> None:
+        """Set fields while a statement is made; from then on it is frozen."""
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         statement: Any = self

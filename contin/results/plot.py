@@ -11,10 +11,6 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.cycles.floquet import unstable
-from contin.cycles.maps import MapSystem
-from contin.cycles.system import PeriodicCollocation
-from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.results.axes import new_axes
 from contin.results.point import Point
@@ -89,7 +85,7 @@ def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
     piece : slice
         Points of the piece; its ends belong to the pieces beside it too.
     """
-    moving = bool(points) and (_is_cycle(points[0]) or _is_equilibrium(points[0]))
+    moving = bool(points) and _unstable(points[0]) is not None
     if len(points) < 2 or (not moving and all(point.index is None for point in points)):
         yield None, slice(None)
         return
@@ -98,15 +94,6 @@ def _pieces(points: Sequence[Point]) -> Iterator[tuple[bool | None, slice]]:
         last = first + len(list(steps))
         yield stable, slice(first, last + 1)
         first = last
-
-
-def _is_cycle(point: Point) -> bool:
-    return isinstance(point.system, (PeriodicCollocation, MapSystem))
-
-
-def _is_equilibrium(point: Point) -> bool:
-    system = point.system
-    return isinstance(system, Algebraic) and system.problem.dynamics and not system.is_sparse
 
 
 def _of_motions(points: Sequence[Point]) -> list[bool | None]:
@@ -122,10 +109,9 @@ def _of_motions(points: Sequence[Point]) -> list[bool | None]:
     return found
 
 
-def _unstable(point: Point) -> int:
-    """Return the number of unstable multipliers, or eigenvalues."""
-    system: Any = point.system
-    return unstable(system, point.x) if _is_cycle(point) else int(np.count_nonzero(system.eigenvalues(point.x).real > 0))
+def _unstable(point: Point) -> int | None:
+    """Return the number of unstable multipliers, or eigenvalues; None where it is not known."""
+    return point.system.unstable(point.x)
 
 
 def _stable(a: Point, b: Point) -> bool | None:
@@ -179,7 +165,7 @@ def _columns(points: Sequence[Point], x: str | None, y: str | None) -> tuple[str
     first = points[0]
     known = [*first.parameters, *first.functionals, "arclength", "norm", "discretization_error", *_states(first)]
     x = first.system.free[0] if x is None else x
-    states = first.system.problem.state_names if isinstance(first.system, PeriodicCollocation) else ()
+    states = first.system.problem.states if first.system.is_cycle and first.system.intervals else ()
     y = (states[0] if states else next(iter(first.functionals), "norm")) if y is None else y
     if x in known and y in states:
         return x, [f"max_{y}", f"min_{y}"], f"{y}, largest and smallest"

@@ -16,18 +16,12 @@ from contin.core.protocol import Discretization
 from contin.core.system import System
 from contin.core.trial import Trial
 from contin.cycles.floquet import Floquet, floquet
-from contin.cycles.maps import MapSystem
-from contin.cycles.system import PeriodicCollocation
-from contin.defining.extended import Extended
-from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
 from contin.results import portrait
 from contin.results.profile import Profile
 
-#: Kinds of curves in two parameters that begin at, or pass, points of codimension two of equilibria.
-_LEAVING = {"BT": ("LP", "HB", "homoclinic"), "GH": ("LP",), "ZH": ("LP", "HB", "TR"), "HH": ("HB", "TR")}
 #: So many columns stand in the representation of a point.
 _SHOWN = 8
 
@@ -40,19 +34,20 @@ def system_of(point: Point, what: str) -> System:
     ProblemError
         A point of a curve in two parameters; ``what`` names the argument.
     """
-    if not isinstance(point.system, System):
+    system: Any = point.system
+    if system.on_curve:
         raise ProblemError(f"{what}: must not be a point of a curve in two parameters")
-    return point.system
+    found: System = system
+    return found
 
 
 def underlying(point: Point) -> Point:
     """Return the solution itself of a point of a curve in two parameters; other points as they are."""
-    if not isinstance(point.system, Extended):
+    if not point.system.on_curve:
         return point
-    base = point.system.base
+    base: Any = point.system.solution
     nowhere = np.full(base.size, np.nan)
-    below = dataclasses.replace(point, label="", name="", x=point.x[: base.size], tangent=nowhere, system=base, details=None)
-    return underlying(below)
+    return dataclasses.replace(point, label="", name="", x=point.x[: base.size], tangent=nowhere, system=base, details=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,10 +178,11 @@ class Point:
         ``"LP"`` (of equilibria, at a generalized Hopf point of cycles), ``"HB"`` (at a double Hopf point of the other pair),
         ``"TR"`` (of cycles) and ``"homoclinic"``; the one on which the point was found is not among them.
         """
-        if not isinstance(self.system, Extended) or not isinstance(self.system.base, Algebraic):
+        curve: Any = self.system
+        if not curve.on_curve or not curve.base.leaving:
             return ()
-        own = self.system.kind if self.label != "HH" else ""
-        return tuple(kind for kind in _LEAVING.get(self.label, ()) if kind != own)
+        own = curve.kind if self.label != "HH" else ""
+        return tuple(kind for kind in curve.base.leaving.get(self.label, ()) if kind != own)
 
     def plot(self, what: str | None = None, states: Sequence[str] | None = None, axes: Any = None) -> Any:
         """Draw the solution: its phase portrait, its states over time and, of a cycle, its Floquet multipliers.
@@ -269,9 +265,9 @@ class Point:
         >>> np.abs(orbit.floquet().multipliers).round(8).tolist()  # 1 and exp(-2 mu period), the period is 2 pi
         [1.0, 0.04321392]
         """
-        if not isinstance(underlying(self).system, (PeriodicCollocation, MapSystem)):
+        if not self.system.solution.is_cycle:
             raise ProblemError("floquet: the point is no cycle; state the problem as a CycleProblem or MapProblem")
-        fold = self.label == "LP" and self.column != PERIOD and not isinstance(self.system, Extended)
+        fold = self.label == "LP" and self.column != PERIOD and not self.system.on_curve
         return floquet(self.system, self.x, self.tangent, self.errors, fold)
 
     def phase_loads(self) -> dict[str, float]:

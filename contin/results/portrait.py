@@ -9,10 +9,8 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.boundary.segmented import SegmentedProblem
 from contin.boundary.system import Collocation
 from contin.cycles.floquet import floquet
-from contin.cycles.system import PeriodicCollocation
 from contin.errors import ProblemError
 from contin.problems.angles import periods_of, whole_rounds
 from contin.results.axes import new_axes
@@ -30,7 +28,7 @@ _MOST_RINGS = 6
 def plot(point: Any, what: str | None, states: Sequence[str] | None, axes: Any) -> Any:
     """Draw one point; see `contin.Point.plot`."""
     system = point.system
-    if not isinstance(system, Collocation):
+    if not system.intervals:
         raise ProblemError("plot: the point must be a solution over t, of a BoundaryValueProblem or CycleProblem")
     drawings = _drawings(system)
     if what is not None and what not in drawings:
@@ -56,7 +54,7 @@ def _drawings(system: Collocation) -> dict[str, Callable[[Any, tuple[str, ...], 
     if len(_known(system)) > 1:
         found["portrait"] = _portrait
     found["series"] = _series
-    if isinstance(system, PeriodicCollocation):
+    if system.is_cycle:
         found["multipliers"] = _multipliers
     return found
 
@@ -77,7 +75,7 @@ def _chosen(system: Collocation, states: Sequence[str] | None) -> tuple[str, ...
 def _known(system: Collocation) -> tuple[str, ...]:
     """Return the names of the states; of segments each name once, in order."""
     problem = system.problem
-    if not isinstance(problem, SegmentedProblem):
+    if not problem.pieces:
         return problem.state_names
     return tuple(dict.fromkeys(name for piece in problem.pieces for name in piece.names))
 
@@ -85,7 +83,7 @@ def _known(system: Collocation) -> tuple[str, ...]:
 def _courses(point: Any, names: Sequence[str]) -> list[tuple[Array, Array]]:
     """Return times in the user's units (K,) and states (K, n) of each segment; a state that it does not have is NaN."""
     problem = point.system.problem
-    if not isinstance(problem, SegmentedProblem):
+    if not problem.pieces:
         return [_course(point, names)]
     found = []
     for index in range(len(problem.pieces)):
@@ -103,7 +101,7 @@ def _course(point: Any, names: Sequence[str]) -> tuple[Array, Array]:
     """Return times in the user's units (K,), and states (K, n)."""
     system = point.system
     a, b = system.problem.domain
-    cycle = isinstance(system, PeriodicCollocation)
+    cycle = system.is_cycle
     once = np.unique(np.concatenate([np.linspace(a, b, max(_FEWEST, _PER_INTERVAL * system.intervals)), system.mesh]))
     t = np.unique(np.arange(system.order)[:, None] + once) if cycle else once
     which = [system.problem.state_names.index(name) for name in names]

@@ -8,7 +8,6 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.boundary.segmented import SegmentedProblem
 from contin.errors import ProblemError
 
 
@@ -27,7 +26,7 @@ class Profile:
 
     def __init__(self, point: Any, index: int) -> None:
         problem = point.system.problem
-        if not isinstance(problem, SegmentedProblem):
+        if not problem.pieces:
             raise ProblemError("segment: the problem has no segments; state it as a SegmentedProblem")
         checks.whole("segment", index, 0, len(problem.pieces) - 1)
         self._point, self._at = point, problem.pieces[index].at

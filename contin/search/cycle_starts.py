@@ -20,6 +20,7 @@ from contin.equilibria.lyapunov import CriticalPair, critical_pair
 from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint, locate_branch_point
+from contin.events.labelled import doubles, frequency_of
 from contin.problems.angles import windings
 from contin.problems.own_names import PERIOD, ROUNDS
 from contin.results.point import Point
@@ -28,11 +29,6 @@ from contin.results.point import Point
 _FAINT = 1e-6
 #: Intervals of the first mesh of a branch from a Hopf point.
 _INTERVALS = 20
-
-
-def doubles(point: Point) -> bool:
-    """Return whether `doubled` orbits leave a point: a period doubling, or a branch point at which a symmetry breaks."""
-    return point.label == "PD" or (point.label == "BP" and isinstance(point.details, dict))
 
 
 def switches(point: Point) -> bool:
@@ -112,12 +108,6 @@ def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) ->
     rest = cycles.pack(np.tile(system.states(x), (cycles.nodes.size, 1)), parameters)
     tangent = cycles.pack((wave * pair.right).real, dict.fromkeys(cycles.free, 0.0))
     return (cycles.with_reference(rest + size * tangent) if size else cycles), rest + size * tangent, tangent
-
-
-def frequency_of(point: Point) -> float | None:
-    """Return the frequency of a Hopf or torus bifurcation; None where it was stored without it."""
-    known = isinstance(point.details, dict) and "frequency" in point.details
-    return float(point.details["frequency"]) if known else None
 
 
 def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:

@@ -11,17 +11,12 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.boundary.variational import VariationalProblem
 from contin.continuation.progress import Progress
 from contin.continuation.run import Continuation
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.state import Reason, Stop
-from contin.cycles.maps import MapSystem
 from contin.cycles.statement import CycleProblem
-from contin.cycles.system import CycleCollocation, PeriodicCollocation
-from contin.equilibria.statement import AlgebraicProblem
-from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.events.branch_point import BranchPoint
 from contin.events.multiple_point import MultiplePoint
@@ -103,9 +98,9 @@ class Diagram:
         'a'
         """
         drawn = [branch.points for branch in self.branches if branch.points]
-        cycles = [points[0].system for points in drawn if isinstance(points[0].system, PeriodicCollocation)]
+        cycles = [points[0].system for points in drawn if points[0].system.is_cycle and points[0].system.intervals]
         if cycles and y is None:
-            y = cycles[0].problem.state_names[0]
+            y = cycles[0].problem.states[0]
         for points in drawn:
             axes = plot.plot(points, x, y, axes)
         return axes
@@ -166,10 +161,10 @@ def _name(junction: Junction, number: int) -> str:
 
 def _is_end(point: Point) -> bool:
     """Return whether a Hopf point or period doubling is where a branch of cycles ends that begins there."""
-    system = point.system
-    if point.label == "HB":
-        return isinstance(system, PeriodicCollocation)
-    return isinstance(system, (PeriodicCollocation, MapSystem)) and system.is_doubled(point.x)
+    system: Any = point.system
+    if point.label == "HB" or not system.is_cycle:
+        return bool(system.is_cycle)
+    return bool(system.is_doubled(point.x))
 
 
 def _values(point: Point) -> dict[str, float]:
@@ -270,10 +265,10 @@ class _Explorer:
         doubling, but for the period.
         """
         ours, theirs = _values(known), _values(point)
-        if isinstance(known.system, Algebraic) and isinstance(point.system, CycleCollocation):
+        if known.system.named_states and point.system.size_of_solutions is not None:
             states = known.system.states(known.x).ravel()
-            ours |= {f"max_{name}": value for name, value in zip(known.system.problem.state_names, states)}
-        angles = getattr(known.system.problem, "angles", {})
+            ours |= {f"max_{name}": value for name, value in zip(known.system.problem.states, states)}
+        angles = known.system.problem.angles
         names = [name for name in ours if name in theirs and name != ROUNDS and name not in winding_names(angles)]
         factor = 2.0 if _is_end(point) and point.label == "PD" else 1.0
         for name in names:
@@ -337,7 +332,7 @@ class _Explorer:
 def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
     """Return the image of unknowns; of a variational problem the states x have one, multipliers are zero (`_seen`)."""
     states = system.states(x).copy()
-    visible = states[:, : getattr(system.problem, "dimension", states.shape[1])]
+    visible = states[:, : system.problem.dimension]
     visible[:] = symmetry(system.nodes, visible.copy())
     return np.concatenate([(states / system.scales.states).ravel(), x[system.state_size :]])
 
@@ -345,7 +340,7 @@ def _image(system: Any, symmetry: Symmetry, x: Array) -> Array:
 def _seen(system: Any, x: Array) -> Array:
     """Return unknowns without multipliers: these follow from the others, and change their sign under symmetries."""
     problem = system.problem
-    if not isinstance(problem, VariationalProblem):
+    if problem.dimension == len(problem.states):
         return x
     x = x.copy()
     x[: system.state_size].reshape(-1, len(problem.state_names))[:, problem.dimension :] = 0.0
@@ -400,7 +395,7 @@ def diagram(
         if argument_count(checks.function("symmetries", symmetry)) != 2:
             raise ProblemError(f"symmetries: {checks.shown(symmetry)} must take 2 arguments, times (K,) and states (K, n)")
     settings = settings_with(settings, options)
-    symmetries = [*symmetries, *getattr(system_of(start, "start").problem, "symmetries", {}).values()]
+    symmetries = [*symmetries, *system_of(start, "start").problem.symmetries.values()]
     system, x = (
         (start.system, start.x) if free is None else system_of(start, "start").with_free(checks.names("free", free), start.x)
     )
@@ -411,9 +406,9 @@ def diagram(
 def _check_columns(problem: Any, settings: Settings) -> None:
     """Require that limits and zeros name columns of the problem or, of equilibria, of the cycles that begin there."""
     known = [*problem.parameters, *problem.functionals]
-    if isinstance(problem, AlgebraicProblem):
+    if problem.domain is None:
         known += problem.state_names
-    if isinstance(problem, AlgebraicProblem) and problem.dynamics:
+    if problem.domain is None and problem.dynamics:
         cycles = CycleProblem.of(problem)
         known += [name for name in (*cycles.parameters, *cycles.functionals) if name not in known]
     for name in (*settings.limits, *settings.zeros):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeGuard
@@ -11,14 +10,9 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.boundary.segmented import SegmentedProblem
 from contin.boundary.statement import BoundaryValueProblem
 from contin.boundary.system import Collocation
-from contin.boundary.variational import VariationalProblem
 from contin.core.system import System
-from contin.cycles.maps import MapSystem
-from contin.cycles.statement import CycleProblem
-from contin.cycles.system import PeriodicCollocation
 from contin.equilibria.statement import AlgebraicProblem
 from contin.errors import ProblemError
 from contin.names import exact_text
@@ -43,20 +37,18 @@ class Options:
     degree: int
 
 
-@functools.singledispatch
 def first_guess(problem: Any, guess: Guess, options: Options) -> tuple[System, Array]:
-    """Return the discretized problem and a vector of unknowns for a guess. Each kind of problem registers its own.
+    """Return the discretized problem and a vector of unknowns for a guess.
 
     Raises
     ------
     ProblemError
-        A problem of an unknown kind, or a guess that does not fit.
+        A guess that does not fit.
     """
-    raise ProblemError(f"problem: {checks.shown(problem)} must be a BoundaryValueProblem or AlgebraicProblem")
+    return (_without_mesh if problem.domain is None else _on_mesh)(problem, guess, options)
 
 
-@first_guess.register
-def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tuple[System, Array]:
+def _without_mesh(problem: AlgebraicProblem, guess: Any, options: Options) -> tuple[System, Array]:
     system = problem.discretized(options.free, options.parameters)
     given: Any = guess.x[: guess.system.state_size] if isinstance(guess, Point) else guess
     count = len(problem.state_names)  # a map takes one point of a cycle, too
@@ -64,18 +56,18 @@ def _of_algebraic(problem: AlgebraicProblem, guess: Any, options: Options) -> tu
     if states.size != count:
         states = _numbers(given, system.state_size)
     x = system.pack(states, {**problem.parameters, **options.parameters})
-    return system.with_rounds_of(x, options.parameters) if isinstance(system, MapSystem) else (system, x)
+    return system.with_rounds_of(x, options.parameters)
 
 
 #: Part of the domain by which the times of a guess may miss its ends: cos(pi/2) is 6e-17.
 _SLACK = 1e-9
 
 
-@first_guess.register
-def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Options) -> tuple[System, Array]:
+def _on_mesh(problem: BoundaryValueProblem, guess: Any, options: Options) -> tuple[System, Array]:
+    guess = problem.whole_guess(guess, {**problem.parameters, **options.parameters})
     a, b = problem.domain
     mesh = np.linspace(a, b, options.intervals + 1)
-    order = problem.order if isinstance(problem, CycleProblem) else 1
+    order = problem.order
     if isinstance(guess, Point):
         mesh = _mesh_of(_meshed(guess), order)
     elif _is_pair(guess):
@@ -85,7 +77,7 @@ def _of_boundary_value(problem: BoundaryValueProblem, guess: Any, options: Optio
     system = problem.discretized(options.free, options.parameters, None, mesh, options.degree)
     if not isinstance(guess, Point):
         system = system.on_breaks()
-    if isinstance(problem, VariationalProblem) and not isinstance(guess, Point):
+    if problem.dimension < len(problem.state_names) and not isinstance(guess, Point):
         return system, with_guessed_multipliers(system, _sampled(guess, system.nodes, problem.dimension))
     periods = periods_of(problem)
     states = _sampled(guess, system.nodes / order, len(problem.state_names), periods)
@@ -121,20 +113,10 @@ def _with_rounds(system: Collocation, states: Array, options: Options) -> tuple[
     return found, states
 
 
-@first_guess.register
-def _of_segments(problem: SegmentedProblem, guess: Any, options: Options) -> tuple[System, Array]:
-    """A list with a guess for each segment: its states, constant or as a function of s; or a guess of all states, on [0, 1]."""
-    if isinstance(guess, list) and any(callable(each) or isinstance(each, (list, tuple, np.ndarray)) for each in guess):
-        if len(guess) != len(problem.pieces):
-            raise ProblemError(f"guess: {len(guess)} guesses, must be one for each of the {len(problem.pieces)} segments")
-        guess = problem.guessed(guess, {**problem.parameters, **options.parameters})
-    return _of_boundary_value(problem, guess, options)
-
-
 def _sampled(guess: Guess, nodes: Array, count: int, periods: Array | None = None) -> Array:
     """Return the states of a guess at the nodes, shape (K, count); angles, of these periods, are made continuous."""
     if isinstance(guess, Point):
-        states = _meshed(guess).evaluate(guess.x, nodes * _order(guess.system))
+        states = _meshed(guess).evaluate(guess.x, nodes * guess.system.order)
         if states.shape[1] != count:
             raise ProblemError(f"guess: a Point of {states.shape[1]} states for a problem of {count}")
         return states
@@ -168,19 +150,16 @@ def _numbers(values: Any, count: int | None = None) -> Array:
 
 def _meshed(guess: Point) -> Collocation:
     """Return the system of a guess that is a solution of a boundary value problem."""
-    if not isinstance(guess.system, Collocation):
+    system: Any = guess.system
+    if not system.intervals:
         raise ProblemError("guess: a Point must be a solution of a boundary value problem")
-    return guess.system
-
-
-def _order(system: Any) -> int:
-    """Return into how many parts a symmetry divides a cycle; one part is the interval that is computed."""
-    return system.order if isinstance(system, PeriodicCollocation) else 1
+    found: Collocation = system
+    return found
 
 
 def _mesh_of(system: Collocation, order: int) -> Array:
     """Return the mesh of a guess for a problem with a symmetry of this order, on the part that is computed."""
-    parts = _order(system)
+    parts = system.order
     if parts == order:
         return system.mesh
     whole = np.unique(np.arange(parts)[:, None] + system.mesh) * order / parts

@@ -8,7 +8,6 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.boundary.system import Collocation
-from contin.boundary.variational import VariationalProblem
 from contin.errors import ProblemError
 from contin.problems.statement import multipliers_of
 
@@ -114,7 +113,6 @@ def _equations(system: Collocation, states: Array, lam: Array, multipliers: Arra
     has few entries that are not zero.
     """
     problem: Any = system.problem
-    assert isinstance(problem, VariationalProblem)
     n, d, count, basis = problem.dimension, system.degree, system.intervals, system.basis
     u = np.hstack([states, lam])
     p = system.parameters.copy()

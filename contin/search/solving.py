@@ -4,39 +4,27 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.boundary.second_variation import degeneracy, dependent_conditions
 from contin.boundary.statement import BoundaryValueProblem
-from contin.boundary.system import Collocation
-from contin.boundary.variational import VariationalProblem
 from contin.collocation.basis import DEGREES
-from contin.collocation.degree import CYCLE_DEGREE, usual_degree
 from contin.collocation.mesh import MOST_INTERVALS, MeshControl
-from contin.connections.statement import ConnectionProblem
 from contin.core.newton import Corrected, Newton, approached, correct
 from contin.core.settling import ROUNDS
 from contin.core.system import System
-from contin.cycles.statement import CycleProblem
 from contin.equilibria.statement import AlgebraicProblem
-from contin.equilibria.system import Algebraic
 from contin.errors import ConvergenceError, ProblemError
 from contin.problems.angles import winding_names
-from contin.problems.own_names import PERIOD
 from contin.problems.statement import forget_changed, with_multipliers
 from contin.results.point import Point, point_of, system_of, underlying
 from contin.search.deflation import correct_away
-from contin.search.dependence import dependence
 from contin.search.guess import Guess, Options, first_guess
 
 #: Rounds of correcting and adapting the mesh; each settles most of what is left.
 _ROUNDS = 4
-#: Equilibria that are nearer to each other than this part of the orbit's size are one.
-_SAME = 1e-6
 
 
 def solve(
@@ -91,23 +79,21 @@ def solve(
     parameters, free = _checked(parameters), with_multipliers(problem, free)
     if isinstance(guess, Point):
         guess = underlying(guess)
-        read = winding_names(getattr(problem, "angles", {}))  # off the guess, as of all others
+        read = winding_names(problem.angles)  # off the guess, as of all others
         parameters = {**{name: value for name, value in guess.parameters.items() if name not in read}, **parameters}
     held = _check_count(problem, free)
     options = Options(parameters, free, intervals, degree or _degree(problem, guess, control))
     system, x = first_guess(problem, guess, options)
     if not np.isfinite(x).all():
         raise ProblemError("guess: its values must be finite numbers")
-    return _leading_on(solved(system, x, control, newton, others, held))
+    return solved(system, x, control, newton, others, held)
 
 
 def _degree(problem: BoundaryValueProblem | AlgebraicProblem, guess: Guess, control: MeshControl) -> int:
     """Return the degree where none is given."""
     if isinstance(guess, Point):
         return guess.system.degree
-    if isinstance(problem, CycleProblem):
-        return CYCLE_DEGREE
-    return usual_degree(len(problem.state_names), control.tolerance)
+    return problem.usual_degree(control.tolerance)
 
 
 def solved(
@@ -135,6 +121,7 @@ def solved(
     else:
         done = corrected(system, x)
     _check_determined(system, done.x)
+    system.check_solution(done.x)
     return point_of(system, done.x, done.iterations, done.error)
 
 
@@ -181,13 +168,7 @@ def _corrected(system: System, x: Array, others: Sequence[Point], newton: Newton
             for place in approached(system, x):
                 with contextlib.suppress(ConvergenceError):
                     return correct(system, place, newton=newton, sizes=system.magnitudes)
-        reason = ""
-        if isinstance(system, Algebraic):
-            reason = dependence(system, x)
-        elif isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
-            reason = degeneracy(system, x)
-            reason += reason and ": no solution was found from this guess"
-        if reason:
+        if reason := system.degenerate(x):
             raise ProblemError(reason) from None
         raise
 
@@ -199,12 +180,7 @@ def _check_determined(system: System, x: Array) -> None:
     ------
     ProblemError
     """
-    reason = ""
-    if isinstance(system, Algebraic):
-        reason = dependence(system, x)
-    elif isinstance(system, Collocation) and isinstance(system.problem, VariationalProblem):
-        reason = dependent_conditions(system, x)
-    if reason:
+    if reason := system.undetermined(x):
         raise ProblemError(reason)
 
 
@@ -215,27 +191,6 @@ def _check_options(problem: object, intervals: object, degree: object, control: 
         checks.whole("degree", degree, DEGREES[0], DEGREES[-1])
     checks.instance("mesh", control, MeshControl, "a MeshControl")
     checks.instance("newton", newton, Newton, "a Newton")
-
-
-def _leading_on(found: Point) -> Point:
-    """Return a solution; check that an orbit between two equilibria does not return to the first one.
-
-    Raises
-    ------
-    ProblemError
-    """
-    problem: Any = found.system.problem
-    if not isinstance(problem, ConnectionProblem) or problem.homoclinic:
-        return found
-    count, names = len(problem.state_names), problem.multipliers
-    first, last = (np.array([found[name] for name in part]) for part in (names[:count], names[count:]))
-    if np.abs(first - last).max() <= _SAME * float(np.ptp(found.system.states(found.x), axis=0).max()):
-        place = ", ".join(f"{name} = {value + 0.0:.6g}" for name, value in zip(problem.state_names, first))
-        raise ProblemError(
-            f"stable: both ends of the orbit are at the equilibrium {place}; leave out stable for a homoclinic orbit, or give "
-            f"a guess of the last equilibrium ({', '.join(names[count:])})"
-        )
-    return found
 
 
 def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequence[str]) -> str | None:
@@ -249,10 +204,10 @@ def _check_count(problem: BoundaryValueProblem | AlgebraicProblem, free: Sequenc
     needed = problem.free_size - 1
     if needed < 0:
         there = len(problem.state_names) + needed
-        kind = "equations" if isinstance(problem, AlgebraicProblem) else "boundary and integral conditions"
+        kind = "equations" if problem.domain is None else "boundary and integral conditions"
         raise ProblemError(f"problem: {there} {kind} for {len(problem.state_names)} states; {-needed} more needed")
-    if isinstance(problem, CycleProblem) and PERIOD in free and len(free) == needed + 1:
-        return PERIOD
+    if problem.spare in free and len(free) == needed + 1:
+        return problem.spare
     if len(free) != needed:
         raise ProblemError(f"free: {len(free)} given, a solution of this problem needs {needed} (conditions - states)")
     return None

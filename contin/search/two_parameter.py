@@ -10,31 +10,21 @@ import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.connections.events import own_test_of
-from contin.connections.system import ConnectionCollocation
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.system import System
 from contin.core.trial import TestFunction
-from contin.cycles.curves import DoublingCurve, TorusCurve
-from contin.cycles.map_curves import MapDoublingCurve, MapTorusCurve
-from contin.cycles.maps import MapSystem
-from contin.cycles.system import PeriodicCollocation
 from contin.defining.branch_point_curve import BranchPointCurve
 from contin.defining.event_curve import EventCurve
 from contin.defining.extended import Extended
 from contin.defining.extremum_curve import ExtremumCurve
 from contin.defining.fold_curve import FoldCurve
-from contin.equilibria.hopf_curve import HopfCurve
-from contin.equilibria.lyapunov import critical_pair
-from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.search.codimension_two import leaving
-from contin.search.cycle_starts import doubles, frequency_of
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
@@ -90,7 +80,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
     """
     checks.instance("start", start, Point, "a Point")
     shown, new = Progress(progress), any(each is not None for each in (second, free, event, hold))
-    goes_on = isinstance(start.system, Extended) and not new
+    goes_on = start.system.on_curve and not new
     _check(event, hold, kind, branch, goes_on)
     names = start.system.free if goes_on else _free_parameters(start, second, free)
     settings = settings_with(settings, {"branch_points": False, "primary": names[-1], **options})
@@ -127,7 +117,7 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
     if len(system.free) != system.problem.free_size:
         raise ProblemError("start: must be a point of a branch, with the free parameters of a curve")
     known = tuple(system.problem.parameters)
-    branch = isinstance(system, System)
+    branch = not system.on_curve
     found_in = start.column if start.label == "LP" and start.column and branch else system.free[0]
     if (second is None) == (free is None):
         raise ProblemError("curve: give the second parameter, or free=[first, second]")
@@ -163,7 +153,7 @@ def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | No
         return _event(start, base, x, event)
     if hold is not None:
         return _value(_holding(start, hold), base, x)
-    for kind in _KINDS if isinstance(start.system, System) else _KINDS_ON_CURVES:
+    for kind in _KINDS_ON_CURVES if start.system.on_curve else _KINDS:
         found = kind(start, base, x)
         if found is not None:
             return found
@@ -178,29 +168,8 @@ def _folds(start: Point, base: System, x: Array) -> _First | None:
     return (FoldCurve(base), x) if start.label == "LP" and start.column else None
 
 
-def _hopf_points(start: Point, base: System, x: Array) -> _First | None:
-    if start.label != "HB" or not isinstance(base, Algebraic):
-        return None
-    frequency = critical_pair(base.jacobian(x), frequency_of(start)).frequency
-    return HopfCurve(base.as_field(), size=frequency**2), np.append(x, 1.0)
-
-
-def _doublings(start: Point, base: System, x: Array) -> _First | None:
-    if not doubles(start):
-        return None
-    if isinstance(base, MapSystem):
-        return MapDoublingCurve(base), x
-    return (DoublingCurve(base), x) if isinstance(base, PeriodicCollocation) else None
-
-
-def _tori(start: Point, base: System, x: Array) -> _First | None:
-    if start.label != "TR" or not isinstance(base, (PeriodicCollocation, MapSystem)):
-        return None
-    angle = frequency_of(start)
-    if angle is None:
-        values = base.eigenvalues(x)
-        angle = abs(values[np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))].imag)
-    return (MapTorusCurve if isinstance(base, MapSystem) else TorusCurve)(base), np.append(x, np.cos(angle))
+def _of_the_kind(start: Point, base: System, x: Array) -> _First | None:
+    return base.defining(start, x)
 
 
 def _extrema(start: Point, base: System, x: Array) -> _First | None:
@@ -209,13 +178,8 @@ def _extrema(start: Point, base: System, x: Array) -> _First | None:
 
 def _extrema_of_extrema(start: Point, base: Any, x: Array) -> _First | None:
     """An extremum along a curve of extrema; a fold with respect to the parameter of a curve of folds is one, too."""
-    if isinstance(base, ExtremumCurve):
-        objective = base.objective
-    elif isinstance(base, FoldCurve) and isinstance(base.base, System):
-        objective = base.free[0]
-    else:
-        return None
-    if start.label not in ("EX", "LP") or start.column != objective:
+    objective = base.stationary
+    if not objective or start.label not in ("EX", "LP") or start.column != objective:
         return None
     return ExtremumCurve(base.base, objective), x[: base.base.size]
 
@@ -260,14 +224,6 @@ def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
     return None
 
 
-def _of_homoclinic_orbits(start: Point, base: Any, x: Array) -> _First | None:
-    """A special point of a curve of homoclinic orbits, which has two free parameters already."""
-    if not isinstance(base, ConnectionCollocation) or not base.problem.homoclinic:
-        return None
-    test = own_test_of(start.label, base, x)
-    return None if test is None else (EventCurve(base, test.function, label=test.label), x)
-
-
 def _event(start: Point, base: Any, x: Array, event: TestFunction) -> _First:
     """A zero of a user's test function.
 
@@ -291,5 +247,5 @@ _STARTS = (
     "(UZ, EP); "
     "for one of your own test functions, give it as event"
 )
-_KINDS = (_branch_points, _folds, _hopf_points, _doublings, _tori, _extrema, _values, _of_homoclinic_orbits)
+_KINDS = (_branch_points, _folds, _of_the_kind, _extrema, _values)
 _KINDS_ON_CURVES = (_extrema_of_extrema, _values, _of_codimension_two)

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contin import checks
 from contin.arrays import Array
-from contin.equilibria.system import Algebraic
 from contin.linalg.dense import DenseFactors
+
+if TYPE_CHECKING:
+    from contin.equilibria.system import Algebraic
 
 #: More states are not looked at: 1000 take a tenth of a second, and five where the equations are singular.
 MOST_STATES = 1000

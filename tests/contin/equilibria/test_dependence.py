@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import contin
-from contin.search.dependence import dependence
+from contin.equilibria.dependence import dependence
 
 
 def reaction(u, p):
