@@ -33,6 +33,7 @@ from contin.arrays import Array
 from contin.collocation.basis import interpolation
 from contin.core.trial import TestFunction, Trial
 from contin.errors import ProblemError
+from contin.events.labelled import finding_of
 from contin.events.segment import Segment, SpecialPoint
 from contin.linalg.orientation import canonical_basis
 
@@ -136,7 +137,7 @@ def nullity_of(point: SpecialPoint) -> int:
     """Return the dimension of the kernel at a point: 1 at a fold, 1 or more at a branch point, else 0."""
     if point.label not in ("LP", "BP", "CP") and not point.is_trivial:
         return 0
-    return int(getattr(point.details, "dimension", 1))
+    return finding_of(point.details).nullity
 
 
 def stability_of(point: SpecialPoint) -> Stability:

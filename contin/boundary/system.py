@@ -70,6 +70,9 @@ class Collocation(System):
     """
 
     problem: BoundaryValueProblem
+    plain = True
+    #: Multipliers in a kernel, of cycles.
+    monodromy: Any = None
 
     def __init__(
         self,
@@ -612,6 +615,15 @@ class Collocation(System):
     def events(self) -> list[TestFunction]:
         """Return those of the statement."""
         return self.problem.events()
+
+    @property
+    def stored(self) -> dict[str, Array]:
+        """Mesh, parameters and sizes."""
+        return {"mesh": self.mesh, **self._own_arrays}
+
+    def referring_to(self, x: Array, tangent: Array) -> Collocation:
+        """Return the same with a solution as the reference, where the kind has one."""
+        return self.with_reference(x)
 
     def degenerate(self, x: Array) -> str:
         """Return what the statement says."""

@@ -61,6 +61,8 @@ class ConnectionCollocation(Conditioned):
 
     problem: ConnectionProblem
 
+    plain = False
+
     def __init__(
         self, problem: ConnectionProblem, mesh: Sequence[float] | Array, degree: int, free: Sequence[str],
         parameters: Mapping[str, float], scales: Scales | None = None,

@@ -17,7 +17,6 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.boundary.second_variation import stability_of
-from contin.boundary.system import Collocation
 from contin.collocation import one_call
 from contin.collocation.defect import estimate, estimate_of
 from contin.continuation.plain import Quotient, Rooms, plain_steps
@@ -59,9 +58,6 @@ from contin.core.small import equations_of, linear_of
 from contin.core.state import State
 from contin.core.step import aims
 from contin.core.trial import Linearization, TestFunction, Trial
-from contin.cycles.homoclinic import STILL, homoclinic
-from contin.cycles.monodromy import monodromy_of
-from contin.cycles.system import CycleCollocation, ForcedCollocation, PeriodicCollocation
 from contin.errors import ConvergenceError
 from contin.events.inspection import Start, is_elsewhere
 from contin.events.segment import SpecialPoint
@@ -101,7 +97,7 @@ def lane_of(
 
 def _is_smooth(system: Any) -> bool:
     """Return whether a kernel makes steps on a mesh: functions are recorded, and have no jumps that the mesh must know of."""
-    if type(system) not in (Collocation, CycleCollocation, ForcedCollocation) or system.workspace is None:
+    if not system.plain or system.workspace is None:
         return False
     return system.intervals > 1 and not system.breaks.size and not system.has_selections and system.size == system.equations + 1
 
@@ -240,17 +236,17 @@ class MeshLane(Lane):
     def __init__(self, system: Any, *given: Any) -> None:
         super().__init__(system, *given)
         settings, newton, n = self.settings, self.settings.newton, system.states_count
-        cycles, autonomous = isinstance(system, PeriodicCollocation), isinstance(system, CycleCollocation)
+        autonomous = system.size_of_solutions is not None
         self._work, self._factors = system.workspace, system.unfilled_factors()
         self._rooms = MeshRooms(
             self._work, self._factors.room, one_call.Control(newton.tolerance, newton.max_iterations, 0, 1),
             np.empty(one_call.UPDATES + newton.max_iterations), np.empty(system.state_size if autonomous else 0),
             self._frame, self._attempt, self._control, self._watch,
         )  # fmt: skip
-        self._still = STILL if autonomous and homoclinic() in given[2] else 0.0
+        self._still = max((test.still for test in given[2]), default=0.0)
         may_grow = settings.mesh.every and system.intervals < settings.mesh.max_intervals
         self._poor = settings.mesh.tolerance if may_grow else np.inf  # an error above it wants a finer mesh
-        self._monodromy = monodromy_of(system) if cycles else None
+        self._monodromy = system.monodromy
         width = 2 * n + len(system.free)
         shapes = (system.intervals - 1, n, width), (width - n, width)
         self._relations = [Relations(np.empty(shapes[0]), np.empty(shapes[1])) for _ in range(2)]
@@ -267,7 +263,7 @@ class MeshLane(Lane):
     @staticmethod
     def knows(test: TestFunction) -> bool:
         """Return whether the kernel watches for what a test function, one of the kind of problem, looks for."""
-        return test.asks is not None or test == homoclinic()
+        return test.asks is not None or test.still > 0
 
     def _home(self) -> tuple[Array, Array]:
         home, x, _ = self._start

@@ -9,6 +9,7 @@ import numpy as np
 from contin.boundary.second_variation import contradiction
 from contin.collocation.switching import Switching
 from contin.core.trial import TestFunction, Trial
+from contin.events.labelled import finding_of
 from contin.events.phase_loads import phase_loads
 from contin.events.refinement import BENT
 from contin.events.segment import Segment, SpecialPoint
@@ -65,9 +66,9 @@ class Notes:
 
     def phases(self, found: SpecialPoint, error: float) -> None:
         """Note the phase conditions that load a labelled point, which is known to ``error``."""
-        trial = found.trial
+        trial, modes = found.trial, list(finding_of(found.details).arrays.get("kernel", ()))
         known = trial.newton_error + (self.tolerance if math.isnan(error) else error)
-        for name, load, is_mode in phase_loads(trial.system, trial.x, getattr(found.details, "kernel", ()), known):
+        for name, load, is_mode in phase_loads(trial.system, trial.x, modes, known):
             place = f"at {found.label} ({self.place(trial)})"
             what = f"has {load:.3g} of the largest number of a mode {place}" if is_mode else f"= {load:.6g} {place}"
             self.add(f"phases: {name} {what} and not zero, so the phase condition loads the structure; leave it out")

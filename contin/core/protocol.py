@@ -68,6 +68,8 @@ class Discretization(Equations, Protocol):
         Those of the free parameters.
     order : int
         Into how many equal parts a symmetry divides a cycle; x holds one of them.
+    plain : bool
+        Kernels may make the plain steps on its mesh.
     leaving : mapping of str to tuple of str
         Kinds of curves in two parameters that begin at, or pass, points of codimension two, by their label.
     """
@@ -84,6 +86,7 @@ class Discretization(Equations, Protocol):
     scales: Any
     free_scales: Array
     order: int = 1
+    plain: bool = False
     leaving: Mapping[str, tuple[str, ...]] = {}
 
     @property
@@ -188,6 +191,15 @@ class Discretization(Equations, Protocol):
     @property
     def solution(self) -> Discretization:
         """The problem whose solutions are followed: of a curve in two parameters the one that it is made of, else itself."""
+        return self
+
+    @property
+    def stored(self) -> dict[str, Array] | None:
+        """What is stored of the system besides its problem and free parameters, by name; None where it is not stored."""
+        return None
+
+    def referring_to(self, x: Array, tangent: Array) -> Discretization:
+        """Return the same with a point as the reference that further conditions are relative to; ``tangent`` may be NaN."""
         return self
 
     @property

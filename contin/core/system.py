@@ -94,6 +94,12 @@ class System(Discretization):
         p[self._free] = x[self.state_size :]
         return p
 
+    @property
+    def _own_arrays(self) -> dict[str, Array]:
+        """Parameters and sizes, by the names under which they are stored."""
+        sizes = {} if self.scales.are_one else {f"scale_{name}": array for name, array in self.scales.arrays().items()}
+        return {"parameters": self.parameters, **sizes}
+
     def _batch(self, name: str, rows: Sequence[str] = ()) -> Batch:
         """Return some of the functions, compiled, of scaled inputs; ``rows`` name the sizes of its values."""
         batch: Batch = self.problem.batch(name)

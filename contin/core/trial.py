@@ -191,6 +191,8 @@ class TestFunction:
         The parameter or functional whose value, fold or extremum is looked for; "" where it is about no column.
     value : float, optional
         The value of the column at the zero.
+    still : float
+        Part of the largest speed of a cycle at which the function is zero, where it is about the least one; kernels watch it.
 
     Examples
     --------
@@ -215,6 +217,7 @@ class TestFunction:
     unless: str = ""
     column: str = ""
     value: float | None = None
+    still: float = 0.0
 
     def holds_one_of(self, free: Sequence[str]) -> bool:
         """Return whether it vanishes where a free parameter has a value."""

@@ -83,7 +83,7 @@ def _number(value: complex) -> str:
 @functools.cache  # one for all runs
 def homoclinic() -> TestFunction:
     """Return the test function that ends a branch of cycles at a homoclinic orbit, unless the user has limited the period."""
-    return TestFunction("EP", "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD)
+    return TestFunction("EP", "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD, still=STILL)
 
 
 def _liveliness(trial: Trial) -> float:

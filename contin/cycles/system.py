@@ -317,6 +317,11 @@ class PeriodicCollocation(Collocation):
     # --- what the kind knows of its branches --------------------------------------------------------------------------
 
     @property
+    def monodromy(self) -> Monodromy:
+        """Where a kernel computes the multipliers."""
+        return monodromy_of(self)
+
+    @property
     def is_cycle(self) -> bool:
         """Yes."""
         return True
@@ -587,6 +592,12 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
     def size_of_solutions(self) -> TestFunction:
         """The amplitude: cycles can shrink onto an equilibrium."""
         return AMPLITUDE
+
+    def referring_to(self, x: Array, tangent: Array) -> CycleCollocation:
+        """Return the same with a cycle as the reference; in place of one of no size, the one beside it along the tangent."""
+        if np.ptp(self.states(x), axis=0).any():
+            return self.with_reference(x)
+        return self.with_reference(x + tangent / np.abs(tangent).max()) if np.isfinite(tangent).all() else self
 
     def home(self, segment: Segment) -> SpecialPoint | None:
         """Return the Hopf point inside a step."""

@@ -73,6 +73,11 @@ class CriticalCurve(Extended):
         self.weights = np.append(base.weights, np.ones(extra))
         self._known: tuple[bytes, NullVectors] | None = None
 
+    @classmethod
+    def of_size(cls, base: System, size: float) -> CriticalCurve:
+        """Return the extended system with this size of kappa."""
+        return cls(base, None, size)
+
     def on(self, base: System) -> CriticalCurve:
         """Return the extended system of another underlying one, with borders of its own."""
         return type(self)(base, None, self.kappa_size)

@@ -51,6 +51,8 @@ class Extended(Discretization):
 
     #: The label of the special points that the curve consists of.
     kind = ""
+    #: Size of a further unknown, by which it is divided in x.
+    kappa_size = 1.0
     #: The column of extrema that the curve consists of.
     objective = ""
 
@@ -69,6 +71,11 @@ class Extended(Discretization):
         self.weights, self.size, self.state_size = base.weights, base.size, base.state_size
         self.intervals, self.degree = base.intervals, base.degree
         self.scales, self.free_scales = base.scales, base.free_scales
+
+    @classmethod
+    def of_size(cls, base: System, size: float) -> Extended:
+        """Return the extended system with a given `kappa_size`."""
+        return cls(base, None)
 
     @abstractmethod
     def borders_fit(self, x: Array) -> bool:
@@ -199,6 +206,12 @@ class Extended(Discretization):
     def solution(self) -> Discretization:
         """The problem whose solutions are followed."""
         return self.base.solution
+
+    def referring_to(self, x: Array, tangent: Array) -> Extended:
+        """Return the same with the solution itself as the reference."""
+        size, base = self.base.size, self.base
+        found: Any = base.referring_to(x[:size], tangent[:size])
+        return self if found is base else self.on(found)
 
     def in_phase(self, x: Array, vectors: Sequence[Array], reference: Array) -> tuple[Array, list[Array]]:
         """Return the solution itself, and vectors, in phase."""

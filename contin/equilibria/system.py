@@ -415,6 +415,11 @@ class Algebraic(System):
         """Return the same, and x for it: there are no rounds."""
         return self, x
 
+    @property
+    def stored(self) -> dict[str, Array]:
+        """Parameters and sizes."""
+        return self._own_arrays
+
     def unstable(self, x: Array) -> int | None:
         """Return the number of unstable eigenvalues; None of large problems, and where nothing moves in time."""
         return None if self.is_sparse or not self.problem.dynamics else int(np.count_nonzero(self.eigenvalues(x).real > 0))

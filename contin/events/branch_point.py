@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from contin.core.newton import Newton
 from contin.core.protocol import Discretization, inner
 from contin.errors import ConvergenceError
 from contin.events.bordered import BorderedMatrix
+from contin.events.labelled import Finding
 from contin.linalg.orientation import ordered, oriented, oriented_along
 
 #: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear.
@@ -43,7 +44,7 @@ _DRAWS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class BranchPoint:
+class BranchPoint(Finding):
     """A simple branch point.
 
     Attributes
@@ -75,6 +76,24 @@ class BranchPoint:
     left: Array
     hessian: Array
     imperfection: float
+    is_branch_point: ClassVar[bool] = True
+
+    @property
+    def leaving(self) -> tuple[Array, ...]:
+        """Its tangents."""
+        return self.tangents
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What is stored, by name."""
+        return {
+            "kernel": self.kernel, "left": self.left, "hessian": self.hessian, "tangents": np.array(self.tangents),
+        }  # fmt: skip
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What is stored besides."""
+        return {"imperfection": self.imperfection}
 
     def __repr__(self) -> str:
         branches = f"{len(self.tangents)} branches cross" if self.tangents else "isolated"

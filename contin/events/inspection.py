@@ -20,9 +20,9 @@ from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.state import Reason, Stop
 from contin.core.trial import Linearization, TestFunction, Trial
-from contin.events.branch_point import BranchPoint
 from contin.events.branch_points import BranchPointSearch
 from contin.events.folds import FoldSearch
+from contin.events.labelled import finding_of
 from contin.events.segment import Place, Segment, SpecialPoint, stop_of
 from contin.events.trivial import crossed, round_off
 
@@ -198,9 +198,10 @@ class Inspection:
             found = self.branch_points.simple
         else:
             return None
-        if not isinstance(found.details, BranchPoint) or not found.details.tangents:
+        tangents = finding_of(found.details).leaving
+        if not tangents:
             return None
-        component = found.details.tangents[0][self.segment.trial.system.parameter_index(fold.name)]
+        component = tangents[0][self.segment.trial.system.parameter_index(fold.name)]
         stationary = abs(component) < _STATIONARY
         return dataclasses.replace(found, label=fold.label, name=fold.name, test=fold) if stationary else None
 
@@ -382,10 +383,11 @@ class Inspection:
 
         With the rate c there, and the fold at a distance d, it differs by c d / 2.
         """
-        if not isinstance(crossing.details, BranchPoint) or not crossing.details.tangents:
+        known = finding_of(crossing.details)
+        if not known.is_simple_branch_point or not known.leaving:
             return False
         at = self.segment.trial.system.parameter_index(fold.name)
-        rate, p = crossing.details.tangents[0][at], crossing.trial.x[at]
+        rate, p = known.leaving[0][at], crossing.trial.x[at]
         change, expected = fold.trial.x[at] - p, rate * (fold.at - crossing.at) / 2
         if abs(rate) < _STATIONARY or abs(change) < _STANDS * (1 + abs(p)):
             return False

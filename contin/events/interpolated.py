@@ -25,6 +25,7 @@ from contin.core.state import State, standing_at
 from contin.core.step import located
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
+from contin.events.labelled import Finding
 from contin.events.root import find_zero
 from contin.events.segment import Segment
 
@@ -63,7 +64,7 @@ class Window:
 
 
 @dataclass(frozen=True, eq=False)
-class InterpolatedZero:
+class InterpolatedZero(Finding):
     """A common zero of test functions, between points of a curve.
 
     Attributes

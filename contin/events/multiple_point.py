@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from contin.arrays import Array
 from contin.core.newton import Newton
 from contin.core.protocol import Discretization, inner
 from contin.errors import ConvergenceError
+from contin.events.labelled import Finding
 from contin.linalg.orientation import canonical_basis, ordered, oriented, oriented_along
 from contin.linalg.singular import smallest_directions
 
@@ -54,7 +56,7 @@ _SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class MultiplePoint:
+class MultiplePoint(Finding):
     """A point where F_x loses rank by two or more at once.
 
     Attributes
@@ -91,6 +93,27 @@ class MultiplePoint:
     tangents: tuple[Array, ...] = ()
     continuum: bool = False
     spread: float = 0.0
+    is_branch_point: ClassVar[bool] = True
+
+    @property
+    def nullity(self) -> int:  # type: ignore[override]
+        """Its dimension."""
+        return self.dimension
+
+    @property
+    def leaving(self) -> tuple[Array, ...]:
+        """Its tangents."""
+        return self.tangents
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What is stored, by name."""
+        return {"kernel": self.kernel, "tangents": np.array(self.tangents)}
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What is stored besides."""
+        return {"dimension": self.dimension, "continuum": self.continuum, "spread": self.spread}
 
     def __repr__(self) -> str:
         count = len(self.tangents)

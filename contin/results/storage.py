@@ -18,20 +18,13 @@ from contin.boundary.system import Collocation
 from contin.core.protocol import Discretization
 from contin.core.scales import Scales
 from contin.core.state import Stop
-from contin.cycles.curves import DoublingCurve, TorusCurve
-from contin.cycles.map_curves import MapDoublingCurve, MapTorusCurve
-from contin.cycles.maps import MapSystem
-from contin.cycles.statement import CycleProblem
-from contin.cycles.system import CycleCollocation
 from contin.defining.branch_point_curve import BranchPointCurve
-from contin.defining.critical_curve import CriticalCurve
-from contin.defining.extended import Extended
 from contin.defining.fold_curve import FoldCurve
-from contin.equilibria.hopf_curve import HopfCurve
 from contin.equilibria.statement import AlgebraicProblem
 from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.branch_point import BranchPoint
+from contin.events.labelled import finding_of
 from contin.events.multiple_point import MultiplePoint
 from contin.files import write_whole
 from contin.results.branch import Branch
@@ -41,12 +34,6 @@ Result = TypeVar("Result")
 
 #: First entry of every file, and of a curve in two parameters: another number where an older version could not read it.
 _FORMAT, _OF_CURVE = "contin branch 1", "contin branch 2"
-#: The extended systems of curves, by the label of their points.
-_CURVES: dict[str, type[Extended]] = {
-    kind.kind: kind for kind in (FoldCurve, BranchPointCurve, HopfCurve, DoublingCurve, TorusCurve)
-}
-#: Those of maps, likewise.
-_CURVES_OF_MAPS: dict[str, type[Extended]] = {kind.kind: kind for kind in (MapDoublingCurve, MapTorusCurve)}
 #: Arrays of a branch point that are stored besides its tangents.
 _OF_BRANCH_POINT = ("kernel", "left", "hessian")
 
@@ -78,7 +65,7 @@ def save(branch: Branch, path: str | Path) -> None:
     checks.instance("branch", branch, Branch, "a Branch")
     if not branch.points:
         raise ProblemError("branch: has no points")
-    systems: list[Discretization] = []
+    systems: list[Any] = []
     rows: list[dict[str, Any]] = []
     arrays: dict[str, Any] = {}
     for number, point in enumerate(branch.points):
@@ -87,22 +74,16 @@ def save(branch: Branch, path: str | Path) -> None:
             systems.append(point.system)
             arrays |= _arrays_of(point.system, at)
         arrays[f"x{number}"], arrays[f"tangent{number}"] = point.x, point.tangent
-        if isinstance(point.details, BranchPoint):
-            for name in _OF_BRANCH_POINT:
-                arrays[f"{name}{number}"] = getattr(point.details, name)
-        if isinstance(point.details, MultiplePoint):
-            arrays[f"kernel{number}"] = point.details.kernel
-        if isinstance(point.details, (BranchPoint, MultiplePoint)):
-            arrays[f"tangents{number}"] = np.array(point.details.tangents)
+        arrays |= {f"{name}{number}": array for name, array in finding_of(point.details).arrays.items()}
         rows.append(_row(point, at))
-    first = branch.points[0].system
-    curves = [[system.kind, getattr(system, "kappa_size", 1.0)] for system in systems if isinstance(system, Extended)]
-    further = first.size - first.base.size if isinstance(first, Extended) else 0  # unknowns that a curve adds
+    first: Any = branch.points[0].system
+    curves = [[system.kind, system.kappa_size] for system in systems if system.on_curve]
+    further = first.size - first.base.size if first.on_curve else 0  # unknowns that a curve adds
     stop = branch.stop and [str(branch.stop.reason), branch.stop.message, branch.stop.advice]
     head = {
         "format": _OF_CURVE if curves else _FORMAT, "points": rows, "stop": stop, "free": first.free,
         "degrees": [s.degree for s in systems], "states": first.problem.states, "names": list(first.problem.parameters),
-        "symmetry": _symmetry(first.problem), "notes": list(branch.notes),
+        "symmetry": _symmetry(first.solution.problem), "notes": list(branch.notes),
     } | ({"curves": curves, "further": further} if curves else {})  # fmt: skip
     image = io.BytesIO()
     np.savez_compressed(image, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
@@ -111,7 +92,7 @@ def save(branch: Branch, path: str | Path) -> None:
 
 def _symmetry(problem: Any) -> list[list[float]] | None:
     """Return the matrix of the symmetry of cycles; None where none is declared."""
-    return problem.symmetry.tolist() if isinstance(problem, CycleProblem) and problem.order > 1 else None
+    return problem.symmetry.tolist() if problem.order > 1 else None
 
 
 def _row(point: Point, at: int) -> dict[str, Any]:
@@ -120,15 +101,14 @@ def _row(point: Point, at: int) -> dict[str, Any]:
         "label": point.label, "name": point.name, "system": at, "functionals": dict(point.functionals),
         "arclength": point.arclength, "iterations": point.iterations, "newton_error": point.newton_error,
         "discretization_error": point.discretization_error,
-        "errors": dict(point.errors), "imperfection": getattr(point.details, "imperfection", None),
-        "dimension": getattr(point.details, "dimension", None), "continuum": getattr(point.details, "continuum", False),
-        "spread": getattr(point.details, "spread", 0.0),
+        "errors": dict(point.errors), "imperfection": None, "dimension": None, "continuum": False, "spread": 0.0,
+        **finding_of(point.details).numbers,
         "index": point.index, "nullity": point.nullity, "index_change": point.index_change, "breaks": point.breaks,
         "details": _numbers(point.details), "column": point.column, "value": point.value,
     }  # fmt: skip
 
 
-def _arrays_of(system: Discretization, number: int) -> dict[str, Array]:
+def _arrays_of(system: Any, number: int) -> dict[str, Array]:
     """Return what is stored of a discretized problem.
 
     Raises
@@ -136,17 +116,18 @@ def _arrays_of(system: Discretization, number: int) -> dict[str, Array]:
     ProblemError
         It is of a kind that is not stored.
     """
-    base = system.base if isinstance(system, Extended) else system
-    if isinstance(system, Extended) and system.kind not in _CURVES:
+    base = system.base if system.on_curve else system
+    if system.on_curve and system.kind not in _curves(base):
         raise ProblemError("branch: points of this kind of curve are not stored; keep their columns")
-    if not isinstance(base, (Collocation, Algebraic)):
+    arrays: dict[str, Array] | None = base.stored
+    if arrays is None:
         raise ProblemError(f"branch: points of a {type(base).__name__} are not stored; keep their columns")
-    arrays = {f"parameters{number}": base.parameters}
-    if isinstance(base, Collocation):
-        arrays[f"mesh{number}"] = base.mesh
-    if not base.scales.are_one:
-        arrays |= {f"scale_{name}{number}": sizes for name, sizes in base.scales.arrays().items()}
-    return arrays
+    return {f"{name}{number}": array for name, array in arrays.items()}
+
+
+def _curves(base: Discretization) -> dict[str, Any]:
+    """Return the extended systems of curves of solutions of a problem that are stored, by the label of their points."""
+    return {**{kind.kind: kind for kind in (FoldCurve, BranchPointCurve)}, **base.curves}
 
 
 def _numbers(details: Any) -> dict[str, float] | None:
@@ -223,8 +204,8 @@ def _system(
     if not head.get("curves"):
         return base
     kind, size = head["curves"][i]
-    curve = (_CURVES_OF_MAPS if isinstance(base, MapSystem) and kind in _CURVES_OF_MAPS else _CURVES)[kind]
-    return curve(base, None, size) if issubclass(curve, CriticalCurve) else curve(base, None)
+    found: Discretization = _curves(base)[kind].of_size(base, size)
+    return found
 
 
 def _base(
@@ -260,25 +241,11 @@ def _is_number(text: str, value: float) -> bool:
         return False
 
 
-def _with_reference(system: Discretization, x: Array, tangent: Array) -> Discretization:
-    """Return a discretized problem with a stored point as the reference, if it has one.
-
-    A cycle without a size, at a Hopf point, has the one beside it along the tangent, where that is known.
-    """
-    if isinstance(system, Extended):
-        size = system.base.size
-        base: Any = _with_reference(system.base, x[:size], tangent[:size])
-        return system if base is system.base else system.on(base)
-    if isinstance(system, CycleCollocation) and not np.ptp(system.states(x), axis=0).any():
-        return system.with_reference(x + tangent / np.abs(tangent).max()) if np.isfinite(tangent).all() else system
-    return system.with_reference(x) if isinstance(system, Collocation) else system
-
-
 def _point(row: dict[str, Any], system: Discretization, arrays: dict[str, Array], number: int) -> Point:
     x = arrays[f"x{number}"]
     if len(x) != system.size:
         raise ProblemError("the file is of an earlier version, which kept one point of a map's cycle only: follow it again")
-    system = _with_reference(system, x, arrays[f"tangent{number}"])
+    system = system.referring_to(x, arrays[f"tangent{number}"])
     details: BranchPoint | MultiplePoint | dict[str, float] | None = row.get("details")
     if row["imperfection"] is not None:
         kept = {name: arrays[f"{name}{number}"] for name in _OF_BRANCH_POINT}

@@ -22,7 +22,7 @@ _ALONG = 1e-4
 
 def leaves_saddle_node(point: Point) -> bool:
     """Return whether a point is a non-central homoclinic orbit to a saddle-node, where two curves meet."""
-    return point.label == "NCH" and isinstance(point.system, ConnectionCollocation)
+    return point.label == "NCH" and not point.system.on_curve
 
 
 def from_non_central(point: Point) -> tuple[ConnectionCollocation, Array, Array]:

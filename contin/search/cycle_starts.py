@@ -67,7 +67,7 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
         It is no Hopf point of equilibria.
     """
     system: Any = point.system
-    if point.label != "HB" or not isinstance(system, Algebraic):
+    if point.label != "HB" or system.intervals or system.on_curve:
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
     cycles, x, tangent = small_cycle(system, point.x, pair, 0.0)
@@ -90,8 +90,7 @@ def _in_sizes_of_the_equilibrium(cycles: CycleCollocation, x: Array) -> tuple[Cy
     if all(np.all(found == 1) for found in sizes):
         return cycles, x
     scaled, x = cycles.with_scales(x, *sizes)
-    assert isinstance(scaled, CycleCollocation)
-    return scaled, x
+    return scaled, x  # type: ignore[return-value]  # the same kind
 
 
 def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) -> tuple[CycleCollocation, Array, Array]:
@@ -127,7 +126,7 @@ def doubled(point: Point) -> tuple[PeriodicCollocation | MapSystem, Array, Array
     system: Any = point.system
     if not doubles(point):
         raise ProblemError(f"start: a point with the label {point.label!r} is no period doubling")
-    if isinstance(system, MapSystem):
+    if not system.intervals:
         return _doubled_map(system, point.x)
     adapted = system.adapted(point.x, MeshControl())  # the point is located on a mesh finer than the run needs
     system, x = (system, point.x) if adapted is None else (adapted[0], adapted[1](point.x))

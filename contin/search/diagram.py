@@ -18,8 +18,7 @@ from contin.core.settings import Options, Settings, settings_with
 from contin.core.state import Reason, Stop
 from contin.cycles.statement import CycleProblem
 from contin.errors import ConvergenceError, ProblemError
-from contin.events.branch_point import BranchPoint
-from contin.events.multiple_point import MultiplePoint
+from contin.events.labelled import finding_of
 from contin.functions.signature import argument_count
 from contin.problems.angles import whole_rounds, winding_names
 from contin.problems.own_names import PERIOD, ROUNDS
@@ -241,8 +240,9 @@ class _Explorer:
     def _is_known(self, point: Point, number: int, depth: int) -> bool:
         """Note a point that a run passes, if it is one to leave a branch at; return True if the way ahead was followed."""
         begins = switches(point)
-        if isinstance(point.details, (BranchPoint, MultiplePoint)) and not begins:
-            return bool(point.details.tangents) and self._arrived(point, number, depth)
+        known = finding_of(point.details)
+        if known.is_branch_point and not begins:
+            return bool(known.leaving) and self._arrived(point, number, depth)
         return begins and self._met(point, number, depth)
 
     def _met(self, point: Point, number: int, depth: int) -> bool:

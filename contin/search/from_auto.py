@@ -106,7 +106,7 @@ def _values(problem: Any, solution: AutoSolution, given: Mapping[str, float]) ->
 
 def _system(problem: Any, solution: AutoSolution, free: Sequence[str], values: Mapping[str, float]) -> tuple[System, Array]:
     """Return the discretized problem on AUTO's mesh, and the solution as its unknowns."""
-    if isinstance(problem, AlgebraicProblem):
+    if problem.domain is None:
         algebraic = Algebraic(problem, free, values)
         return algebraic, algebraic.pack(solution.states, values)
     degree, (a, b) = solution.degree, problem.domain

@@ -16,7 +16,6 @@ from contin.connections.system import ConnectionCollocation
 from contin.core.newton import Newton
 from contin.cycles.homoclinic import equilibrium_beside
 from contin.cycles.system import CycleCollocation
-from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.linalg.orientation import first_least
 from contin.problems.angles import periods_of, whole_rounds, winding_names, windings
@@ -82,11 +81,10 @@ def homoclinic(
     """
     checks.instance("start", start, Point, "a Point")
     control = MeshControl() if mesh is None else mesh
-    if isinstance(start.system, Algebraic) and start.system.problem.dynamics:
+    system: Any = start.system
+    if not system.on_curve and not system.intervals and system.problem.dynamics:
         return _from_saddle(start, free, limits, direction, (control, newton))
-    if not isinstance(start.system, CycleCollocation):
-        raise ProblemError("start: must be a point of a CycleProblem, or an equilibrium of an AlgebraicProblem")
-    if limits is not None:
+    if limits is not None and system.size_of_solutions is not None:
         raise ProblemError("limits: are for a start at an equilibrium; the orbit is looked for near the cycle")
     return _from_cycle(start, free, (control, newton))
 
@@ -136,6 +134,8 @@ def _from_cycle(cycle: Point, free: Sequence[str], options: tuple[MeshControl, N
     ProblemError
     """
     system: Any = cycle.system
+    if system.size_of_solutions is None:
+        raise ProblemError("start: must be a point of a CycleProblem, or an equilibrium of an AlgebraicProblem")
     if system.order > 1:
         raise ProblemError("start: must be a cycle without a symmetry; solve takes it as a guess of such a CycleProblem")
     states, names = system.states(cycle.x), system.problem.state_names

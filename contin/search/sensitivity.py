@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -11,11 +11,10 @@ from contin.arrays import Array
 from contin.core.differences import derivative
 from contin.core.system import System
 from contin.core.trial import Linearization, Trial
-from contin.equilibria.system import Algebraic
 from contin.errors import ProblemError
 from contin.events.bordered import BorderedMatrix
-from contin.events.branch_point import BranchPoint
 from contin.events.hopf import critical_real_part
+from contin.events.labelled import finding_of, frequency_of
 from contin.results.point import Point, system_of
 
 
@@ -69,7 +68,7 @@ def sensitivities(
     wide, x = system.with_free((*system.free, *by), point.x)
     if point.label == "LP":
         return _of_fold(point, wide, x, by)
-    if isinstance(point.details, BranchPoint):
+    if finding_of(point.details).is_simple_branch_point:
         return {name: _of_branch_point(point, name) for name in by}
     fixed = _fixed(point, held)
     return {name: _held(point, name, fixed) for name in by}
@@ -86,7 +85,7 @@ def _fixed(point: Point, held: str | Callable[[Trial], float] | None) -> str | C
         return held
     system = system_of(point, "point")
     columns = (*system.problem.parameters, *system.problem.functionals, *system.named_states)
-    if held is None and point.label == "HB" and isinstance(system, Algebraic) and isinstance(point.details, Mapping):
+    if held is None and point.label == "HB" and frequency_of(point) is not None and not system.intervals:
         return critical_real_part(point.details["frequency"])
     if held is None:
         held = point.column or (system.free[0] if point.label in ("", "EP") else None)

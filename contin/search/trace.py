@@ -13,10 +13,9 @@ from contin.arrays import Array
 from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
 from contin.core.settings import Options, Settings, settings_with
-from contin.core.system import System
 from contin.errors import ConvergenceError, ProblemError
-from contin.events.branch_point import BranchPoint, locate_branch_point
-from contin.events.multiple_point import MultiplePoint
+from contin.events.branch_point import locate_branch_point
+from contin.events.labelled import finding_of
 from contin.linalg.orientation import oriented_along
 from contin.problems.statement import forget_changed
 from contin.results.branch import Branch
@@ -69,7 +68,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     start = start if free is None else _solution(start, checks.names("free", free))
     system: Any = start.system
     x = start.x
-    if isinstance(system, System) and forget_changed(system.problem):
+    if not system.on_curve and forget_changed(system.problem):
         system = system.with_parameters({})
     if branch is not None:
         checks.whole("branch", branch, 0, 10)
@@ -106,9 +105,10 @@ def _solution(start: Point, free: Sequence[str]) -> Point:
 
 def _own_tangent(start: Point, system: Any, settings: Settings) -> Array | None:
     """Return the tangent of the branch that a branch point was found on, oriented; None at other points."""
-    if not isinstance(start.details, (BranchPoint, MultiplePoint)) or not start.details.tangents or system is not start.system:
+    known = finding_of(start.details)
+    if not known.leaving or system is not start.system:
         return None  # elsewhere the equations tell it
-    tangent: Array = start.details.tangents[0]
+    tangent: Array = known.leaving[0]
     rate = tangent[system.parameter_index(settings.primary or system.free[0])]
     return settings.direction * oriented_along(tangent, rate)
 
@@ -121,15 +121,16 @@ def _tangent(start: Point, system: Any, branch: int) -> Array:
     ProblemError
         The start is no branch point, or one in other parameters, or has fewer branches.
     """
-    if not isinstance(start.details, (BranchPoint, MultiplePoint)):
+    known = finding_of(start.details)
+    if not known.is_branch_point:
         raise ProblemError("branch: the start is not a branch point")
     if set(system.free) != set(start.system.free):
         own = ", ".join(start.system.free)
         raise ProblemError(f"free: {', '.join(system.free)} must be {own}, with which the branch point was found")
-    if not 0 <= branch < len(start.details.tangents):
-        raise ProblemError(f"branch: {branch} must lie between 0 and {len(start.details.tangents) - 1}")
-    tangent: Array = start.details.tangents[branch]
-    if isinstance(start.system, System):
+    if not 0 <= branch < len(known.leaving):
+        raise ProblemError(f"branch: {branch} must lie between 0 and {len(known.leaving) - 1}")
+    tangent: Array = known.leaving[branch]
+    if not start.system.on_curve:
         at = [start.system.parameter_index(name) for name in system.free]
         tangent = np.concatenate([tangent[: system.state_size], tangent[at]])
     return tangent
