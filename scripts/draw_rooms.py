@@ -3,7 +3,7 @@
     python scripts/draw_rooms.py [OUT.svg]
 
 The order of the rooms comes from the contract in pyproject.toml. The arrows come from all import statements, those inside
-functions and those for types included. An import that goes upwards is an error (exit code 1).
+functions included, but for those that only types need. An import that goes upwards is an error (exit code 1).
 """
 
 from __future__ import annotations
@@ -20,14 +20,18 @@ OUT = ROOT / "docs" / "images" / "rooms.svg"
 #: The modules beside the rooms: drawn as one box.
 FOUNDATION = "errors · arrays · checks · files"
 PURPOSE = {
-    "analysis": "first solutions, curves in two parameters, diagrams, sensitivities",
-    "continuation": "the loop: predict, correct, inspect, accept",
+    "search": "first solutions, runs from points, curves, diagrams, sensitivities",
+    "continuation": "the loop: predict, correct, watch, locate, accept",
     "results": "points, branches, files, tables, plots",
-    "curves": "extended systems: folds, Hopf points and others in two parameters",
-    "detection": "test functions, folds, branch points, Hopf points, error estimates",
-    "stepping": "Newton's method, one step, settings, state of a run",
-    "discretization": "collocation, mesh, assembly; the protocol of all systems",
-    "problems": "what a user states, checked",
+    "connections": "homoclinic and heteroclinic orbits",
+    "cycles": "cycles of vector fields and maps: multipliers, doublings, tori",
+    "equilibria": "F(u, p) = 0: Hopf points, dependent equations",
+    "boundary": "boundary value problems; energies and their index",
+    "defining": "extended systems of special points in two parameters",
+    "events": "folds, branch points, test functions, error estimates",
+    "core": "the protocol of all systems; Newton's method, one step, settings",
+    "collocation": "nodes, mesh, assembly, error of a solution: arrays and kernels",
+    "problems": "what all statements share",
     "linalg": "factorization by condensation, dense LU, singular vectors",
     "functions": "users' functions recorded: exact derivatives, interpreter; kernels",
     FOUNDATION: "what every room uses (arrows left out)",
@@ -63,13 +67,21 @@ def room_of(module: str, rooms: list[str]) -> str:
 
 
 def imported(tree: ast.AST) -> Iterator[str]:
-    """Yield the names of all modules that a file imports, wherever it does."""
-    for node in ast.walk(tree):
+    """Yield the names of all modules that a file imports, wherever it does, but where only a type is meant."""
+    for node in ast.walk(_Ran().visit(tree)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
             # `from contin import checks` imports a module, too
             yield from (f"contin.{alias.name}" for alias in node.names) if node.module == "contin" else (node.module,)
+
+
+class _Ran(ast.NodeTransformer):
+    """Leaves what runs."""
+
+    def visit_If(self, node: ast.If) -> ast.AST | None:
+        """Drop what is for type checkers only."""
+        return None if isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING" else self.generic_visit(node)
 
 
 def imports(package: Path = ROOT / "contin") -> tuple[Imports, Imports]:
@@ -93,7 +105,7 @@ def imports(package: Path = ROOT / "contin") -> tuple[Imports, Imports]:
 
 
 def edges(inside: Imports) -> list[str]:
-    """Return the imports as lines, "detection -> stepping"; ValueError where one goes upwards."""
+    """Return the imports as lines, "events -> core"; ValueError where one goes upwards."""
     rooms = layers()
     for room, others in inside.items():
         for other in others:
