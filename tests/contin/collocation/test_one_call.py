@@ -7,8 +7,8 @@ import pytest
 
 import contin
 from contin import BoundaryValueProblem, CycleProblem
+from contin.core import newton as newton_module
 from contin.core.newton import Newton, correct
-from contin.stepping import newton as newton_module
 
 
 def bratu():
