@@ -214,8 +214,9 @@ class Continuation:
         """Make plain steps, many at a time, up to the first that wants a closer look; yield their points."""
         most = FEWEST
         while True:
-            due, lane, state = self._adapt(), self._lane, self.state
-            if lane is None or state.singular:
+            due, state = self._adapt(), self.state
+            lane = None if state.singular else self._lane
+            if lane is None:
                 return
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
             block = lane.steps(state, max(most, 0), self._here())
