@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -84,24 +84,30 @@ class Collocation(System):
         scales: Scales | None = None,
     ) -> None:
         super().__init__(problem, free, parameters, scales)
-        self.degree = degree
+        self.degree = self._d = degree
         self.basis = basis(degree)
-        self.mesh = np.array(mesh, dtype=float)
-        self._h = np.diff(self.mesh)
+        self._n = len(problem.state_names)
+        self._take_mesh(np.array(mesh, dtype=float))
+
+    def _take_mesh(self, mesh: Array) -> None:
+        """Set all that depends on the mesh, and forget what was computed on another one."""
+        for name in _ON_A_MESH:
+            vars(self).pop(name, None)
+        problem, degree, h = self.problem, self.degree, mesh[1:] - mesh[:-1]
         a, b = problem.domain
-        if self.mesh.ndim != 1 or self.mesh.size < 2 or not np.all(self._h > 0) or self.mesh[0] != a or self.mesh[-1] != b:
+        if mesh.ndim != 1 or mesh.size < 2 or not np.all(h > 0) or mesh[0] != a or mesh[-1] != b:
             raise ProblemError(f"mesh: must increase from {a} to {b}, with at least one interval")
-        self._n, self._d, self.intervals = len(problem.state_names), degree, self._h.size
-        self._times = (self.mesh[:-1, None] + self._h[:, None] * self.basis.points).ravel()
-        self._h_points = np.repeat(self._h, degree)[:, None]
-        self._quadrature = np.tile(self.basis.weights, self.intervals) * self._h_points[:, 0]
+        self.mesh, self._h, self.intervals = mesh, h, h.size
+        self._times = (mesh[:-1, None] + h[:, None] * self.basis.points).ravel()
+        self._h_points = np.repeat(h, degree)[:, None]
+        self._quadrature = (h[:, None] * self.basis.weights).ravel()
         self._by_interval = degree * np.arange(self.intervals)[:, None] + np.arange(degree + 1)
         self.state_size = (self.intervals * degree + 1) * self._n
         self.size = self.state_size + len(self.free)
         self._conditions = self.intervals * degree * self._n + problem.boundary_size + problem.integral_size
         self.equations = self._conditions
         node_weights = np.zeros(self.intervals * degree + 1)
-        shares = (self._h[:, None] * self.basis.node_weights) / (b - a)
+        shares = (h[:, None] * self.basis.node_weights) / (b - a)
         for node in range(degree + 1):
             node_weights[node : node + self.intervals * degree : degree] += shares[:, node]
         #: Weights of the inner product: the mean over the domain of u.v, plus p.q of the free parameters.
@@ -187,10 +193,14 @@ class Collocation(System):
 
     def _interpolated(self, x: Array, times: Array) -> Array:
         """Return the piecewise polynomial of the values in x."""
-        j = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, self.intervals - 1)
+        return self._interpolator(times)(x)
+
+    def _interpolator(self, times: Array) -> Carrier:
+        """Return the function that evaluates the piecewise polynomial of values at times in the domain."""
+        j = np.minimum(np.maximum(np.searchsorted(self.mesh, times, side="right") - 1, 0), self.intervals - 1)
         matrix = interpolation(self.basis.nodes, self.basis.barycentric, (times - self.mesh[j]) / self._h[j])
-        states: Array = np.einsum("ij,ijk->ik", matrix, self._local(self._scaled_states(x))[j])
-        return states
+        places = self._by_interval[j]
+        return lambda x: np.einsum("ij,ijk->ik", matrix, self._scaled_states(x)[places])
 
     def evaluate_scaled_in(self, x: Array, interval: int, places: Array) -> Array:
         """Return the states divided by their sizes at ``places`` (K,) of an interval, between 0 and 1, shape (K, n)."""
@@ -447,10 +457,8 @@ class Collocation(System):
 
     def carrier(self, other: Discretization) -> Carrier:
         """Return the function that carries vectors of unknowns from this mesh to the mesh of another system."""
-        nodes = other.nodes
-        return self._between_scales(
-            lambda x: np.concatenate([self._interpolated(x, nodes).ravel(), x[self.state_size :]]), other
-        )
+        states = self._interpolator(other.nodes)
+        return self._between_scales(lambda x: np.concatenate([states(x).ravel(), x[self.state_size :]]), other)
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[Collocation, Array]:
         """Return the same problem with these sizes of states and parameters, sizes of rows found at x, and x for it."""
@@ -475,14 +483,21 @@ class Collocation(System):
         return other, self.carrier(other)(x)
 
     def _with(self, **changes: Any) -> Collocation:
-        """Return the same with other mesh, free parameters, parameters or scales."""
+        """Return the same with other free parameters, parameters or scales."""
         values = dict(zip(self.problem.parameters, self.parameters))
-        kept = {"mesh": self.mesh, "free": self.free, "parameters": values, "scales": self.scales}
-        return type(self)(self.problem, degree=self.degree, **{**kept, **changes})
+        kept = {"free": self.free, "parameters": values, "scales": self.scales}
+        return type(self)(self.problem, self.mesh, self.degree, **{**kept, **changes})
 
-    def on_mesh(self, mesh: Array) -> tuple[Collocation, Carrier]:
+    def _copied(self) -> Self:
+        """Return a copy with all that was computed, which ``copy.copy`` leaves out."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
+        return other
+
+    def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
         """Return the same problem on another mesh, and the function that carries vectors of unknowns over to it."""
-        other = self._with(mesh=mesh)
+        other = self._copied()
+        other._take_mesh(np.array(mesh, dtype=float))
         return other, self.carrier(other)
 
     def refined(self) -> tuple[Collocation, Carrier]:
@@ -597,7 +612,7 @@ class Collocation(System):
 
     def on_breaks(self) -> Collocation:
         """Return the same problem on a mesh of as many intervals, with the breaks among its points."""
-        return self._with(mesh=with_breaks(self.mesh, self.breaks)) if len(self.breaks) else self
+        return self.on_mesh(with_breaks(self.mesh, self.breaks))[0] if len(self.breaks) else self
 
     def with_parameters(self, values: Mapping[str, float]) -> Collocation:
         """Return the same problem with other values of parameters that are not free."""
@@ -642,6 +657,8 @@ class Collocation(System):
 #: Distance of a switch from a mesh point, as a part of the domain, up to which it lies there. Special points are off by about
 #: that: ten times smaller is round-off of the place itself.
 _CLOSE = 1e-12
+#: What is computed when it is first asked for, and depends on the mesh.
+_ON_A_MESH = ("defect", "_workspaces", "_switchings", "_monodromies")
 #: The t of boundary conditions, which do not take it.
 _TIME = np.zeros(1)
 

@@ -364,9 +364,9 @@ def estimate_of(defect: Defect) -> Estimate:
     """Return the room of a mesh, whose right-hand side jumps nowhere."""
     system, n = defect.system, defect.n
     points, mesh, count = defect.times.size, system.mesh.size, len(system.integrated)
-    values = system.workspace.values
+    codes, _, values = system.workspace
     width, empty = values.field.shape[1], np.empty
-    integrals = system._batch("functionals" if count else "field").load()
+    integrals = system._batch("functionals").load() if count else codes.field
     return Estimate(
         defect.tables, defect.times, defect.weights, system.mesh, defect.conditions, integrals, defect.least_sizes,
         empty(count), system.gauss_weights, empty((mesh, width)), empty((mesh, width)), empty((mesh, n)),

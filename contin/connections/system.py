@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -69,13 +69,21 @@ class ConnectionCollocation(Conditioned):
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
         check_windings(problem.angles, self.free, dict(zip(problem.parameters, map(float, self.parameters))))
-        self._further = sum(problem.conditions) + problem.saddle_node + 1
-        self.equations = self._conditions + self._further
         self.reference: Array = np.empty(0)
 
-    def with_reference(self, x: Array) -> ConnectionCollocation:
+    def _take_mesh(self, mesh: Array) -> None:
+        super()._take_mesh(mesh)
+        self.equations = self._conditions + self._further
+
+    @property
+    def _further(self) -> int:
+        """Number of conditions beyond collocation and the equilibria."""
+        return sum(self.problem.conditions) + self.problem.saddle_node + 1
+
+    def with_reference(self, x: Array) -> Self:
         """Return the same with v and Q of the orbit x."""
-        other = self._with()
+        other = self._copied()
+        other._known_subspaces = {}
         other.reference = np.array(x)
         other._phase = other.phase_row(other._scaled_states(x))
         other._target = float(other._phase @ x)
@@ -381,14 +389,19 @@ class ConnectionCollocation(Conditioned):
 
     def _with(self, **changes: Any) -> ConnectionCollocation:
         other: Any = super()._with(**changes)
-        if self.reference.size and changes:
+        if self.reference.size:
             other = other.with_reference(self._carried(other))
         found: ConnectionCollocation = other
         return found
 
+    def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
+        """Return the same on another mesh, with the same reference, and the carrier."""
+        other, carry = super().on_mesh(mesh)
+        return other.with_reference(carry(self.reference)) if self.reference.size else other, carry
+
     def _carried(self, other: Any) -> Array:
         """Return the reference as a vector of unknowns of another system of this problem."""
-        states = self.evaluate(self.reference, other.nodes)
+        states = self.states(self.reference)
         names = list(self.problem.parameters)
         carried: Array = other.pack(states, dict(zip(names, self.all_parameters(self.reference))))
         return carried
@@ -399,10 +412,7 @@ class ConnectionCollocation(Conditioned):
         if mesh is None and np.abs(x - self.reference).max() <= _MOVED * np.abs(x).max():
             return None
         renewed = self.with_reference(x)
-        if mesh is None:
-            return renewed, self.carrier(renewed)
-        other = renewed._with(mesh=mesh)
-        return other, self.carrier(other)
+        return (renewed, np.array) if mesh is None else renewed.on_mesh(mesh)
 
     # --- what the kind knows of its branches --------------------------------------------------------------------------
 

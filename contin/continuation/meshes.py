@@ -156,10 +156,10 @@ class MeshPolicy:
         Half of them may do then: short intervals make it larger, as where cycles shrink after canards. Where the parameter
         stands still, in an explosion, errors of the mesh are taken for round-off.
         """
-        control = self.steps.settings.mesh
-        if not state.discretization_error > control.tolerance or not accuracy_of(here()).is_round_off:
+        control, now = self.steps.settings.mesh, state.system.intervals
+        if not state.discretization_error > control.tolerance or control.min_intervals * _FAR_TOO_MANY > now:
             return False
         wanted = state.system.adapted(state.x, control)
-        if wanted is None or wanted[0].intervals * _FAR_TOO_MANY > state.system.intervals:
+        if wanted is None or wanted[0].intervals * _FAR_TOO_MANY > now:
             return False
-        return bool(self.steps.sense(here()))
+        return accuracy_of(here()).is_round_off and bool(self.steps.sense(here()))

@@ -210,8 +210,9 @@ class Continuation:
         """Make plain steps, many at a time, up to the first that wants a closer look; yield their points."""
         most = FEWEST
         while True:
-            due, lane, state = self._adapt(), self._lane, self.state
-            if lane is None or state.singular:
+            due, state = self._adapt(), self.state
+            lane = None if state.singular else self._lane
+            if lane is None:
                 return
             most = min(most, due, self.settings.max_points - 1 - state.accepted)  # the last one has a label
             block = lane.steps(state, max(most, 0), self._here())
@@ -262,7 +263,7 @@ class Continuation:
         """Make one step: yield the labelled points inside it, then the point at its end."""
         self._adapt()
         try:
-            step = self._accurate_step()
+            step = self._step(self.state)
         except ConvergenceError as error:
             here, first = self._here(), Trial(*self.start[:2], Linearization(self.start[2], np.nan))
             failed = met(self._ends, here, first) or no_convergence(self.state, self.settings, error)
@@ -273,6 +274,7 @@ class Continuation:
             label, name = ("EP", stop.event) if stop.event else ("MX", "no convergence")
             yield self._point(SpecialPoint(0.0, label, name, here), self.state, accuracy=self._accuracy)
             return
+        self._accuracy = accuracy_of(step.end)
         segment, special = step.segment, [step.segment.trial.system.judged(point) for point in step.special]
         special = within_limits(segment, special, self._limits)
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
@@ -314,29 +316,30 @@ class Continuation:
 
     # --- one step ------------------------------------------------------------------------------------------------
 
-    def _accurate_step(self) -> Step:
-        """Make a step whose end has an error within the tolerance of the mesh, as far as a finer mesh makes it smaller.
+    def _attempt(self, step: float, made: Trial | None) -> tuple[Segment, Judgement]:
+        """Make a step of a given length whose end has an error within the tolerance of the mesh, as far as finer ones help.
 
-        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point.
+        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point, before
+        it is looked at closely: that takes longer than to make it. ``made`` is its end, where a kernel has it.
         """
-        step, control = self._step(self.state), self.settings.mesh
-        self._accuracy = accuracy_of(step.end)
+        segment, judgement = self._steps.attempt(self.state, self._here(), step, made)
+        accuracy, control = accuracy_of(segment.trial.settled), self.settings.mesh
         for _ in range(_ATTEMPTS):
-            end, known = step.end, (self.state, self._end)
-            if not is_poor(self._accuracy, control) or self._ends_inside(step.segment):
+            end, known = segment.trial.settled, (self.state, self._end)
+            if not is_poor(accuracy, control) or self._ends_inside(segment):
                 break
             if unsettled(end, control.tolerance, self.primary):
                 break  # finer meshes are no help
-            other = finer(end.system, end.x, self._accuracy.error, control)
+            other = finer(end.system, end.x, accuracy.error, control)
             if other is None or not self._go_on(self._meshes.moved(self.state, self._here, other)):
                 break
-            again = self._step(self.state)
-            accuracy = accuracy_of(again.end)
-            if not accuracy.error < _HELPS * self._accuracy.error:
+            again, judged_again = self._steps.attempt(self.state, self._here(), step)
+            better = accuracy_of(again.trial.settled)
+            if not better.error < _HELPS * accuracy.error:
                 self.state, self._end = known
                 break
-            step, self._accuracy = again, accuracy
-        return step
+            segment, judgement, accuracy = again, judged_again, better
+        return segment, judgement
 
     def _moved_past(self, trial: Trial) -> str:
         """Return a clause if special points lie between a point and the same one with other mesh points; "" otherwise."""
@@ -370,7 +373,7 @@ class Continuation:
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
-                segment, judgement = self._steps.attempt(state, self._here(), step, made)
+                segment, judgement = self._attempt(step, made)
                 inspection = Inspection(segment, settings, self.start, self._steps.fold)
                 if not (state.singular or segment.is_moved or any(asks(inspection) for asks in self._watch)):
                     return Step(segment, judgement)

@@ -16,7 +16,6 @@ from contin.core.step import (
     following_step,
     is_astray,
     judged,
-    located,
     longest_step,
     predict,
 )
@@ -124,7 +123,7 @@ class Steps:
         for share in _ASIDE:
             try:
                 guess = state.x + share * step * state.tangent
-                aside = located(state, guess, share * step, self.settings.newton)
+                aside = corrected(state, guess, share * step, self.settings.newton)
                 if judged(state, guess, aside).turn <= aims(self.settings, state.system)[0]:
                     return share * step, aside
             except ConvergenceError as error:

@@ -7,7 +7,7 @@ import math
 import threading
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -88,13 +88,16 @@ class PeriodicCollocation(Collocation):
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
-        self._known: dict[bytes, tuple[ComplexArray, Mask, ComplexArray]] = {}
         self.order = problem.order
         self._turn: Array = problem.symmetry * self.scales.states / self.scales.states[:, None]
         values = dict(zip(problem.parameters, map(float, self.parameters)))
         check_windings(problem.angles, self.free, values)
         #: What angles have gained after 0, 1, ... of the parts that a symmetry divides the cycle into, shape (order + 1, n).
         self.gains: Array = _gains(gain(problem.angles, problem.state_names, values), problem.symmetry, self.order)
+
+    def _take_mesh(self, mesh: Array) -> None:
+        super()._take_mesh(mesh)
+        self._known: dict[bytes, tuple[ComplexArray, Mask, ComplexArray]] = {}
 
     @property
     def turn(self) -> Array:
@@ -430,13 +433,16 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
         parameters: Mapping[str, float], scales: Scales | None = None,
     ) -> None:  # fmt: skip
         super().__init__(problem, mesh, degree, free, parameters, scales)
+        self._set_reference(np.zeros((self.nodes.size, self._n)))
+
+    def _take_mesh(self, mesh: Array) -> None:
+        super()._take_mesh(mesh)
         self.equations = self._conditions + 1
         if PERIOD in self.free:
-            known = parameters.get(PERIOD, 1.0)
-            at = self.parameter_index(PERIOD)
-            self.weights[at] = _PERIOD_SHARE / (1 + known / self.free_scales[at - self.state_size]) ** 2
+            at = self.free.index(PERIOD)
+            known = self.parameters[self._free[at]] / self.free_scales[at]
+            self.weights[self.state_size + at] = _PERIOD_SHARE / (1 + known) ** 2
         self._drifted: set[bytes] = set()
-        self._set_reference(np.zeros((self.nodes.size, self._n)))
 
     def _set_reference(self, reference: Array) -> None:
         """Take the phase row from an orbit, states at the nodes."""
@@ -540,15 +546,16 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 
     def _with(self, **changes: Any) -> CycleCollocation:
         other: Any = super()._with(**changes)
-        same = np.array_equal(other.mesh, self.mesh)
-        other._set_reference(self.reference if same else self._between(self.reference, other.nodes))
+        other._set_reference(self.reference)
         found: CycleCollocation = other
         return found
 
-    def _between(self, states: Array, times: Array) -> Array:
-        """Return states at the nodes, in the user's units, carried to other times."""
-        x = np.concatenate([(states / self.scales.states).ravel(), np.zeros(len(self.free))])
-        return self.evaluate(x, times)
+    def on_mesh(self, mesh: Sequence[float] | Array) -> tuple[Self, Carrier]:
+        """Return the same on another mesh, with the same reference, and the carrier."""
+        other, carry = super().on_mesh(mesh)
+        known = np.concatenate([(self.reference / self.scales.states).ravel(), np.zeros(len(self.free))])
+        other._set_reference(other.states(carry(known)))
+        return other, carry
 
     def with_reference(self, x: Array) -> CycleCollocation:
         """Return the same with the orbit x as the reference.
@@ -565,22 +572,17 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 
     def _referring_to(self, states: Array) -> CycleCollocation:
         """Return the same on the same mesh, with a reference given by its states at the nodes."""
-        other = type(self).__new__(type(self))
-        vars(other).update(vars(self))  # copy.copy leaves out what was computed
+        other = self._copied()
         other._set_reference(states)
         return other
 
     def adapted(self, x: Array, control: MeshControl) -> tuple[Collocation, Carrier] | None:
         """Return the same on a better mesh for x and with x as the reference; None where there is no need."""
-        mesh = self._better_mesh(x, control)
-        if mesh is None:
-            states = self.states(x)
-            if np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():
-                return None
-            return self._referring_to(states), np.array
-        other = self._with(mesh=mesh)
-        other._set_reference(self._between(self.states(x), other.nodes))
-        return other, self.carrier(other)
+        mesh, states = self._better_mesh(x, control), self.states(x)
+        if mesh is None and np.abs(states - self.reference).max() <= _MOVED * np.abs(states).max():
+            return None
+        other = self._referring_to(states)
+        return (other, np.array) if mesh is None else other.on_mesh(mesh)
 
     # --- what the kind knows of its branches --------------------------------------------------------------------------
 

@@ -27,7 +27,8 @@ from contin.results.point import Point
 
 #: A state of an equilibrium that is smaller than this part of the largest, or than this, may be round-off, and has no size.
 _FAINT = 1e-6
-#: Intervals of the first mesh of a branch from a Hopf point.
+#: Intervals of the first mesh of a branch from a Hopf point, at least. A run that wants 40 would make its first step on 20 and,
+#: again, on 40: that takes a tenth of a branch of Lorenz's cycles.
 _INTERVALS = 20
 
 
@@ -36,10 +37,13 @@ def switches(point: Point) -> bool:
     return point.label == "HB" or doubles(point)
 
 
-def switched(point: Point, free: Sequence[str] | None = None) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
+def switched(
+    point: Point, fewest: int, free: Sequence[str] | None = None
+) -> tuple[PeriodicCollocation | MapSystem, Array, Array]:
     """Return the system of the cycles that begin at a point, the point in it, and the tangent there.
 
-    Free parameters are those of the point, or others: the new branch leaves along the states alone, whichever are free.
+    Free parameters are those of the point, or others: the new branch leaves along the states alone, whichever are free. The
+    first mesh from a Hopf point has the ``fewest`` intervals of a run, or more.
 
     Raises
     ------
@@ -48,7 +52,7 @@ def switched(point: Point, free: Sequence[str] | None = None) -> tuple[PeriodicC
     ConvergenceError
         The branch point of doubled orbits is not found.
     """
-    cycles, x, tangent = doubled(point) if doubles(point) else from_hopf(point)
+    cycles, x, tangent = doubled(point) if doubles(point) else from_hopf(point, max(fewest, _INTERVALS))
     if free is None:
         return cycles, x, tangent
     found, x = cycles.with_free(checks.names("free", free), x)
@@ -56,7 +60,7 @@ def switched(point: Point, free: Sequence[str] | None = None) -> tuple[PeriodicC
     return found, x, along  # type: ignore[return-value]  # with_free keeps the kind
 
 
-def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
+def from_hopf(point: Point, intervals: int) -> tuple[CycleCollocation, Array, Array]:
     """Return the system of the cycles that leave a Hopf point, the point as an orbit of no size, and the tangent there.
 
     The tangent is the ellipse of the critical eigenvector v, Re(v exp(2 pi i t)), with the period 2 pi over the frequency.
@@ -70,7 +74,7 @@ def from_hopf(point: Point) -> tuple[CycleCollocation, Array, Array]:
     if point.label != "HB" or system.intervals or system.on_curve:
         raise ProblemError(f"start: a point with the label {point.label!r} is no Hopf point of equilibria")
     pair = critical_pair(system.jacobian(point.x), frequency_of(point))
-    cycles, x, tangent = small_cycle(system, point.x, pair, 0.0)
+    cycles, x, tangent = small_cycle(system, point.x, pair, 0.0, intervals)
     scaled, x = _in_sizes_of_the_equilibrium(cycles, x)
     if scaled is not cycles:
         tangent = cycles.carrier(scaled)(tangent)
@@ -93,7 +97,9 @@ def _in_sizes_of_the_equilibrium(cycles: CycleCollocation, x: Array) -> tuple[Cy
     return scaled, x  # type: ignore[return-value]  # the same kind
 
 
-def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) -> tuple[CycleCollocation, Array, Array]:
+def small_cycle(
+    system: Algebraic, x: Array, pair: CriticalPair, size: float, intervals: int = _INTERVALS
+) -> tuple[CycleCollocation, Array, Array]:
     """Return the system of cycles beside a Hopf point x, the ellipse of this size as one, and the direction in which it grows.
 
     The free parameters are those of ``system`` and, after the first, the period.
@@ -101,7 +107,7 @@ def small_cycle(system: Algebraic, x: Array, pair: CriticalPair, size: float) ->
     first, *others = system.free
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(x))))
     parameters[PERIOD] = 2 * math.pi / pair.frequency
-    mesh = np.linspace(0, 1, _INTERVALS + 1)
+    mesh = np.linspace(0, 1, intervals + 1)
     cycles = CycleCollocation(CycleProblem.of(system.problem), mesh, CYCLE_DEGREE, (first, PERIOD, *others), parameters)
     wave = np.exp(2j * math.pi * cycles.nodes)[:, None]
     rest = cycles.pack(np.tile(system.states(x), (cycles.nodes.size, 1)), parameters)

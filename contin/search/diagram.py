@@ -213,7 +213,7 @@ class _Explorer:
             return
         junction.taken[1][1] = len(self.result.branches)
         try:
-            system, x, tangent = switched(junction.point)
+            system, x, tangent = switched(junction.point, self.settings.mesh.min_intervals)
             self._follow(self._run(system, x, self.settings, tangent), junction.depth + 1, junction)
         except ConvergenceError as error:
             junction.failed.append((1, 1, str(error)))

@@ -73,7 +73,7 @@ def trace(start: Point, settings: Settings | None = None, *, free: Sequence[str]
     if branch is not None:
         checks.whole("branch", branch, 0, 10)
     if branch == 1 and switches(start):
-        cycles, x, tangent = switched(start, free)
+        cycles, x, tangent = switched(start, settings.mesh.min_intervals, free)
         return follow_until_interrupted(Continuation(cycles, x, settings, settings.direction * tangent), shown)
     if branch == 1 and leaves_saddle_node(start):
         if free is not None:

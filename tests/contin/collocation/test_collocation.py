@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from contin import BoundaryValueProblem, Collocation, ProblemError, correct
+import contin
+from contin import AlgebraicProblem, BoundaryValueProblem, Collocation, ProblemError, correct
 
 
 @functools.cache
@@ -98,6 +99,33 @@ def test_carrying_to_another_mesh_is_exact_for_polynomials():
     other, carry = system.on_mesh([0, 0.013, 0.4, 0.41, 0.9, 1.0])
     expected = np.stack([other.nodes**4 - other.nodes, 2 * other.nodes**3], axis=1)
     assert np.allclose(other.states(carry(x)), expected, atol=1e-14)
+
+
+def test_nothing_that_was_computed_on_a_mesh_is_kept_on_another():
+    """All numbers of a system that was used, on another mesh, are those of one that was made there."""
+    rest = contin.solve(AlgebraicProblem(_unstable, ["x", "y"], {"a": -0.5}), [0.0, 0.0])
+    (hopf,) = contin.trace(rest, free=["a"], limits={"a": (-1, 1)}).labelled("HB")
+    used = contin.trace(hopf, branch=1, limits={"a": (-1, 0.2)}).points[-1]
+    mesh = np.linspace(0, 1, 13) ** 1.5
+    moved, carry = used.system.on_mesh(mesh)
+    x, values = carry(used.x), dict(zip(moved.problem.parameters, moved.parameters))
+    other = moved.with_reference(x)
+    made = type(other)(other.problem, mesh, other.degree, other.free, values, other.scales).with_reference(x)
+    row = (made.weights * x,)
+    (residual, factors), (expected, there) = (system.linearize(x, row) for system in (other, made))
+    assert np.array_equal(residual, expected) and np.array_equal(factors.solve(x), there.solve(x))
+    columns = dict.fromkeys(other.problem.functionals, 0.0)
+    assert other.discretization_error(x, factors, columns) == made.discretization_error(x, there, columns)
+    assert np.array_equal(other.eigenvalues(x), made.eigenvalues(x))
+    ends = [correct(system, x, row[0], row[0] @ x, linearize=True) for system in (other, made)]
+    assert np.array_equal(ends[0].x, ends[1].x) and np.array_equal(ends[0].tangent, ends[1].tangent)
+    for name, value in vars(made).items():
+        assert not isinstance(value, np.ndarray) or np.array_equal(value, getattr(other, name)), name
+
+
+def _unstable(u, p):
+    square = u.x**2 + u.y**2
+    return p.a * u.x - u.y - u.x * square, u.x + p.a * u.y - u.y * square
 
 
 def test_weights_are_those_of_the_mean_square():

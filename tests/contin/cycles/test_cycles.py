@@ -71,6 +71,14 @@ def test_cycles_in_another_parameter_than_that_of_the_hopf_point(free):
         assert point["max_x"] ** 2 == pytest.approx(0.5 + point["nu"], abs=1e-9)
 
 
+def test_cycles_begin_on_as_many_intervals_as_the_run_has():
+    """Bounds of the mesh hold from the first point of a branch on."""
+    start, limits = contin.solve(AlgebraicProblem(circle, ["x", "y"], {"mu": -0.5}), [0.0, 0.0]), {"mu": (-1, 0.5)}
+    (hopf,) = contin.trace(start, free=["mu"], limits=limits).labelled("HB")
+    branch = contin.trace(hopf, branch=1, limits=limits, mesh=MeshControl(min_intervals=30, max_intervals=30))
+    assert {point.system.intervals for point in branch} == {30}
+
+
 def test_a_fold_of_cycles():
     """r' = mu r + r**3 - r**5: both cycles meet at mu = -1/4, r**2 = 1/2; multiplier exp(2 pi r d(growth)/dr)."""
     problem = CycleProblem(bautin, ["x", "y"], {"mu": 1.0})
