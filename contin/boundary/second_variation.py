@@ -23,7 +23,7 @@ intervals are joined in the same way, as long as that holds. What is left is a s
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -33,8 +33,8 @@ from contin.arrays import Array
 from contin.collocation.basis import interpolation
 from contin.core.trial import TestFunction, Trial
 from contin.errors import ProblemError
-from contin.events.labelled import finding_of
-from contin.events.segment import Segment, SpecialPoint
+from contin.events.index import Stability, nullity_of
+from contin.events.segment import SpecialPoint
 from contin.linalg.orientation import canonical_basis
 
 if TYPE_CHECKING:
@@ -108,36 +108,6 @@ def _index(trial: Trial) -> float:
 
 #: The index of a state with an energy. One object, so that a trial computes it once.
 INDEX = TestFunction("", "index", _index)
-
-
-def contradiction(index: TestFunction | None, segment: Segment, special: Iterable[SpecialPoint]) -> str:
-    """Return how the index over a step contradicts its special points, as a clause; "" where it does not.
-
-    It changes at special points only, by no more than the dimension of what vanishes there. A larger change means that
-    something was passed in silence. The index knows nothing of how special points are found.
-    """
-    if index is None:
-        return ""
-    before, after = segment.before.value(index), segment.trial.value(index)
-    if not abs(after - before) > sum(map(nullity_of, special)):
-        return ""
-    return f"the {index.name} goes from {before:g} to {after:g}"
-
-
-@dataclass(frozen=True)
-class Stability:
-    """Index, nullity and broken symmetries of a point, as in `contin.Point`."""
-
-    index: int | None = None
-    nullity: int = 0
-    breaks: tuple[str, ...] = ()
-
-
-def nullity_of(point: SpecialPoint) -> int:
-    """Return the dimension of the kernel at a point: 1 at a fold, 1 or more at a branch point, else 0."""
-    if point.label not in ("LP", "BP", "CP") and not point.is_trivial:
-        return 0
-    return finding_of(point.details).nullity
 
 
 def stability_of(point: SpecialPoint) -> Stability:

@@ -20,6 +20,8 @@ from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 if TYPE_CHECKING:
     from contin.core.trial import TestFunction
+    from contin.events.index import Stability
+    from contin.events.segment import SpecialPoint
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,6 +114,10 @@ class BoundaryValueProblem(Restated):
     def usual_degree(self, tolerance: float) -> int:
         """Return the degree of a mesh where none is given."""
         return usual_degree(len(self.state_names), tolerance)
+
+    def stability(self, point: SpecialPoint) -> Stability:
+        """Return index, nullity and broken symmetries of a solution, of a statement with an energy."""
+        raise NotImplementedError("there is no energy")
 
     def degenerate(self, system: Collocation, x: Array) -> str:
         """Return why Newton's method may have failed at a guess x; see `Discretization.degenerate`."""

@@ -34,6 +34,8 @@ from contin.linalg.segments import run, share
 if TYPE_CHECKING:
     from contin.boundary.statement import BoundaryValueProblem
     from contin.core.trial import TestFunction
+    from contin.events.index import Stability
+    from contin.events.segment import SpecialPoint
 
 
 class Collocation(System):
@@ -639,6 +641,10 @@ class Collocation(System):
     def referring_to(self, x: Array, tangent: Array) -> Collocation:
         """Return the same with a solution as the reference, where the kind has one."""
         return self.with_reference(x)
+
+    def stability(self, point: SpecialPoint) -> Stability:
+        """Return what the statement says."""
+        return self.problem.stability(point)
 
     def degenerate(self, x: Array) -> str:
         """Return what the statement says."""

@@ -10,11 +10,13 @@ from typing import Any
 from contin import checks
 from contin.arrays import Array, Function
 from contin.boundary.canonical import Canonical, Variation, canonical
-from contin.boundary.second_variation import INDEX, degeneracy, dependent_conditions, legendre
+from contin.boundary.second_variation import INDEX, degeneracy, dependent_conditions, legendre, stability_of
 from contin.boundary.statement import BoundaryValueProblem
 from contin.boundary.system import Collocation
 from contin.core.trial import TestFunction
 from contin.errors import ProblemError
+from contin.events.index import Stability
+from contin.events.segment import SpecialPoint
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, argument_count
 from contin.problems.statement import check_statement
@@ -157,6 +159,10 @@ class VariationalProblem(BoundaryValueProblem):
     def events(self) -> list[TestFunction]:
         """Return that of Legendre's condition: where it fails, the energy is not convex in the controls."""
         return [legendre()]
+
+    def stability(self, point: SpecialPoint) -> Stability:
+        """Return what the second variation says of a solution."""
+        return stability_of(point)
 
     def degenerate(self, system: Collocation, x: Array) -> str:
         """Return what makes the equations singular at a guess x."""

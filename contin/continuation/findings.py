@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contin.boundary.second_variation import nullity_of
 from contin.continuation.notes import Notes, why_lost
 from contin.core.settings import Settings
 from contin.core.trial import TestFunction
+from contin.events.index import nullity_of
 from contin.events.refinement import refined
 from contin.events.segment import Segment, SpecialPoint
 from contin.events.test_functions import with_normal_form

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array
-from contin.boundary.second_variation import stability_of
 from contin.collocation import one_call
 from contin.collocation.defect import estimate, estimate_of
 from contin.continuation.plain import Quotient, Rooms, plain_steps
@@ -51,7 +50,6 @@ from contin.continuation.rules import (
     Path,
     Watch,
 )
-from contin.continuation.spectra import spectra_of
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings
 from contin.core.small import equations_of, linear_of
@@ -61,6 +59,7 @@ from contin.core.trial import Linearization, TestFunction, Trial
 from contin.errors import ConvergenceError
 from contin.events.inspection import Start, is_elsewhere
 from contin.events.segment import SpecialPoint
+from contin.events.spectra import spectra_of
 from contin.events.trivial import crossed, jumped
 from contin.linalg.condensation import Factorization
 from contin.linalg.ends import Relations
@@ -190,7 +189,7 @@ class Lane(ABC):
         passed = next((number for number, (ends, told) in enumerate(steps) if self._asks(*ends, *told)), made)
         if self._index is None:
             return passed, None
-        return passed, [stability_of(SpecialPoint(0.0, "", "", trial)).index for trial in trials[1 : passed + 1]]
+        return passed, [trial.system.stability(SpecialPoint(0.0, "", "", trial)).index for trial in trials[1 : passed + 1]]
 
     def _asks(self, before: Trial, trial: Trial, step: float, closes: float) -> bool:
         """Return whether a step asks for a closer look by what the kernel does not know, be it that this is not found."""

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from contin.boundary.second_variation import contradiction
 from contin.collocation.switching import Switching
 from contin.core.trial import TestFunction, Trial
+from contin.events.index import contradiction
 from contin.events.labelled import finding_of
 from contin.events.phase_loads import phase_loads
 from contin.events.refinement import BENT

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from contin.continuation import rules
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
-from contin.continuation.spectra import FIRST, LAST, Spectra, fill_cubic, fill_spectrum, may_double_or_twist, may_pass_axis
 from contin.core.scales import USUAL
 from contin.core.small import (
     BELIEVED,
@@ -27,6 +26,7 @@ from contin.core.small import (
 )
 from contin.events.crossings import CALM, NEAR_ONE
 from contin.events.segment import LEAST_COSINE
+from contin.events.spectra import FIRST, LAST, Spectra, fill_cubic, fill_spectrum, may_double_or_twist, may_pass_axis
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, helper
 from contin.linalg.ends import is_near_one

@@ -11,18 +11,18 @@ from typing import NamedTuple
 
 from contin.arrays import Array
 from contin.collocation import one_call
+from contin.collocation.monodromy import KNOWN, Monodromy, fill_multipliers, nearest_to_one
 from contin.collocation.workspace import Workspace
 from contin.continuation import rules
 from contin.continuation.plain import Quotient, calm
 from contin.continuation.rules import Attempt, Control, Frame, Path, Watch
-from contin.continuation.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
 from contin.core.newton import STAGNANT
 from contin.core.rounding import NEAR_CIRCLE
 from contin.core.small import ASKS, BELIEVED, FAILED
-from contin.cycles.floquet import AS_FAR
-from contin.cycles.hopf_end import COLLAPSED
-from contin.cycles.monodromy import KNOWN, Monodromy, fill_multipliers, nearest_to_one
+from contin.core.step import COLLAPSED
 from contin.events.crossings import PIVOT, TURN
+from contin.events.nearness import AS_FAR
+from contin.events.spectra import FIRST, LAST, Spectra, keep_off_one, may_cross_between
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
 from contin.linalg.condensation import Factored

@@ -19,7 +19,6 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.arrays import Array
-from contin.boundary.second_variation import Stability, contradiction, stability_of
 from contin.continuation.failure import met, no_convergence, shorter_steps
 from contin.continuation.findings import IndexChange, index_changes, is_confirmed, located_again
 from contin.continuation.first import begins_outside, corrected_first, on_branch
@@ -36,6 +35,7 @@ from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.accuracy import Accuracy, accuracy_of, at_branch_point
 from contin.events.extrema import extremum
+from contin.events.index import Stability, contradiction
 from contin.events.inspection import Inspection, Start
 from contin.events.segment import Segment, SpecialPoint, with_details
 from contin.events.test_functions import (
@@ -409,7 +409,7 @@ class Continuation:
             accuracy = self._accuracy
         stability = Stability()
         if self._index is not None:
-            stability = stability_of(found)
+            stability = system.stability(found)
         if found.label:
             self._notes.phases(found, accuracy.error)
         return Point(

@@ -258,6 +258,10 @@ class Discretization(Equations, Protocol):
         """The test function whose value is the index of a point, of a problem with an energy."""
         return None
 
+    def stability(self, point: SpecialPoint) -> Any:
+        """Return the `Stability` of a point of a kind with an index; at a special one, what vanishes there does not count."""
+        return None
+
     @property
     def size_of_solutions(self) -> TestFunction | None:
         """The test function of the size of a solution, with a sign, where solutions can shrink onto others."""

@@ -25,6 +25,9 @@ from contin.functions.kernel_parts import ReadOnlyVector, Vector, helper
 from contin.linalg.dense import DenseFactors
 from contin.linalg.factors import Factors
 
+#: Smallest size of a cycle as a part of that before the step. A branch that ends at a Hopf point is this near to it at the end
+#: of a step by chance only, and the step is halved then; Newton's method that falls onto an equilibrium is nearer by far.
+COLLAPSED = 1e-3
 #: Share of the states in a unit tangent below which their direction is not compared: the states hardly take part in the step.
 _STILL = 0.01
 #: A step ends at this many times the distance to a limit, along the tangent, at most: beyond it, and not much. Ten times

@@ -24,10 +24,10 @@ from contin.core.protocol import Discretization
 from contin.core.rounding import changes_of_multipliers
 from contin.core.state import Reason, Stop
 from contin.core.trial import TestFunction, Trial, sign_changed
-from contin.cycles.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
 from contin.errors import ConvergenceError
 from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import frequency_of
+from contin.events.nearness import AS_FAR, CIRCLE, DEEPER, LOOKS, MINUS_ONE, ONE, comes_near
 from contin.events.segment import Place, Segment, SpecialPoint
 from contin.events.significance import on_finer_mesh
 
@@ -35,21 +35,12 @@ if TYPE_CHECKING:
     from contin.cycles.maps import MapSystem
     from contin.cycles.system import PeriodicCollocation
 
-#: Where a step is looked at inside, on the cubic, as parts of it: also beside its ends, where a dip towards zero would show at
-#: no other place. Without those two of Mathieu's doublings, a part of .03 and .04 behind the beginning of a step, are passed.
-LOOKS = (1 / 64, 1 / 4, 1 / 2, 3 / 4, 63 / 64)
-#: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
-#: to this part. Ten times smaller, two period doublings that nearly meet are passed.
-DEEPER = 0.5
 #: A logarithm below this may be that of a double multiplier 1: it is up to 6e-6 in the restricted three-body problem. Ten times
 #: larger, period doublings beside folds lose their coefficients.
 _ONE = 1e-5
 #: A multiplier whose logarithm is smaller is not called unstable: in a conservative system the mesh moves the second multiplier
 #: 1 by up to 1e-10, where round-off moves it by 1e-13. Ten times larger, a cycle beside a fold may count as stable.
 _NEARLY_ONE = 1e-9
-#: A multiplier is told from 1 where its logarithm is larger than so many times that of the one that is 1. The two of a double
-#: one differ by 1e-7 of it. Ten times larger, a cycle beside a fold may count as stable.
-AS_FAR = 2.0
 #: Step along the tangent over which multipliers are compared: their errors need one digit. In a canard explosion they change by
 #: a tenth of their value where the step is a thousand times longer.
 _ASIDE = 1e-5

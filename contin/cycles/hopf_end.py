@@ -29,9 +29,6 @@ from contin.problems.own_names import PERIOD
 if TYPE_CHECKING:
     from contin.cycles.system import CycleCollocation
 
-#: Smallest size of a cycle as a part of that before the step. A branch that ends at a Hopf point is this near to it at the end
-#: of a step by chance only, and the step is halved then; Newton's method that falls onto an equilibrium is nearer by far.
-COLLAPSED = 1e-3
 #: Newton's updates of the equilibrium, and secants, at most: both converge from near by, in four to six.
 _UPDATES = 20
 #: Newton's method ends with an update below this, relative to 1 + the states, the secant method with such a step: a few units

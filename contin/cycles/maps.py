@@ -21,6 +21,7 @@ from contin.cycles.system import is_opposite, is_pair
 from contin.equilibria.system import Algebraic
 from contin.events.coefficient import Coefficient
 from contin.events.labelled import doubles
+from contin.events.nearness import NO_MULTIPLIER
 from contin.events.segment import SpecialPoint
 from contin.functions.batch import Batch
 from contin.linalg.periodic import log_eigenvalues
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 
 #: A fixed point of half of the rounds misses itself by less, relative to 1 + its states: the square root of round-off.
 _SHRUNK = 1e-7
-#: The logarithm of a multiplier is no smaller than that of this number: a superstable cycle has the multiplier zero.
-NO_MULTIPLIER = 1e-300
 #: Smallest number of unknown states for which the matrix is kept sparse: it has n + 1 entries a row. Dense factors of 200
 #: unknowns take as long as sparse ones.
 _MANY = 200

@@ -185,6 +185,11 @@ class Round:
         Number of equations, and of unknowns, of one copy.
     """
 
+    states: int
+    n: int
+    size: int
+    collocated: Collocated
+
     def __init__(self, system: PeriodicCollocation, x: Array, phased: bool, collocated: Collocated | None = None) -> None:
         self.system, self.phased, self._x = system, phased, x
         self.states, self.n = system.state_size, system.states_count

@@ -16,17 +16,18 @@ from contin.boundary.conditions import Conditioned
 from contin.boundary.system import Collocation
 from contin.collocation.extremes import extremes
 from contin.collocation.mesh import MeshControl
+from contin.collocation.monodromy import DRIFTED, Monodromy, fill_multipliers, monodromy_of
 from contin.core.protocol import Carrier
 from contin.core.rounding import on_circle
 from contin.core.scales import Scales
 from contin.core.state import Reason, Stop
+from contin.core.step import COLLAPSED
 from contin.core.trial import TestFunction, Trial
 from contin.cycles.curves import DoublingCurve, TorusCurve
 from contin.cycles.floquet import critical_angle, doubled, doubling, keep_off_one, torus, unstable
 from contin.cycles.folds import events_on_folds
 from contin.cycles.homoclinic import explained, homoclinic
-from contin.cycles.hopf_end import AMPLITUDE, COLLAPSED, hopf_point_inside, shrunk
-from contin.cycles.monodromy import DRIFTED, Monodromy, fill_multipliers, monodromy_of
+from contin.cycles.hopf_end import AMPLITUDE, hopf_point_inside, shrunk
 from contin.cycles.normal_forms import at_special_point
 from contin.cycles.phase import cycle_in_phase, forced_cycle_in_phase, lasting
 from contin.errors import ProblemError

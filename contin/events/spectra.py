@@ -14,9 +14,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.rounding import NEAR_AXIS, NEAR_CIRCLE
 from contin.core.small import Equations, evaluate_slopes
-from contin.cycles.floquet import DEEPER, LOOKS
-from contin.cycles.maps import NO_MULTIPLIER
-from contin.cycles.nearness import CIRCLE, MINUS_ONE, ONE, comes_near
+from contin.events.nearness import CIRCLE, DEEPER, LOOKS, MINUS_ONE, NO_MULTIPLIER, ONE, comes_near
 from contin.functions.kernel_parts import Matrix, Stack, Vector, helper
 from contin.linalg.spectrum import fill_eigenvalues
 

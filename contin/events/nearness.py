@@ -15,6 +15,17 @@ _NEAR = 3.0
 #: It is looked at inside, too, where a logarithm is nearer than so many times its change over the step.
 _CHANGES = 3.0
 
+#: Where a step is looked at inside, on the cubic, as parts of it: also beside its ends, where a dip towards zero would show at
+#: no other place. Without those two of Mathieu's doublings, a part of .03 and .04 behind the beginning of a step, are passed.
+LOOKS = (1 / 64, 1 / 4, 1 / 2, 3 / 4, 63 / 64)
+#: A dip is followed where a parabola goes below this part of the values around it, and as long as each place lowers the value
+#: to this part. Ten times smaller, two period doublings that nearly meet are passed.
+DEEPER = 0.5
+#: The logarithm of a multiplier is no smaller than that of this number: a superstable cycle has the multiplier zero.
+NO_MULTIPLIER = 1e-300
+#: A multiplier is told from 1 where its logarithm is larger than so many times that of the one that is 1. The two of a double
+#: one differ by 1e-7 of it. Ten times larger, a cycle beside a fold may count as stable.
+AS_FAR = 2.0
 #: What multipliers pass.
 ONE, MINUS_ONE, CIRCLE = range(3)
 
