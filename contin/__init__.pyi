@@ -6,7 +6,8 @@ from .boundary.variational import VariationalProblem
 from .collocation.basis import basis, interpolation
 from .collocation.mesh import MeshControl
 from .connections.statement import ConnectionProblem
-from .continuation.run import Continuation, follow
+from .continuation.progress import follow
+from .continuation.run import Continuation
 from .core.newton import Newton, correct
 from .core.settings import Settings
 from .core.state import Reason, State, Stop

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from contin.continuation.notes import Notes
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.state import Reason, State, Stop
@@ -16,6 +17,8 @@ from contin.core.trial import TestFunction, Trial
 from contin.errors import ConvergenceError
 from contin.names import exact_text
 
+#: A run whose primary parameter has stood still for so many steps says so, and is asked whether it should go on.
+_STANDING = 6
 #: Shorter steps that are tried, as parts of ``min_step``: the largest that goes on is told.
 _SHORTER = (1e-2, 1e-4)
 #: Looser tolerances that are tried, as multiples of the one that failed: the smallest that goes on is told.
@@ -175,3 +178,16 @@ def _next(state: State, step: float, settings: Settings) -> Trial | None:
         return None
     finite = np.isfinite(trial.system.residual(trial.x)).all() and np.isfinite(inner(state.system, trial.x, trial.x))
     return trial if finite and judged(state, guess, trial).turn <= aims(settings, state.system)[0] else None
+
+
+def ended(trial: Trial, state: State, settings: Settings, primary: str, notes: Notes) -> Stop | None:
+    """Return why a run ends after a step: it has as many points as it may have, or its primary parameter stands still."""
+    if state.accepted >= settings.max_points:
+        return Stop(Reason.MAX_POINTS, f"max_points = {settings.max_points} reached", "raise it to go on")
+    if not settings.folds or state.accepted != _STANDING or state.sense:
+        return None
+    stop = trial.system.standstill(trial, primary)
+    if stop is None and not trial.system.intervals:
+        place = f"{primary} stays at {trial[primary]:.10g}, as far as can be told"
+        notes.add(f"{place}: a vertical family, as of a linear or conservative system; folds are not told there")
+    return stop

@@ -11,10 +11,11 @@ import numpy as np
 from contin.continuation.notes import Notes, why_lost
 from contin.core.settings import Settings
 from contin.core.trial import TestFunction
-from contin.events.index import nullity_of
+from contin.events.index import Stability, nullity_of
 from contin.events.refinement import refined
 from contin.events.segment import Segment, SpecialPoint
 from contin.events.test_functions import with_normal_form
+from contin.results.point import Point
 
 #: Labels of points that must not be missed on a finer mesh. Others (of codimension two, user zeros) keep theirs with ± NaN.
 _CONFIRMED = ("LP", "BP", "HB", "PD", "TR")
@@ -79,3 +80,18 @@ def index_changes(
             name = f"{group[0].label} {group[0].full_name}".strip()
             notes.add(f"the index goes from {before:g} to {after:g} at {name} ({notes.place(group[0].trial)})")
     return changes
+
+
+def told(
+    found: SpecialPoint, arclength: float, index: TestFunction | None, change: IndexChange | None, mesh_error: float
+) -> Point:
+    """Return what is told of a special point, or of a regular one: the point of a branch."""
+    trial, system = found.trial, found.trial.system
+    parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))
+    stability = Stability() if index is None else system.stability(found)
+    return Point(
+        found.label, found.full_name, parameters, trial.functionals, trial.x, trial.tangent, system, arclength,
+        trial.iterations, trial.newton_error, found.errors or {}, found.details,
+        stability.index, stability.nullity, change, stability.breaks,
+        *(("", None) if found.test is None else (found.test.column, found.test.value)), mesh_error,
+    )  # fmt: skip

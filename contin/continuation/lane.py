@@ -322,6 +322,29 @@ class MeshLane(Lane):
         self._handed = step, Trial(self.system, path.x[number].copy(), linear, int(iterations), error)
 
 
+class Lanes:
+    """The lane of a run, made anew where what it depends on has changed.
+
+    Parameters
+    ----------
+    start, tests, own
+        As in `lane_of`.
+    """
+
+    def __init__(self, start: Start, tests: Sequence[TestFunction], own: Sequence[TestFunction]) -> None:
+        self._run = start, tests, own
+        self._for: object = None
+        self._known: Lane | None = None
+
+    def of(self, system: Discretization, settings: Settings, noisy: bool) -> Lane | None:
+        """Return the lane of a system with these settings; None where there is none."""
+        if self._for != (system, settings, noisy):
+            self._for = system, settings, noisy
+            if self._known is None or not self._known.serves(system, settings, noisy):
+                self._known = lane_of(system, settings, *self._run, noisy)
+        return self._known
+
+
 class Block:
     """Plain steps that one call has made.
 

@@ -6,22 +6,30 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 
 from contin.arrays import Array
 from contin.collocation.mesh import MeshControl
+from contin.continuation.notes import unsettled
 from contin.continuation.scaling import outgrown
 from contin.continuation.steps import Steps
 from contin.core.newton import correct
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.state import State
-from contin.core.step import trial_of
+from contin.core.step import Judgement, trial_of
 from contin.core.trial import TestFunction, Trial
 from contin.errors import ConvergenceError
 from contin.events.accuracy import Accuracy, accuracy_of
+from contin.events.segment import Segment
 from contin.events.trivial import jumped
 
+#: A finer mesh stays if it makes the error smaller than this part of it. Where it does not, as at round-off or at a jump of the
+#: equations inside an interval, meshes would grow without end.
+_HELPS = 0.5
+#: Times that a step is made on finer and finer meshes.
+_ATTEMPTS = 4
 #: Part of the tolerance that a finer mesh aims at. Ten times larger, the points after it exceed the tolerance again, and more
 #: steps are made twice on the bank of reference problems. Ten times smaller takes 18 % more intervals of degree 7.
 _MARGIN = 0.1
@@ -64,6 +72,21 @@ def _intervals_for(system: Discretization, error: float, control: MeshControl) -
 def _with_fewest(control: MeshControl, count: int) -> MeshControl:
     """Return the same with another least number of intervals."""
     return dataclasses.replace(control, min_intervals=count)
+
+
+class Place(Protocol):
+    """Where a run is: what a step begins from, which may move to another mesh."""
+
+    state: State
+
+    def here(self) -> Trial:
+        """Return the state's point."""
+
+    def go_on(self, moved: Moved | None) -> bool:
+        """Let the run go on from a state on another mesh, if there is one."""
+
+    def ends_inside(self, segment: Segment) -> bool:
+        """Return whether the run ends inside a step, at a place whose end is not accepted."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,6 +152,38 @@ class MeshPolicy:
         return dataclasses.replace(
             state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
         ), end
+
+    def good_step(self, run: Place, step: float, made: Trial | None) -> tuple[Segment, Judgement]:
+        """Make a step of a given length whose end has an error within the tolerance of the mesh, as far as finer ones help.
+
+        The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point, before
+        it is looked at closely: that takes longer than to make it. ``made`` is its end, where a kernel has it.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        control = self.steps.settings.mesh
+        segment, judgement = self.steps.attempt(run.state, run.here(), step, made)
+        accuracy = accuracy_of(segment.trial.settled)
+        for _ in range(_ATTEMPTS):
+            end, known = segment.trial.settled, (run.state, run.here())
+            if (
+                not is_poor(accuracy, control)
+                or run.ends_inside(segment)
+                or unsettled(end, control.tolerance, self.steps.primary)
+            ):
+                break
+            other = finer(end.system, end.x, accuracy.error, control)
+            if other is None or not run.go_on(self.moved(run.state, run.here, other)):
+                break
+            again, judged_again = self.steps.attempt(run.state, run.here(), step)
+            better = accuracy_of(again.trial.settled)
+            if not better.error < _HELPS * accuracy.error:
+                run.go_on(known)
+                break
+            segment, judgement, accuracy = again, judged_again, better
+        return segment, judgement
 
     def _fewest_intervals(self, state: State) -> int:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.

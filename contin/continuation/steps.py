@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from contin.arrays import Array
 from contin.core.settings import Settings
@@ -21,13 +23,40 @@ from contin.core.step import (
 )
 from contin.core.trial import TestFunction, Trial
 from contin.errors import ConvergenceError
-from contin.events.segment import Place, Segment
+from contin.events.segment import Place, Segment, SpecialPoint
 from contin.events.significance import STANDS, free_values, sense
 from contin.events.trivial import crossed, jumped
 
 #: Beside a branch point, special points are looked for from this fraction of the first step on: closer, tangents are blurred.
 #: The next one is taken where the equations are still too nearly singular for Newton's method.
 _ASIDE = (0.01, 0.1, 0.5)
+
+
+class Step(NamedTuple):
+    """A step that was made.
+
+    Attributes
+    ----------
+    segment : Segment
+    judgement : Judgement
+    special : sequence of SpecialPoint
+        Inside it, in order.
+    turns : bool
+        The primary parameter turns inside it.
+    doubt : str
+        What is left of it where the step cannot be halved any more.
+    """
+
+    segment: Segment
+    judgement: Judgement
+    special: Sequence[SpecialPoint] = ()
+    turns: bool = False
+    doubt: str = ""
+
+    @property
+    def end(self) -> Trial:
+        """The end of the segment on a mesh with points where conditions that the solution decides switch."""
+        return self.segment.trial.settled
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from contin import checks
 from contin.arrays import Array
 from contin.boundary.statement import BoundaryValueProblem
 from contin.collocation.basis import basis, interpolation
-from contin.continuation.run import Continuation, follow
+from contin.continuation.progress import follow
+from contin.continuation.run import Continuation
 from contin.core.settings import Settings
 from contin.core.system import System
 from contin.cycles.statement import CycleProblem

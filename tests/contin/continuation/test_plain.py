@@ -15,7 +15,7 @@ from contin import (
     Settings,
     TestFunction,
 )
-from contin.continuation import run as runs
+from contin.continuation import lane as runs
 from contin.cycles.maps import MapSystem
 
 
