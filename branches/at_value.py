@@ -15,7 +15,8 @@ from branches.files import StoreError
 from branches.interpolation import uncertainty
 from branches.read import read_branch
 from branches.read_closed import StoredBranch
-from contin import Collocation, ContinError, Continuation, Settings, correct
+from contin import ContinError, Settings
+from contin.lowlevel import Collocation, Continuation, correct
 from ribbon_model import exact
 from ribbon_model.shape import interpolated
 

@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from branches.fields import Interval, MeshConfig, StepConfig, Strict, show
 from branches.units import STRIP_UNITS, quantity
-from contin import exact_text
+from contin.lowlevel import exact_text
 from ribbon_model.laws import FINITE_WIDTH, LAWS, RIBBON, label
 
 

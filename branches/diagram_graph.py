@@ -19,7 +19,7 @@ from branches.files import StoreError, write_bytes
 from branches.interpolation import places
 from branches.labels import SPECIAL, kind_of
 from branches.names import DIAGRAM, GRAPHML
-from contin import exact_text
+from contin.lowlevel import exact_text
 from ribbon_model.laws import from_label, label
 from ribbon_model.linear import circle, covering
 

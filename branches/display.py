@@ -222,7 +222,7 @@ def duration(seconds: float) -> str:
 
 def name_of(config) -> str:
     """The branch in words."""
-    from contin import exact_text  # not for --help
+    from contin.lowlevel import exact_text  # not for --help
 
     what = "secondary branch from " if config.origin else ""
     return f"{config.material}, {what}(m, n) = ({config.m}, {config.n}), nu = {exact_text(config.nu)}"

@@ -10,7 +10,7 @@ import numpy as np
 from branches import disentangle as layered
 from branches.diagram_graph import families, pieces, secondaries
 from branches.labels import END, FOLD, MARKS, SECONDARY
-from contin import exact_text
+from contin.lowlevel import exact_text
 
 STABLE, UNSTABLE = "#000000", "#8a8a8a"
 #: A colour for each wavenumber, of Okabe-Ito's and Tol's sets: told apart by the colour-blind.

@@ -9,7 +9,8 @@ import numpy as np
 
 from branches.advice import no_state
 from branches.config import Config
-from contin import Continuation, Point, Reason, Stop
+from contin import Point, Reason, Stop
+from contin.lowlevel import Continuation
 from ribbon_model import convexity
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import covering, thresholds

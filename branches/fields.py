@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from contin import exact_text
+from contin.lowlevel import exact_text
 
 
 class Strict(BaseModel):

@@ -14,7 +14,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from branches import interrupt
-from contin import temporary_name, write_whole
+from contin.lowlevel import temporary_name, write_whole
 
 #: Bytes of the smallest result; as many are written to test the disk before a computation.
 _SMALLEST = 64 * 1024

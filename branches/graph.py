@@ -14,7 +14,7 @@ from pathlib import Path
 
 from branches import diagram_graph as diagram
 from branches.files import StoreError
-from contin import exact_text
+from contin.lowlevel import exact_text
 
 
 def read(path: str | Path):

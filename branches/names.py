@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from contin import exact_text
+from contin.lowlevel import exact_text
 
 if TYPE_CHECKING:  # a question about a diagram needs no scenes, which take 0.1 s to import
     from branches.config import Config

@@ -15,7 +15,8 @@ import numpy as np
 
 from branches.open_branch import OpenBranch
 from branches.progress import Progress
-from contin import Collocation, ContinError, Point, exact_text
+from contin import ContinError, Point
+from contin.lowlevel import Collocation, exact_text
 from ribbon_model.barriers import KICK_OPEN, Barrier, apart, barriers, ways_down
 from ribbon_model.changed_ends import corrected
 from ribbon_model.descent import descend

@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from branches.fields import Interval, MeshConfig, StepConfig, Strict, show
 from branches.units import STRIP_UNITS, quantity
-from contin import exact_text
+from contin.lowlevel import exact_text
 from ribbon_model.ends import ANGLES, DIRECTIONS, HINGED, JOINT, PLACE, End, perpendicular, unit
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON
 from ribbon_model.material import Material

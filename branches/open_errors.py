@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from contin import BranchPoint, Collocation, ContinError, ConvergenceError, Point, correct, locate_branch_point, point_of
+from contin import ContinError, ConvergenceError, Point
+from contin.lowlevel import BranchPoint, Collocation, correct, locate_branch_point, point_of
 
 #: First step of the secant method for a fold, in the norm of the run; located points lie within 1e-6 of it. Ten times larger:
 #: one more step.

@@ -15,7 +15,7 @@ import numpy as np
 from branches.diagram_graph import OPEN_FORMAT
 from branches.labels import SPECIAL, label_of, without_round_off
 from branches.open_branch import OpenBranch
-from contin import exact_text
+from contin.lowlevel import exact_text
 
 #: Columns that say nothing of a state.
 _LEFT_OUT = (

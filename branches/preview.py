@@ -14,7 +14,7 @@ import numpy as np
 from branches import diagram_graph as diagram
 from branches.config import Config, DiagramConfig
 from branches.labels import kind_of
-from contin import exact_text
+from contin.lowlevel import exact_text
 from ribbon_model import exact
 
 SOURCE = "preview: exact quadrature"

@@ -11,7 +11,7 @@ from branches.config import Config, dump
 from branches.draw_strip import flat_across
 from branches.files import StoreError
 from branches.store import meaning_of
-from contin import exact_text
+from contin.lowlevel import exact_text
 from ribbon_model.domains import DOMAINS, LOOP
 from ribbon_model.laws import LAWS, label
 from ribbon_model.shape import Shape

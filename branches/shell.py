@@ -32,7 +32,7 @@ from branches.display import complain, survive_any_encoding, write_output
 from branches.executor import cores, run_jobs
 from branches.files import StoreError, only_run, prepare, write_bytes
 from branches.progress import Progress
-from contin import exact_text
+from contin.lowlevel import exact_text
 
 PROGRAM = "ccx"
 INSTALL = "CalculiX (the program ccx) is not installed; on Debian and Ubuntu: apt-get install calculix-ccx"

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from contin import ConvergenceError, TestFunction, correct
+from contin import ConvergenceError, TestFunction
+from contin.lowlevel import correct
 from ribbon_model.convexity import margin
 from ribbon_model.laws import Law
 from ribbon_model.modes import REVERSALS, Mode

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from branches.progress import Progress
-from contin import Settings, follow
+from contin import Settings
+from contin.lowlevel import follow
 from ribbon_model import convexity, linear, stability
 from ribbon_model.barriers import Barrier, barriers, covering_index, is_at, sides
 from ribbon_model.equilibrium import LENGTH

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from branches.open_config import OpenConfig
-from contin import exact_text
+from contin.lowlevel import exact_text
 
 #: Parts of a scene in which every number may be a list.
 _PARTS = ("material", "dimensions", "numbers", "closed")

@@ -11,9 +11,30 @@
 The tutorial is docs/contin.md; docs/architecture.md says which folder does what.
 """
 
+import importlib
+import warnings
+from typing import Any
+
 import lazy_loader
 
 #: Of both distributions that hold this package, see CONTRIBUTING.md.
 __version__ = "0.2.0"
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+#: Modules to which names have moved that were here in version 0.2; the names stay here for one version, with a warning.
+_MOVED = ("lowlevel", "auto07p")
+
+
+def __getattr__(name: str) -> Any:
+    """Return a public name, imported when it is first used."""
+    if name == "Monitor":  # the first name of the class
+        name = "TestFunction"
+    try:
+        return _public(name)
+    except AttributeError:
+        for module in _MOVED:
+            place = importlib.import_module(f"contin.{module}")
+            if name in place.__all__:
+                warnings.warn(f"contin.{name} is contin.{module}.{name} now", DeprecationWarning, stacklevel=2)
+                return getattr(place, name)
+        raise

@@ -16,7 +16,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contin import Collocation, Point, correct, point_of
+from contin import Point
+from contin.lowlevel import Collocation, correct, point_of
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, FREE, PLACE
 from ribbon_model.loads import FORCES, STROKE

@@ -11,7 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contin import Batch, TestFunction
+from contin import TestFunction
+from contin.lowlevel import Batch
 from ribbon_model.domains import StripProblem
 from ribbon_model.equilibrium import moment_with_force, moment_without_force
 from ribbon_model.laws import Law

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
-from contin import correct, eigenbasis
+from contin.lowlevel import correct, eigenbasis
 from ribbon_model import exact, second_variation
 from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH
@@ -205,7 +205,7 @@ def modes(strip: Strip, number: int = 8) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest eigenvalues of the Hessian of the energy on the closed strips, over the mean squared change of strain.
 
     A negative one is a direction in which an equilibrium is unstable; a shift of phase has one near zero. The signs of the
-    vectors, and the bases of equal eigenvalues (modes of a circle come in pairs), are those of `contin.eigenbasis`.
+    vectors, and the bases of equal eigenvalues (modes of a circle come in pairs), are those of `contin.lowlevel.eigenbasis`.
 
     Returns
     -------

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import BoundaryValueProblem, Collocation
+from contin import BoundaryValueProblem
+from contin.lowlevel import Collocation
 from ribbon_model.equilibrium import LENGTH, directors, with_force, without_force
 from ribbon_model.laws import Law
 from ribbon_model.shape import Shape

@@ -146,7 +146,8 @@ def energy(w1, w3, kappa_n, nu, Gamma):
 @functools.cache
 def _derivatives(function: Callable[..., float]):
     """Return U and its slopes, to be evaluated for many sections, and the columns of their derivatives."""
-    from contin import Batch, gradient  # loads compiled code, which circles do not need
+    from contin import gradient
+    from contin.lowlevel import Batch  # loads compiled code, which circles do not need
 
     def value(w1, w3, kappa_n, nu, plane, twist, stiff, C):
         return function(w1, w3, kappa_n, Section(nu, plane, twist, stiff, C))

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import Collocation, Settings, follow
+from contin import Settings
+from contin.lowlevel import Collocation, follow
 from ribbon_model.domains import HALF_LOOP_BETWEEN_AXES
 from ribbon_model.equilibrium import directors
 from ribbon_model.laws import Law

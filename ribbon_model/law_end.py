@@ -8,7 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from contin import Collocation, Continuation, TestFunction, Trial
+from contin import TestFunction
+from contin.lowlevel import Collocation, Continuation, Trial
 from ribbon_model.equilibrium import moment_on_directors, strains_of
 from ribbon_model.laws import FINITE_WIDTH, RIBBON
 from ribbon_model.material import Material

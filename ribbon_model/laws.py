@@ -206,7 +206,7 @@ class Law:
 @functools.cache
 def _response_at_points(law: Law):
     """Return the response of a law, to be evaluated at many points, and the columns of its derivatives by the moment."""
-    from contin import Batch
+    from contin.lowlevel import Batch
 
     response = law.response
     names = ("kappa_n", *law.parameters)
@@ -217,7 +217,8 @@ def _response_at_points(law: Law):
 @functools.cache
 def _energy_at_points(law: Law):
     """Return U and its slopes by the strains and kappa_n in the same manner."""
-    from contin import Batch, gradient
+    from contin import gradient
+    from contin.lowlevel import Batch
 
     if law.energy is None:
         raise ValueError(f"law {law.name!r} has no strain energy for descents")

@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from contin import Collocation
+from contin.lowlevel import Collocation
 from ribbon_model import ends
 from ribbon_model.ends import ANGLES, CLAMPED, HINGED, JOINT, PLACE
 from ribbon_model.loads import FORCES, STROKE

@@ -18,7 +18,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from contin import Collocation, ContinError, Continuation, Point, ProblemError, TestFunction, VariationalProblem, solve
+from contin import ContinError, Point, ProblemError, TestFunction, VariationalProblem, solve
+from contin.lowlevel import Collocation, Continuation
 from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
 from ribbon_model.equilibrium import CENTRELINE, FRAME, directors, moment_on_axes, spin, strains_of

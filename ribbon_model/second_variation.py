@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import basis, interpolation
+from contin.lowlevel import basis, interpolation
 from ribbon_model import linear
 from ribbon_model.domains import CELL, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, LOOP, Domain
 from ribbon_model.equilibrium import LENGTH

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from contin import locate_branch_point
+from contin.lowlevel import locate_branch_point
 from ribbon_model.domains import Domain
 from ribbon_model.solution import Solution
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contin import Collocation, locate_branch_point
+from contin.lowlevel import Collocation, locate_branch_point
 from ribbon_model.domains import CELL, HALF_LOOP
 from ribbon_model.laws import Law, TwoBendings
 from ribbon_model.linear import circle, thresholds

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import basis, interpolation
+from contin.lowlevel import basis, interpolation
 from ribbon_model.equilibrium import directors
 from ribbon_model.shown import Shown
 

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contin import basis
+from contin.lowlevel import basis
 from ribbon_model.second_variation import Equilibrium, Symmetry, coupling
 
 #: An eigenvalue below this is zero as far as equilibria are known: Newton's method leaves 1e-11, times a condition of 100. Ten

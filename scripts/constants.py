@@ -46,7 +46,7 @@ def bank() -> dict[str, int]:
 
     case = importlib.import_module("bank.case")
     count = {"runs": 0, "wrong": 0, "points": 0, "factorizations": 0}
-    for kind in (contin.Collocation, contin.Algebraic):
+    for kind in (contin.lowlevel.Collocation, contin.lowlevel.Algebraic):
         kind.linearize = _counted(kind.linearize, count)
     for path in sorted(folder.glob("*.py")):
         for known in getattr(importlib.import_module(f"bank.{path.stem}"), "CASES", ()):

@@ -55,7 +55,7 @@ def choose(graph, law, nu):
     """The law and nu to draw: those asked for, or the first that the diagram has; and a line that says so."""
     from branches.diagram_graph import families
     from branches.files import StoreError
-    from contin import exact_text
+    from contin.lowlevel import exact_text
 
     have = sorted({family[:2] for family in families(graph)}, key=lambda pair: (pair[0] != "ribbon", pair))
     found = [pair for pair in have if law in (None, pair[0]) and nu in (None, pair[1])]

@@ -37,9 +37,11 @@ def calls(scene: Path, folder: Path) -> Counter[CodeType]:
         with contextlib.redirect_stdout(io.StringIO()):
             sys.setprofile(count)
             try:
-                main([str(scene), "--out", str(folder / f"{number}.h5")])
+                code = main([str(scene), "--out", str(folder / f"{number}.h5")])
             finally:
                 sys.setprofile(None)
+        if code:
+            raise SystemExit(code)
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from branches.explore.packing import column, compressed
 from branches.files import StoreError
-from contin import StoredColumns, read_columns
+from contin.lowlevel import StoredColumns, read_columns
 
 #: The column of the size of the states, their root mean square over the nodes.
 NORM = "norm"

@@ -10,7 +10,8 @@ import numpy as np
 
 from branches.files import StoreError
 from branches.read import StoredBranch
-from contin import Collocation, ConvergenceError, Newton, correct
+from contin import ConvergenceError, Newton
+from contin.lowlevel import Collocation, correct
 from ribbon_model.solution import Solution
 
 #: Largest residual of a kept solution with the columns of its point, relative to 1 + the largest parameter. The largest of 311

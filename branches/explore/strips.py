@@ -19,7 +19,7 @@ from branches.explore.solutions import solutions
 from branches.files import StoreError
 from branches.labels import ON_PAGE, kind_of
 from branches.read import StoredBranch, read_branch
-from contin import exact_text
+from contin.lowlevel import exact_text
 from ribbon_model.domains import DOMAINS
 from ribbon_model.laws import LAWS, from_label, label
 from ribbon_model.linear import circle, covering, energy_interval, index

@@ -12,7 +12,8 @@ from branches.draw_diagram import colour_of
 from branches.paper.draw import STABLE, keep
 from branches.paper.page import Row, Section
 from branches.stability import LABEL, Watch
-from contin import Settings, curve, follow, locate_branch_point
+from contin import Settings, curve
+from contin.lowlevel import follow, locate_branch_point
 from ribbon_model import exact
 from ribbon_model.domains import HALF_LOOP
 from ribbon_model.laws import RIBBON

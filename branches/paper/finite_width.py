@@ -16,7 +16,8 @@ from branches.display import Display
 from branches.draw_diagram import CONJUGATE, NATURAL, colour_of, conjugate, legend
 from branches.paper.draw import keep
 from branches.paper.page import Row, Section
-from contin import Settings, curve, follow
+from contin import Settings, curve
+from contin.lowlevel import follow
 from ribbon_model import exact
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, label
 from ribbon_model.linear import thresholds

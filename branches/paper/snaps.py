@@ -101,7 +101,8 @@ def _past(limit: float, side: int) -> float:
 def _buckled(law: Law, m: int, n: int, label: str, at: int, side: int, seen: str = "") -> Start:
     """The state at a labelled point of a primary branch, with kappa_n moved on."""
     from branches.stability import Watch
-    from contin import Settings, follow
+    from contin import Settings
+    from contin.lowlevel import follow
     from ribbon_model.seeds import primary_branch
 
     system, x, tangent = primary_branch(law, m, n, NU, 8, 7)

@@ -106,7 +106,8 @@ def follow(
 
     Examples
     --------
-    >>> from contin import Algebraic, AlgebraicProblem, Settings
+    >>> from contin import AlgebraicProblem, Settings
+    >>> from contin.lowlevel import Algebraic
     >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
     >>> branch = follow(Algebraic(parabola, ["a"]), np.array([1.0, 1.0]), Settings(direction=-1, limits={"a": (-1, 4)}))
     >>> [point.label for point in branch if point.label]

@@ -72,7 +72,8 @@ class Continuation:
 
     Examples
     --------
-    >>> from contin import Algebraic, AlgebraicProblem
+    >>> from contin import AlgebraicProblem
+    >>> from contin.lowlevel import Algebraic
     >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
     >>> run = Continuation(Algebraic(parabola, ["a"]), np.array([1.0, 1.0]), Settings(direction=-1, limits={"a": (-1, 4)}))
     >>> print([point.label for point in run if point.label], run.stop)

@@ -135,7 +135,8 @@ def correct(
 
     Examples
     --------
-    >>> from contin import Algebraic, AlgebraicProblem
+    >>> from contin import AlgebraicProblem
+    >>> from contin.lowlevel import Algebraic
     >>> circle = AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1,), ["x"], {"a": 0.6})
     >>> print(round(correct(Algebraic(circle, []), [1.0]).x[0], 12))
     0.8

@@ -1,6 +1,6 @@
 """The protocol of a discretized problem: what corrector, detection and the continuation loop ask of it.
 
-`contin.Collocation` and `contin.Algebraic` follow it, and so do the extended systems of `contin.curve`.
+`contin.lowlevel.Collocation` and `contin.lowlevel.Algebraic` follow it, and so do the extended systems of `contin.curve`.
 """
 
 from __future__ import annotations

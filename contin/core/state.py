@@ -42,7 +42,8 @@ class State:
 
     Examples
     --------
-    >>> from contin import Algebraic, AlgebraicProblem, Continuation, Settings
+    >>> from contin import AlgebraicProblem, Settings
+    >>> from contin.lowlevel import Algebraic, Continuation
     >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
     >>> system, settings = Algebraic(parabola, ["a"]), Settings(direction=-1, limits={"a": (-1, 4)})
     >>> run = Continuation(system, np.array([1.0, 1.0]), settings)

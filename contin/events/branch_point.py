@@ -63,7 +63,8 @@ class BranchPoint(Finding):
 
     Examples
     --------
-    >>> from contin import Algebraic, AlgebraicProblem
+    >>> from contin import AlgebraicProblem
+    >>> from contin.lowlevel import Algebraic
     >>> transcritical = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0})
     >>> found = locate_branch_point(Algebraic(transcritical, ["a"]), np.array([0.1, 0.1]))
     >>> sorted(abs(round(float(tangent[0]), 6)) for tangent in found.tangents)  # x = 0 and x = a
@@ -112,7 +113,8 @@ class BranchPoint(Finding):
 
         Examples
         --------
-        >>> from contin import Algebraic, AlgebraicProblem
+        >>> from contin import AlgebraicProblem
+        >>> from contin.lowlevel import Algebraic
         >>> transcritical = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0})
         >>> system = Algebraic(transcritical, ["a"])
         >>> found = locate_branch_point(system, np.array([0.1, 0.1])).along(system, np.array([-1.0, -1.0]))
@@ -147,7 +149,8 @@ def locate_branch_point(
 
     Examples
     --------
-    >>> from contin import Algebraic, AlgebraicProblem
+    >>> from contin import AlgebraicProblem
+    >>> from contin.lowlevel import Algebraic
     >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2),), ["x"], {"a": 0.0})
     >>> found = locate_branch_point(Algebraic(pitchfork, ["a"]), np.array([0.1, 0.1]))
     >>> bool(np.all(np.abs(found.x) < 1e-8)), len(found.tangents)
@@ -171,7 +174,8 @@ def rounded_off(system: Discretization, point: BranchPoint, newton: Newton) -> A
 
     Examples
     --------
-    >>> from contin import Algebraic, AlgebraicProblem
+    >>> from contin import AlgebraicProblem
+    >>> from contin.lowlevel import Algebraic
     >>> pitchfork = AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x**2 - 1),), ["x"], {"a": 1.0})
     >>> system = Algebraic(pitchfork, ["a"])
     >>> found = locate_branch_point(system, np.array([0.1, 1.1]))

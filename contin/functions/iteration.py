@@ -197,7 +197,8 @@ def root(residual: Callable[..., Any], start: Sequence[Any]) -> tuple[Any, ...]:
     The rate w of w + w**3 = u, with its exact derivative 1/(1 + 3 w**2):
 
     >>> import numpy as np
-    >>> from contin import Batch, root
+    >>> from contin import root
+    >>> from contin.lowlevel import Batch
     >>> batch = Batch([lambda u, p: root(lambda w: (w[0] + w[0] ** 3 - u.u,), [0.0])[0]], [0], ["u"], [], times=False)
     >>> given = np.zeros(1), np.array([[10.0]]), np.empty((0, 1)), np.empty(0)
     >>> value, slope = batch.jacobian(*given, batch.columns([]))

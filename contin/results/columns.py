@@ -73,7 +73,8 @@ def read_columns(path: str | Path) -> StoredColumns:
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> from contin import AlgebraicProblem, read_columns, save, solve, trace
+    >>> from contin import AlgebraicProblem, save, solve, trace
+    >>> from contin.lowlevel import read_columns
     >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
     >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)})
     >>> with tempfile.TemporaryDirectory() as folder:

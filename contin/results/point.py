@@ -321,7 +321,8 @@ def point_of(system: Discretization, x: Array, iterations: int = 0, error: float
 
     Examples
     --------
-    >>> from contin import Algebraic, AlgebraicProblem
+    >>> from contin import AlgebraicProblem
+    >>> from contin.lowlevel import Algebraic
     >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
     >>> point_of(Algebraic(parabola, ["a"]), np.array([2.0, 4.0]))
     Point(a=4)

@@ -63,7 +63,8 @@ def from_auto(
 
     Examples
     --------
-    >>> from contin import AlgebraicProblem, AutoSolution, trace
+    >>> from contin import AlgebraicProblem, trace
+    >>> from contin.auto07p import AutoSolution
     >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
     >>> found = AutoSolution("LP", 2, {"a": 1e-7}, np.zeros(1), np.array([[1e-4]]), 1, 0)
     >>> fold = from_auto(parabola, found, free=["a"])

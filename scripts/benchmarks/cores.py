@@ -49,9 +49,9 @@ def _one(degree: int, repeats: int, exact_fold: float) -> dict:
     }  # fmt: skip
 
 
-def _circle(degree: int) -> tuple[contin.Collocation, np.ndarray]:
+def _circle(degree: int) -> tuple[contin.lowlevel.Collocation, np.ndarray]:
     """Return the half loop on a uniform mesh, and the circle as its unknowns."""
-    system = contin.Collocation(half_loop_in_full(), np.linspace(0, 1, INTERVALS + 1), degree, ["kappa_n"], {})
+    system = contin.lowlevel.Collocation(half_loop_in_full(), np.linspace(0, 1, INTERVALS + 1), degree, ["kappa_n"], {})
     states = np.array([circle_in_full(t) for t in system.nodes])
     return system, system.pack(states, {"kappa_n": 2.3, "nu": 0.3})
 
@@ -66,7 +66,7 @@ def _threads(count: int, function, *arguments) -> dict:
         os.environ.pop("CONTIN_THREADS") if before is None else os.environ.update(CONTIN_THREADS=before)
 
 
-def _stages(system: contin.Collocation, x: np.ndarray) -> dict:
+def _stages(system: contin.lowlevel.Collocation, x: np.ndarray) -> dict:
     """Return the times of all stages of one Newton iteration, and a hash of all that they give."""
     row, right = np.ones((1, system.size)), np.ones(system.size)
     times = [time.perf_counter()]

@@ -65,7 +65,7 @@ def _sweep(shapes, repeats) -> list[dict]:
 def _one(intervals, n, degree, repeats) -> dict:
     """Measure one Newton iteration (rhs, Jacobian, assembly, factorization, one solve) and the share of factorization."""
     problem = chain(n)
-    system = contin.Collocation(problem, np.linspace(0, 1, intervals + 1), degree, ["lam"], {})
+    system = contin.lowlevel.Collocation(problem, np.linspace(0, 1, intervals + 1), degree, ["lam"], {})
     x = np.full(system.size, 0.5)
     row = np.ones(system.size)
     right = np.ones(system.equations + 1)
@@ -146,7 +146,7 @@ def _reference(m, n, truth):
     )
     there = contin.TestFunction("UZ", "there", lambda trial: trial["kappa_n"] - truth.kappa_n)
     settings = contin.Settings(**{**vars(settings), "test_functions": (there,)})
-    for point in contin.Continuation(system, x, settings, tangent):
+    for point in contin.lowlevel.Continuation(system, x, settings, tangent):
         if point.label == "UZ" and abs(point["kappa_star"] - truth.kappa_star) < 1e-4 * (1 + abs(truth.kappa_star)):
             return point.system, point.x
     raise RuntimeError(f"({m}, {n}): contin did not come by kappa_n = {truth.kappa_n:g}, kappa* = {truth.kappa_star:g}")
@@ -157,7 +157,7 @@ def _kappa_star(reference, x, intervals, degree, adapted) -> float:
     names = dict(zip(reference.problem.parameters, reference.all_parameters(x)))
 
     def on(mesh):
-        return contin.Collocation(reference.problem, mesh, degree, reference.free, names)
+        return contin.lowlevel.Collocation(reference.problem, mesh, degree, reference.free, names)
 
     mesh = np.linspace(0, 1, intervals + 1)
     if adapted:
@@ -167,7 +167,7 @@ def _kappa_star(reference, x, intervals, degree, adapted) -> float:
     guess = reference.carrier(system)(x)
     row = np.zeros(system.size)
     row[system.parameter_index("kappa_n")] = 1.0
-    done = contin.correct(system, guess, row, row @ guess)
+    done = contin.lowlevel.correct(system, guess, row, row @ guess)
     return Trial.without_tangent(system, done.x)["kappa_star"]
 
 

@@ -58,7 +58,7 @@ def half_loop(intervals=40, degree=4, tolerance=1e-10, stop="BP") -> dict:
     bifurcation = circle.labelled("BP")[0]
     switched = time.perf_counter()
     settings = contin.Settings(branch_points=stop == "BP", **options)
-    run = contin.Continuation(bifurcation.system, bifurcation.x, settings, bifurcation.details.tangents[1])
+    run = contin.lowlevel.Continuation(bifurcation.system, bifurcation.x, settings, bifurcation.details.tangents[1])
     points = _until(run, stop)
     return {"seconds": time.perf_counter() - switched, "circle_seconds": switched - began, **_summary(points)}
 
@@ -80,7 +80,7 @@ def cell(intervals=8, degree=6, tolerance=1e-12, angle=0.35, accuracy=0.02, step
     began = time.perf_counter()
     system, x, tangent = primary_branch(RIBBON, m, n, 0.3, intervals, degree)
     switched = time.perf_counter()
-    points = _until(contin.Continuation(system, x, settings, tangent), stop)
+    points = _until(contin.lowlevel.Continuation(system, x, settings, tangent), stop)
     return {"seconds": time.perf_counter() - switched, "circle_seconds": switched - began, **_summary(points)}
 
 

@@ -59,7 +59,7 @@ def _killed_while_writing(scene: Scene, chance: random.Random) -> Run:
 
 def writers() -> tuple[str, ...]:
     from branches import files, store
-    from contin import write_whole
+    from contin.lowlevel import write_whole
 
     return files.__file__, store.__file__, write_whole.__code__.co_filename
 

@@ -177,7 +177,7 @@ def test_a_point_without_an_error_of_its_place_has_none_of_its_forces():
     config = parse("material: {law: flat rod, nu: 0.3}\nfinish: free\nstages: [{follow: force_width, to: 1}]\n", "s")
     point, strip = first_state(config), config.strip()
     system, x = point.system.with_free(("force_width", *strip.problem.multipliers), point.x)
-    lost = dataclasses.replace(contin.point_of(system, x), label="LP", errors={"force_width": math.nan})
+    lost = dataclasses.replace(contin.lowlevel.point_of(system, x), label="LP", errors={"force_width": math.nan})
     assert all(math.isnan(error) for error in errors_of(lost, strip.reactions).values())
 
 

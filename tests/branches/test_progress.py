@@ -13,7 +13,7 @@ from branches.diagram_graph import _circle, new_graph
 from branches.display import Display
 from branches.executor import WAIT
 from branches.progress import Progress, StartingDisplay
-from contin import exact_text
+from contin.lowlevel import exact_text
 
 TAPE = "--width .016 --thickness .00012 --length .6 --natural-radius .03 --poisson-ratio .3 --youngs-modulus 200e9"
 

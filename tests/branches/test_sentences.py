@@ -52,7 +52,7 @@ def test_a_failed_stage_of_a_law_with_an_end_is_told_so(tmp_path):
 def test_a_corner_is_not_blamed_on_equations_that_a_scene_does_not_have(monkeypatch):
     """The engine's sentence about abs is replaced; with no change that helps, none is advised."""
     problem = contin.AlgebraicProblem(lambda u, p: (u.x - abs(p.a),), ["x"], {"a": -1.0})
-    run = contin.Continuation(*_free(problem), contin.Settings(limits={"a": (-1, 1)}))
+    run = contin.lowlevel.Continuation(*_free(problem), contin.Settings(limits={"a": (-1, 1)}))
     list(run)
     monkeypatch.setattr(advice, "_goes_on", lambda *_: False)
     stop = advice.no_state(run, "a = 0")
@@ -68,7 +68,7 @@ def test_a_reason_of_another_kind_is_kept():
     """Where steps succeed from the last state, the run has met something else, and says what."""
     circle = contin.AlgebraicProblem(lambda u, p: (u.x**2 + p.a**2 - 1,), ["x"], {"a": 0.6})
     point = contin.solve(circle, [0.8])
-    run = contin.Continuation(*point.system.with_free(["a"], point.x), contin.Settings(max_points=5))
+    run = contin.lowlevel.Continuation(*point.system.with_free(["a"], point.x), contin.Settings(max_points=5))
     list(run)
     run.stop = contin.Stop("no convergence", "h changed its sign, but no zero of it was found on the branch")
     assert advice.no_state(run, "a = 1") is run.stop

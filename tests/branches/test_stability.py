@@ -8,7 +8,8 @@ from branches.display import Display
 from branches.job import run_branch
 from branches.read import read_branch
 from branches.stability import LABEL, Watch
-from contin import Settings, follow, locate_branch_point
+from contin import Settings
+from contin.lowlevel import follow, locate_branch_point
 from ribbon_model.domains import HALF_LOOPS
 from ribbon_model.laws import RIBBON
 from ribbon_model.secondary import secondary_branch

@@ -54,7 +54,9 @@ def test_every_public_name_has_an_example():
     assert without_an_example(contin, contin.__all__) == []
 
 
-@pytest.mark.parametrize("owner", [contin.Branch, contin.BranchPoint, contin.Diagram, contin.Point, contin.CycleProblem])
+@pytest.mark.parametrize(
+    "owner", [contin.Branch, contin.lowlevel.BranchPoint, contin.Diagram, contin.Point, contin.CycleProblem]
+)
 def test_every_method_that_users_call_has_an_example(owner):
     methods = [
         name for name, value in vars(owner).items() if name[0] != "_" and isinstance(value, (types.FunctionType, classmethod))

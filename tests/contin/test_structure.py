@@ -88,7 +88,7 @@ def test_jacobian_of_a_problem_in_groups_against_differences():
     assert [len(group) for group in coupled_groups(stated.batch("field").depends[:5, :5])] == [3, 1, 1]
     assert stated.batch("field").columns([0]).rows.size == 13  # of 36
     random = np.random.default_rng(1)
-    system = contin.Collocation(stated, np.array([0, 0.2, 0.5, 1.0]), 4, ["target", "load", "mean"], {})
+    system = contin.lowlevel.Collocation(stated, np.array([0, 0.2, 0.5, 1.0]), 4, ["target", "load", "mean"], {})
     x, direction, row = random.standard_normal((3, system.size))
     left = random.standard_normal(system.equations)
     _, factors = system.linearize(x, (row,))
@@ -108,7 +108,7 @@ def test_groups_change_nothing_but_round_off():
     x, b = None, None
     solutions = []
     for stated in (apart, together):
-        system = contin.Collocation(stated, np.linspace(0, 1, 6), 5, ["target", "load", "mean"], {})
+        system = contin.lowlevel.Collocation(stated, np.linspace(0, 1, 6), 5, ["target", "load", "mean"], {})
         x = random.standard_normal(system.size) if x is None else x
         b = random.standard_normal((5, system.size)) if b is None else b
         _, factors = system.linearize(x, (np.ones(system.size),))

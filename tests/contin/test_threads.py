@@ -94,7 +94,9 @@ def chain(n):
 def test_a_linearization_has_the_same_bits(n, intervals, degree, use):
     """With parameters, an integral condition, extra rows and columns, and more right-hand sides than are solved together."""
     random, known = np.random.default_rng(1), None
-    system = contin.Collocation(chain(n), np.sort([0, 1, *random.uniform(0, 1, intervals - 1)]), degree, ["a", "b"], {})
+    system = contin.lowlevel.Collocation(
+        chain(n), np.sort([0, 1, *random.uniform(0, 1, intervals - 1)]), degree, ["a", "b"], {}
+    )
     x = random.standard_normal(system.size)
     rows, columns = random.standard_normal((2, system.size + 1)), random.standard_normal((1, system.equations))
     b = random.standard_normal((6, system.size + 1))
@@ -178,7 +180,7 @@ def jacobian(batch, u, none, p):
 def test_a_forked_process_has_threads_of_its_own(use):
     use(3)
     problem = chain(3)
-    system = contin.Collocation(problem, np.linspace(0, 1, 31), 4, ["a", "b"], {})
+    system = contin.lowlevel.Collocation(problem, np.linspace(0, 1, 31), 4, ["a", "b"], {})
     x, b = np.full(system.size, 0.5), np.ones(system.equations + 1)
     row = np.ones(system.size)
     known = system.linearize(x, (row,))[1].solve(b)
@@ -197,7 +199,7 @@ import contin
 from contin.linalg import segments
 segments._LARGE = 0
 problem = contin.BoundaryValueProblem(lambda t, u, p: (u.v, -p.a * u.u), lambda a, b, p: (a.u, b.u - 1), ["u", "v"], {"a": 1.0})
-system = contin.Collocation(problem, np.linspace(0, 1, 2001), 4, [], {})
+system = contin.lowlevel.Collocation(problem, np.linspace(0, 1, 2001), 4, [], {})
 x = np.zeros(system.size)
 system.linearize(x)[1].solve(x)
 print("begins", flush=True)

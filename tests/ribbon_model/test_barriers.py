@@ -11,7 +11,8 @@ from ribbon_model.solution import Solution
 
 def test_a_saddle_lies_between_its_two_circles():
     """(1, 2) of the flat rod goes from one turn to three and is subcritical: its states separate the two."""
-    from contin import Settings, follow
+    from contin import Settings
+    from contin.lowlevel import follow
 
     system, x, tangent = primary_branch(FLAT_ROD, 1, 2, 0.3, 8, 7)
     settings = Settings(trivial="M2", limits={"kappa_n": (-10, 10)}, zeros={"kappa_n": [3.0]}, errors=False)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from contin import Settings, correct, follow, trace
+from contin import Settings, trace
+from contin.lowlevel import correct, follow
 from ribbon_model import exact
 from ribbon_model.domains import HALF_LOOP, LOOP
 from ribbon_model.equilibrium import directors, on_directors

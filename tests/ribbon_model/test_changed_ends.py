@@ -24,7 +24,7 @@ def continued(strip, point, follow):
     """The state with these ends, corrected; nothing is left to correct."""
     system, x = with_ends(strip, point, follow)
     assert np.abs(system.residual(x)).max() < 1e-8
-    return contin.point_of(system, contin.correct(system, x, *_held(system, x, follow)).x)
+    return contin.lowlevel.point_of(system, contin.lowlevel.correct(system, x, *_held(system, x, follow)).x)
 
 
 def _held(system, x, follow):

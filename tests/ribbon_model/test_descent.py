@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contin import Settings, follow
+from contin import Settings
+from contin.lowlevel import follow
 from ribbon_model import exact, second_variation
 from ribbon_model.descent import METRICS, descend, identify, modes, perturbed
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, ISOTROPIC_ROD, PAPER_LAWS, RIBBON

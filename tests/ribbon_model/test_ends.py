@@ -2,7 +2,8 @@
 
 import pytest
 
-from contin import MeshControl, Settings, follow
+from contin import MeshControl, Settings
+from contin.lowlevel import follow
 from ribbon_model import exact
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import thresholds

@@ -18,7 +18,7 @@ NU = 0.3
 def on_cells(law, m, n, limits, every):
     """Solutions on a primary branch, by the cell."""
     system, x, tangent = primary_branch(law, m, n, NU, 10, 7)
-    points = contin.follow(system, x, contin.Settings(trivial="M2", limits={"kappa_n": limits}), tangent).points[1:-1]
+    points = contin.lowlevel.follow(system, x, contin.Settings(trivial="M2", limits={"kappa_n": limits}), tangent).points[1:-1]
     return [Solution.of(point) for point in points if not point.label][::every]
 
 
@@ -43,15 +43,15 @@ def test_the_energy_alone_gives_states_and_index(law, domain):
         values = {"kappa_n": half.parameters["kappa_n"], "nu": NU}
         mesh = half.t[:: half.degree] * LENGTH / 2
         mesh[-1] = problem.domain[1]
-        system = contin.Collocation(problem, mesh, half.degree, problem.multipliers, values)
+        system = contin.lowlevel.Collocation(problem, mesh, half.degree, problem.multipliers, values)
         momenta = spun(half.states[:, :4], half.loads()[0])
         guess = system.pack(
             np.hstack([half.states, 2 * momenta, 0 * half.states[:, 4:]]), dict.fromkeys(problem.multipliers, 0.0)
         )
-        x = contin.correct(system, guess).x
+        x = contin.lowlevel.correct(system, guess).x
         assert np.abs(system.states(x)[:, :7] - half.states).max() < 1e-7
         (kept,) = [entry for entry in half.index().classes if entry.name == (0, "even")]
-        assert contin.point_of(system, x).second_variation().index() == kept.negative
+        assert contin.lowlevel.point_of(system, x).second_variation().index() == kept.negative
 
 
 @pytest.mark.full

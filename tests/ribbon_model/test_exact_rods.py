@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from contin import Settings, follow
+from contin import Settings
+from contin.lowlevel import follow
 from ribbon_model.exact import curve, end, folds, refine, solve
 from ribbon_model.laws import LAWS
 from ribbon_model.linear import thresholds

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import contin
-from contin import Settings, follow
+from contin import Settings
+from contin.lowlevel import follow
 from ribbon_model import convexity, exact_finite_width, finite_width
 from ribbon_model.domains import HALF_LOOP
 from ribbon_model.laws import FINITE_WIDTH, FLAT_ROD, RIBBON, TwoBendings, from_label, label
@@ -128,7 +129,7 @@ def test_the_response_carries_derivatives():
     """Exact derivatives through the search against central differences of the response, for all that it depends on."""
     random, h = np.random.default_rng(4), 1e-5
     names = ("M1", "M2", "M3", "kappa_n", "nu", "Gamma")
-    batch = contin.Batch([lambda u, p: FINITE_WIDTH.response(*u)], [5], names, (), times=False)
+    batch = contin.lowlevel.Batch([lambda u, p: FINITE_WIDTH.response(*u)], [5], names, (), times=False)
     assert batch.interpreted is None
     for Gamma in (0.3, 10.0, 300.0):
         w1, w3, kappa_n, d = moments(random, Gamma)

@@ -142,7 +142,7 @@ def test_a_run_that_fails_beside_the_end_of_the_law_is_said_to_end_there():
     strip = OpenStrip(tapered, finish=FREE_END, numbers={"force_normal": 0.0})
     system, x = strip.first_point().system.with_free(("force_normal",), strip.first_point().x)
     settings = contin.Settings(limits={"force_normal": (-1, 5)}, test_functions=strip.domain_tests())
-    run = contin.Continuation(system, x, settings)
+    run = contin.lowlevel.Continuation(system, x, settings)
     points = [point for point in run if not point.label]
     assert strip.explained(run).startswith("the end of the law 'ribbon'")
     states = points[-1].system.evaluate(points[-1].x, np.linspace(0, 1, 201))

@@ -119,7 +119,7 @@ def test_both_sides_of_the_saddle_between_two_arches():
     (start, *_) = straight.labelled("BP")
     mode = contin.trace(start, branch=1, zeros={"distance": [0.9]}, limits={"distance": (0.85, 1.1)})
     system, x = with_ends(strip, mode.labelled("UZ")[0], "distance")
-    saddle = contin.point_of(system, x)
+    saddle = contin.lowlevel.point_of(system, x)
     assert saddle.second_variation().index() == 1
     found = ways_down(lambda segments: cut(strip, saddle.system, saddle.x, segments), apart, KICK_OPEN)
     rests = [descend(cut(strip, arch.system, arch.x, len(found[0].strains))).end for arch in arches]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from contin import ConvergenceError, MeshControl, Newton, Settings, correct, follow
+from contin import ConvergenceError, MeshControl, Newton, Settings
+from contin.lowlevel import correct, follow
 from ribbon_model.domains import HALF_LOOPS, LOOP
 from ribbon_model.equilibrium import directors, on_directors
 from ribbon_model.laws import FLAT_ROD, RIBBON

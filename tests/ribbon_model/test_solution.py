@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from contin import Settings, follow
+from contin import Settings
+from contin.lowlevel import follow
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP, HALF_LOOP_BETWEEN_AXES, HALF_LOOPS, LOOP
 from ribbon_model.equilibrium import LENGTH
 from ribbon_model.laws import FLAT_ROD, ISOTROPIC_ROD, LAWS, Law

@@ -12,7 +12,8 @@ import pytest
 from conjugate_points import conjugate_index
 from scipy.optimize import brentq
 
-from contin import MeshControl, Settings, correct, follow, trace
+from contin import MeshControl, Settings, trace
+from contin.lowlevel import correct, follow
 from ribbon_model import linear
 from ribbon_model.domains import LOOP
 from ribbon_model.equilibrium import LENGTH

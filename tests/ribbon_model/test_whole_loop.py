@@ -16,12 +16,12 @@ FREE = ("kappa_n", "M1", "M2", "M3", "R1", "R2", "R3")
 
 @pytest.fixture(scope="module")
 def circle():
-    system = contin.Collocation(LOOP.problem(RIBBON), np.linspace(0, 1, 13), 7, FREE, {"nu": NU})
+    system = contin.lowlevel.Collocation(LOOP.problem(RIBBON), np.linspace(0, 1, 13), 7, FREE, {"nu": NU})
     values = {"kappa_n": 2.0, "M1": 1 - 2.0}
     half = np.pi * system.nodes
     zero = 0 * half
     states = [np.cos(half), np.sin(half), zero, zero, zero, np.cos(2 * half) - 1, np.sin(2 * half)]
-    start = contin.point_of(system, system.pack(np.array(states).T, dict.fromkeys(FREE, 0.0) | values))
+    start = contin.lowlevel.point_of(system, system.pack(np.array(states).T, dict.fromkeys(FREE, 0.0) | values))
     return contin.trace(start, free=FREE, limits={"kappa_n": (0, 3.15)})
 
 
@@ -44,7 +44,9 @@ def test_with_a_phase_the_branch_is_followed_from_there(circle):
     size = point.system.state_size
     parts = dict(zip(FREE, tangent[size:]))
     tangent = np.append(tangent[:size], [parts.get(name, 0.0) for name in LOOP.free])
-    run = contin.Continuation(system, x, contin.Settings(limits={"kappa_n": (0, 4.5), "kappa_star": (0.5, 2)}), tangent)
+    run = contin.lowlevel.Continuation(
+        system, x, contin.Settings(limits={"kappa_n": (0, 4.5), "kappa_star": (0.5, 2)}), tangent
+    )
     labels = {p.label: p["kappa_n"] for p in run}
     (fold,) = exact.folds(1, 2, NU)
     assert labels["LP"] == pytest.approx(fold.kappa_n, abs=1e-10)

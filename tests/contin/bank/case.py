@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from contin import Branch, Continuation, Point, Settings, Stop
+from contin import Branch, Point, Settings, Stop
+from contin.lowlevel import Continuation
 
 #: Wanted agreement with the reference, relative to max(1, |value|).
 TOLERANCE = 1e-9

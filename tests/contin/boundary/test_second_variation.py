@@ -212,7 +212,9 @@ def straight():
 @pytest.mark.parametrize("intervals", [4, 7, 11, 100, 333])
 def test_modes_are_eigenfunctions_on_every_mesh(intervals):
     """At load 9 pi^2: cos 3 pi t, the third mode, vanishes; two others are negative."""
-    system = contin.Collocation(PINNED, np.linspace(0, 1, intervals + 1), 4, ["load", "mu_offset"], {"load": 9 * math.pi**2})
+    system = contin.lowlevel.Collocation(
+        PINNED, np.linspace(0, 1, intervals + 1), 4, ["load", "mu_offset"], {"load": 9 * math.pi**2}
+    )
     x = system.pack(np.zeros((len(system.nodes), 2)), {"load": 9 * math.pi**2, "mu_offset": 0.0})
     found = second_variation(system, x)
     t = np.linspace(0, 1, 41)

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from contin import ProblemError, basis, interpolation
+from contin import ProblemError
+from contin.lowlevel import basis, interpolation
 
 each_degree = pytest.mark.parametrize("degree", range(2, 9))
 

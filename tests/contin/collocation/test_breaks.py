@@ -9,10 +9,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import contin
-from contin import Batch, BoundaryValueProblem, CycleProblem, VariationalProblem
+from contin import BoundaryValueProblem, CycleProblem, VariationalProblem
 from contin.collocation.basis import basis
 from contin.collocation.mesh import MeshControl, adapted_mesh, with_breaks
 from contin.errors import InterpretedWarning
+from contin.lowlevel import Batch
 
 CASES = {
     "jump": (lambda t: 3.0 if t < 0.4 else 1.0, [0.4]),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import contin
-from contin import AlgebraicProblem, BoundaryValueProblem, Collocation, ProblemError, correct
+from contin import AlgebraicProblem, BoundaryValueProblem, ProblemError
+from contin.lowlevel import Collocation, correct
 
 
 @functools.cache

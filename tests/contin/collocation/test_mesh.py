@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from bank.closed_forms import bratu
 
-from contin import BoundaryValueProblem, Collocation, MeshControl, Settings, basis, follow, solve
+from contin import BoundaryValueProblem, MeshControl, Settings, solve
 from contin.collocation.mesh import adapted_mesh, density
+from contin.lowlevel import Collocation, basis, follow
 
 DEGREES = range(2, 9)
 

@@ -101,7 +101,7 @@ def test_advice_for_a_step_that_is_too_long():
 def test_advice_for_a_mesh(monkeypatch):
     """Where the run goes on with the mesh halved only, the advice names the setting that allows that mesh."""
     start = contin.trace(contin.solve(bratu(), [0, 0]), free=["lam"], limits={"lam": (0.1, 3)}).points[0]
-    run = contin.Continuation(start.system, start.x)
+    run = contin.lowlevel.Continuation(start.system, start.x)
     count = run.state.system.intervals
     monkeypatch.setattr(failure, "_goes_on", lambda state, *_: state.system.intervals > count)
     for control, words in ((MeshControl(max_intervals=count), "max_intervals"), (MeshControl(), "min_intervals")):

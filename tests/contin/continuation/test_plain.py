@@ -7,16 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from contin import (
-    Algebraic,
-    AlgebraicProblem,
-    Continuation,
-    MapProblem,
-    Settings,
-    TestFunction,
-)
+from contin import AlgebraicProblem, MapProblem, Settings, TestFunction
 from contin.continuation import lane as runs
 from contin.cycles.maps import MapSystem
+from contin.lowlevel import Algebraic, Continuation
 
 
 def lorenz(u, p):

@@ -9,19 +9,8 @@ from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_load_of, brat
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from contin import (
-    AlgebraicProblem,
-    BoundaryValueProblem,
-    Collocation,
-    Continuation,
-    ConvergenceError,
-    ProblemError,
-    Settings,
-    TestFunction,
-    follow,
-    solve,
-    trace,
-)
+from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, ProblemError, Settings, TestFunction, solve, trace
+from contin.lowlevel import Collocation, Continuation, follow
 
 
 def bratu_start(intervals=10, degree=6):

@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from contin import Algebraic, AlgebraicProblem, ConvergenceError, Newton, correct
+from contin import AlgebraicProblem, ConvergenceError, Newton
+from contin.lowlevel import Algebraic, correct
 
 
 class Matrix:

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from contin import Algebraic, AlgebraicProblem, ConvergenceError, Newton
+from contin import AlgebraicProblem, ConvergenceError, Newton
 from contin.core.state import State, standing_at
 from contin.core.step import corrected, judged, located, predict
 from contin.core.trial import Linearization, Trial
+from contin.lowlevel import Algebraic
 
 
 def circle():

@@ -76,4 +76,4 @@ def test_points_that_are_singular_alone(size):
     fold = contin.AlgebraicProblem(lambda u, p: (size * (u.x**2 - p.mu), u.y - u.x), ["x", "y"], {"mu": 0.0})
     fork = contin.AlgebraicProblem(lambda u, p: (size * (p.mu * u.x - u.x**3), u.y - u.x), ["x", "y"], {"mu": 0.0})
     for problem in (fold, fork):
-        assert not dependence(contin.Algebraic(problem, []), np.zeros(2))
+        assert not dependence(contin.lowlevel.Algebraic(problem, []), np.zeros(2))

@@ -182,7 +182,7 @@ def test_the_column_is_shown_and_kept(tmp_path):
     errors = [point.discretization_error for point in branch]
     assert max(errors) > 1e-3
     contin.save(branch, tmp_path / "b.npz")
-    assert contin.read_columns(tmp_path / "b.npz").columns["discretization_error"].tolist() == errors
+    assert contin.lowlevel.read_columns(tmp_path / "b.npz").columns["discretization_error"].tolist() == errors
     assert [point.discretization_error for point in contin.load(LAYER, tmp_path / "b.npz")] == errors
     assert branch.to_pandas()["discretization_error"].tolist() == errors
     axes = branch.plot()

@@ -6,17 +6,8 @@ import numpy as np
 import pytest
 from bank.closed_forms import bratu, buckling_loads, elastica, parabola, pitchfork, two_elasticas
 
-from contin import (
-    Algebraic,
-    AlgebraicProblem,
-    BoundaryValueProblem,
-    Collocation,
-    ConvergenceError,
-    MultiplePoint,
-    locate_branch_point,
-    solve,
-    trace,
-)
+from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, solve, trace
+from contin.lowlevel import Algebraic, Collocation, MultiplePoint, locate_branch_point
 
 
 def test_branch_points_of_the_elastica():

@@ -5,13 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from contin import Algebraic, AlgebraicProblem, Newton, solve, trace
+from contin import AlgebraicProblem, Newton, solve, trace
 from contin.core.state import standing_at
 from contin.core.step import corrected, predict
 from contin.core.trial import linearization
 from contin.events.folds import FoldSearch
 from contin.events.segment import Segment
 from contin.events.test_functions import fold
+from contin.lowlevel import Algebraic
 
 
 def cubic(square):

@@ -79,7 +79,9 @@ def test_a_diagram_follows_one_branch_of_each_conjugacy_class(equal):
 
     symmetries = [rotated, twice, reflected, lambda t, u: rotated(t, reflected(t, u)), lambda t, u: twice(t, reflected(t, u))]
     result = contin.diagram(equal.points[0], limits={"lam": (0, 4), "mean": (-1, 4)}, depth=1, symmetries=symmetries)
-    (junction,) = [junction for junction in result.junctions if isinstance(junction.point.details, contin.MultiplePoint)]
+    (junction,) = [
+        junction for junction in result.junctions if isinstance(junction.point.details, contin.lowlevel.MultiplePoint)
+    ]
     assert all(set(taken) == {1, -1} for taken in junction.taken)
     assert len({number for taken in junction.taken[1:] for number in taken.values()}) == 2
 

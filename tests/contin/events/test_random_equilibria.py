@@ -63,7 +63,7 @@ def test_a_double_eigenvalue_is_a_double_point(seed, symmetric, nonlinear):
 def test_no_simple_branch_point_is_found_at_a_double_one(seed):
     """Borders for a kernel of two dimensions leave the matrix singular where it has three."""
     named = values([12.0, 14.0, 14.0], seed, symmetric=seed % 2 == 0, square=0.5)
-    system = contin.Algebraic(problem(3), ["lam"], named)
+    system = contin.lowlevel.Algebraic(problem(3), ["lam"], named)
     with pytest.raises(contin.ConvergenceError):
         locate_branch_point(system, np.array([0.0, 0.0, 0.0, 14.0]))
 
@@ -71,7 +71,7 @@ def test_no_simple_branch_point_is_found_at_a_double_one(seed):
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
 def test_simple_branch_points_close_by_are_found_as_such(gap):
     named = values([12.0, 14.0, 14.0 + gap], 1, symmetric=True, square=0.5)
-    found = locate_branch_point(contin.Algebraic(problem(3), ["lam"], named), np.array([0.0, 0.0, 0.0, 14.0]))
+    found = locate_branch_point(contin.lowlevel.Algebraic(problem(3), ["lam"], named), np.array([0.0, 0.0, 0.0, 14.0]))
     assert found.x[-1] == pytest.approx(14.0, abs=1e-9) and len(found.tangents) == 2
 
 

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from contin import Algebraic, AlgebraicProblem, Newton, locate_branch_point, solve, trace
+from contin import AlgebraicProblem, Newton, solve, trace
 from contin.core.trial import Trial
 from contin.events.trivial import crossed, jumped, round_off
+from contin.lowlevel import Algebraic, locate_branch_point
 
 
 def amplitude(values):

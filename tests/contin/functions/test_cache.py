@@ -203,7 +203,7 @@ def test_a_second_process_needs_no_compiler(tmp_path):
 #: Functions alone: where the engine is imported before, a second process compiles it as well, for each folder.
 PROBLEM = """
 import numpy as np
-from contin import Batch
+from contin.lowlevel import Batch
 batch = Batch([lambda t, u, p: (u.v, -p.lam * u.u)], [2], ["u", "v"], ["lam"])
 print(batch.values(np.zeros(1), np.array([[2.0, 3.0]]), np.empty((0, 2)), np.array([5.0])).tolist())
 """
@@ -225,7 +225,7 @@ def test_processes_that_compile_the_same_problem_at_once(tmp_path):
 SAME_NAMES = """
 import sys
 import numpy as np
-from contin import Batch
+from contin.lowlevel import Batch
 
 def problem(helper):
     def rhs(t, u, p):

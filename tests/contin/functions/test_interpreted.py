@@ -12,8 +12,9 @@ from scipy import special
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from contin import AlgebraicProblem, Batch, BoundaryValueProblem, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, solve, trace
 from contin.errors import InterpretedWarning
+from contin.lowlevel import Batch
 
 pytestmark = pytest.mark.filterwarnings("ignore::contin.errors.InterpretedWarning")
 TABLE = np.linspace(0.0, 1.0, 11)

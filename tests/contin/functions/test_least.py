@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contin import Batch, least, minimum
+from contin import least, minimum
+from contin.lowlevel import Batch
 
 
 def state(M, a):

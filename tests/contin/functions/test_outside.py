@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from contin import AlgebraicProblem, Batch, BoundaryValueProblem, ProblemError, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, ProblemError, solve, trace
 from contin.errors import InterpretedWarning
+from contin.lowlevel import Batch
 
 VALUES = {"k": 4.0, "more": {"half": 0.5}}
 MATRIX = scipy.sparse.diags_array([np.ones(3), -2 * np.ones(4), np.ones(3)], offsets=[-1, 0, 1])

@@ -9,8 +9,8 @@ import pytest
 import scipy.sparse
 
 import contin
-from contin import Batch
 from contin.errors import InterpretedWarning
+from contin.lowlevel import Batch
 
 NONE = np.empty((0, 1))
 

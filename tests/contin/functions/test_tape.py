@@ -17,10 +17,11 @@ from scipy import special
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 import contin
-from contin import Batch, ProblemError, gradient, minimum, root
+from contin import ProblemError, gradient, minimum, root
 from contin.errors import InterpretedWarning
 from contin.functions.derivatives import jacobian, tangents
 from contin.functions.tape import Tape
+from contin.lowlevel import Batch
 
 NONE = np.empty((0, 1))
 

@@ -44,7 +44,7 @@ def test_a_branch_is_a_sequence(column):
 
 def test_what_is_printed_fits_on_a_screen(column, diagram):
     first, *_ = column.labelled("BP")
-    state = contin.Continuation(first.system, column[0].x).state
+    state = contin.lowlevel.Continuation(first.system, column[0].x).state
     long = contin.Branch(column.points * 50, column.stop)
     for found in (column, long, first, first.details, first.system, state, diagram, diagram.branches[0], column.stop):
         lines = repr(found).splitlines()
@@ -59,7 +59,7 @@ def test_problems_and_runs_are_printed_by_names(column):
     assert repr(problem) == "BoundaryValueProblem(states u, v; parameters P)"
     many = contin.AlgebraicProblem(lambda u, p: u, [f"u{i}" for i in range(500)], {})
     assert repr(many).endswith("u19 and 480 more; parameters none)")
-    run = contin.Continuation(column[0].system, column[0].x)
+    run = contin.lowlevel.Continuation(column[0].system, column[0].x)
     assert repr(run).startswith("Continuation(State(") and repr(run).endswith("not ended)")
     cycle = contin.CycleProblem(lambda u, p: (u.y, -u.x), ["x", "y"], {})
     assert repr(cycle) == "CycleProblem(states x, y; parameters period)"
@@ -67,7 +67,7 @@ def test_problems_and_runs_are_printed_by_names(column):
 
 def test_a_stored_table_is_printed_on_a_line(column, tmp_path):
     contin.save(column, tmp_path / "column.npz")
-    text = repr(contin.read_columns(tmp_path / "column.npz"))
+    text = repr(contin.lowlevel.read_columns(tmp_path / "column.npz"))
     assert text.startswith(f"StoredColumns({len(column)} points, columns ") and "EP, BP, BP, EP; reached P = 45)" in text
 
 

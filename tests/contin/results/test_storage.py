@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from bank.closed_forms import elastica, parabola
 
-from contin import AlgebraicProblem, ProblemError, load, read_columns, save, solve, trace
+from contin import AlgebraicProblem, ProblemError, load, save, solve, trace
+from contin.lowlevel import read_columns
 
 
 def test_a_stored_branch_point_can_be_left_again(tmp_path):

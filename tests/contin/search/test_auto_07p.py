@@ -12,18 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contin import (
-    AlgebraicProblem,
-    AutoSolution,
-    BoundaryValueProblem,
-    ConvergenceError,
-    CycleProblem,
-    ProblemError,
-    from_auto,
-    read_auto,
-    solve,
-    trace,
-)  # fmt: skip
+from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, CycleProblem, ProblemError, solve, trace
+from contin.auto07p import AutoSolution, from_auto, read_auto  # fmt: skip
 
 STORED = Path(__file__).parent / "auto_07p"
 #: The fold of Bratu's problem, from its closed form.

@@ -296,7 +296,7 @@ def test_a_stored_curve_goes_on(tmp_path):
     branch = contin.trace(middle, free=["m"], limits={"m": (-1, 5)})
     assert branch.points[-1]["m"] == pytest.approx(5, abs=1e-12) and branch.points[0]["n"] == middle["n"]
     assert contin.solve(problem, middle)["m"] == middle["m"]
-    columns = contin.read_columns(tmp_path / "hopf.npz")
+    columns = contin.lowlevel.read_columns(tmp_path / "hopf.npz")
     assert columns.columns["m"] == pytest.approx(columns.columns["n"] ** 2, abs=1e-11)
     assert columns.profiles[0][1].shape == (1, 2)
 
