@@ -275,11 +275,11 @@ def _zero_again(
         if value == 0:
             return trial, 0.0
         trial, before = at(s), value
+        if abs(s - last) < _LAST:
+            return trial, 0.0
         value = test.function(trial)
         if test.label == "LP" and max(abs(before), abs(value)) < _FLAT:
             return trial, 0.0  # the parameter stands still all around: its value there is that of the fold
-        if abs(s - last) < _LAST:
-            return trial, 0.0
         if value == before:
             break  # it does not depend on the place, and is not zero
         s, last = s - value * (s - last) / (value - before), s
