@@ -61,7 +61,7 @@ CALM = 10.0
 _GLANCES = 2
 
 
-def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
+def quotients(before: Factors, after: Factors, size: int, pivot: float = PIVOT) -> ComplexArray:
     """Return how the singular values that change most do so between two points, from factors there: shape (watched,), complex.
 
     Parameters
@@ -70,13 +70,15 @@ def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
         Of [F_x; row] with one row.
     size : int
         Of the matrix.
+    pivot : float
+        The condensed matrix decides where no pivot is less.
 
     Returns
     -------
     ndarray
         Eigenvalues of the quotient; NaN where a matrix is exactly singular, or where too many change.
     """
-    condensed = _condensed(before, after)
+    condensed = _condensed(before, after, pivot)
     if condensed is not None:
         return _finite_eigenvalues(condensed)
     if size > _SMALL:
@@ -86,14 +88,19 @@ def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
     return _all(before, after, size) if size <= _MEDIUM else np.full(1, np.nan, dtype=complex)
 
 
-def _condensed(before: Factors, after: Factors) -> Array | None:
+def _condensed(before: Factors, after: Factors, pivot: float = PIVOT) -> Array | None:
     """Return the quotient of the condensed matrices; None where there are none, and where they do not decide."""
     if not (isinstance(before, Factorization) and isinstance(after, Factorization) and before.ends and after.ends):
         return None
-    if not min(before.ends.least_pivot, after.ends.least_pivot) > PIVOT:
+    if not min(before.ends.least_pivot, after.ends.least_pivot) > pivot:
         return None
     quotient, turn = compared(before.ends, after.ends)
     return quotient if turn < TURN and np.isfinite(quotient).all() else None
+
+
+def is_watched(before: Factors, after: Factors, size: int) -> bool:
+    """Return whether the quotient is so large that not all its eigenvalues are computed, and nothing condensed decides."""
+    return size > _SMALL and _condensed(before, after) is None
 
 
 def _finite_eigenvalues(matrix: Array) -> ComplexArray:

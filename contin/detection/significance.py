@@ -19,7 +19,7 @@ from contin.discretization.protocol import Discretization
 from contin.errors import ConvergenceError
 from contin.linalg.orientation import oriented
 from contin.stepping.newton import UNITS, Newton, correct
-from contin.stepping.step import CLEAR
+from contin.stepping.step import CLEAR, trial_of
 from contin.stepping.trial import TestFunction, Trial, linearization
 
 #: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
@@ -49,7 +49,7 @@ def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
     rate = trial.value(fold)
     if not abs(rate) < CLEAR:
         return float(np.sign(rate))
-    if trial.system.refined() is None:  # without a mesh, there is round-off only
+    if not trial.system.intervals:  # without a mesh, there is round-off only
         return float(np.sign(rate)) if abs(rate) > _noise(trial, fold) else 0.0
     finer = on_finer_mesh(trial, newton)
     if finer is None:
@@ -102,10 +102,9 @@ def on_finer_mesh(trial: Trial, newton: Newton) -> Trial | None:
     system, carry = finer
     x, row = carry(trial.x), system.weights * carry(trial.tangent)
     try:
-        better = correct(system, x, row, row @ x, newton).x
+        return trial_of(system, correct(system, x, row, row @ x, newton, linearize=True), row)
     except ConvergenceError:
         return None
-    return Trial(system, better, linearization(system, better, row))
 
 
 def senses(segment: Segment, fold: TestFunction) -> tuple[float, float]:
