@@ -13,12 +13,13 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.detection.branch_point import locate_branch_point
-from contin.detection.crossings import calm, crossings, is_watched, passed, quotients
+from contin.detection.crossings import calm, crossings, is_watched, passed, quotients, quotients_along
 from contin.detection.floquet import keep_off_one
 from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
 from contin.detection.segment import Segment, SpecialPoint
 from contin.discretization.protocol import inner
 from contin.errors import ConvergenceError
+from contin.linalg.factors import Factors
 from contin.linalg.orientation import canonical_basis
 from contin.linalg.singular import smallest_directions
 from contin.stepping.trial import Trial, sign_changed
@@ -65,7 +66,12 @@ class BranchPointSearch:
             before.refactor(row)
         if before.sign == trial.sign and (keep_off_one(self.segment) or calm(before.factors, trial.factors, size)):
             return 0, True
-        if is_watched(before.factors, trial.factors, size) and self._without_smallest is not None:
+        watched = is_watched(before.factors, trial.factors, size)
+        if watched and not self.sign_changes:
+            along = quotients_along(functools.cache(self._whole))
+            if along is not None and crossings(along) == (0, True):
+                return 0, True
+        if watched and self._without_smallest is not None:
             return self._without_smallest
         before.refactor(row)
         values = quotients(before.factors, trial.factors, size)
@@ -100,11 +106,14 @@ class BranchPointSearch:
         rows, unit[-1] = np.zeros((2, size + 1)), 1.0
         rows[0, :-1], rows[1, :-1] = segment.state.row, right[0]
         column = left[:1, : system.equations]
-        first, last = (system.linearize(end.x, rows, column)[1] for end in (segment.before, segment.trial))
+        matrix = functools.cache(lambda part: self._bordered(part, rows, column))
+        first, last = matrix(0.0), matrix(1.0)
         g = [factors.solve(unit)[-1] for factors in (first, last)]
         if not np.isfinite(g).all() or (g[0] * g[1] < 0) != self.sign_changes:
             return None
-        values = quotients(first, last, size + 1, _PIVOT)
+        values = quotients_along(matrix, _PIVOT)
+        if values is None:
+            values = quotients(first, last, size + 1)
         if not np.isfinite(values).all():
             return 0, False
         if crossings(values) != (0, True) or first.sign != last.sign:
@@ -112,12 +121,24 @@ class BranchPointSearch:
         if self.sign_changes:
             self._shares = _shares(np.array([g[0] / g[1]]))
             return 1, True
-        with contextlib.suppress(ConvergenceError):
-            for place in (segment.guessed, segment.at):  # the cubic may lie on the other side of a zero
-                middle = system.linearize(place(segment.step / 2).x, rows, column)[1].solve(unit)[-1]
-                if middle * g[0] > 0:
-                    return 0, True
+        if matrix(0.5).solve(unit)[-1] * g[0] > 0:
+            return 0, True
+        with contextlib.suppress(ConvergenceError):  # the cubic may lie on the other side of a zero
+            middle = system.linearize(segment.at(segment.step / 2).x, rows, column)[1]
+            if middle.solve(unit)[-1] * g[0] > 0:
+                return 0, True
         return None
+
+    def _whole(self, part: float) -> Factors:
+        """Return the factors of [F_x; row] at a part of the step."""
+        trial, row = self.segment.trial, self.segment.state.row
+        return trial.factors if part == 1 else self._bordered(part, row[None])
+
+    def _bordered(self, part: float, rows: Array, columns: Array | tuple[()] = ()) -> Factors:
+        """Return the factors of F_x with these rows and columns at a part of the step, inside it on the cubic."""
+        segment, ends = self.segment, {0.0: self.segment.before, 1.0: self.segment.trial}
+        x = ends[part].x if part in ends else segment.guess(segment.low + part * (segment.step - segment.low))
+        return segment.state.system.linearize(x, rows, columns)[1]
 
     @property
     def _gap(self) -> float:
