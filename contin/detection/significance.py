@@ -51,6 +51,8 @@ def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
         return float(np.sign(rate))
     if not trial.system.intervals:  # without a mesh, there is round-off only
         return float(np.sign(rate)) if abs(rate) > _noise(trial, fold) else 0.0
+    if not (1 + _AGREES) * abs(rate) > _ROUND_OFF:
+        return 0.0  # one that agrees is round-off, too
     finer = on_finer_mesh(trial, newton)
     if finer is None:
         return 0.0
