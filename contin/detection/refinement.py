@@ -15,6 +15,7 @@ from contin.detection.multiple_point import MultiplePoint, locate_multiple_point
 from contin.detection.segment import SpecialPoint
 from contin.discretization.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
+from contin.linalg.factors import Factors
 from contin.stepping.newton import Newton
 from contin.stepping.settings import Settings
 from contin.stepping.settling import ROUNDS
@@ -254,9 +255,10 @@ def _zero_again(
         Newton's method fails, or there is no zero.
     """
     state = standing_at(system, x, tangent / np.sqrt(inner(system, tangent, tangent)), 1.0)
+    factors: Factors | None = None
 
     def at(s: float) -> Trial:
-        trial = located(state, x + s * state.tangent, s, newton)
+        trial = located(state, x + s * state.tangent, s, newton, factors)
         for _ in range(ROUNDS):
             moved = trial.system.on_switches(trial.x, closely=True)
             if moved is None:
@@ -270,6 +272,7 @@ def _zero_again(
     trial = here = at(0.0)
     if test is None:
         return trial, 0.0
+    factors = here.factors if here.system is system else None
     s, last, value = _FIRST, 0.0, test.function(trial)
     for _ in range(_SECANTS):
         if value == 0:
