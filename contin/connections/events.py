@@ -24,6 +24,7 @@ at the reference of the discretization.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -177,14 +178,22 @@ def _system(trial: Trial) -> ConnectionCollocation:
     return found
 
 
+@functools.lru_cache(maxsize=4)
+def _reference(system: ConnectionCollocation) -> Trial:
+    """Return the reference of a discretization as a point."""
+    return Trial.without_tangent(system, system.reference)
+
+
 def _leading(trial: Trial, side: int) -> ComplexArray:
     """Return the eigenvalues of one side, 0 stable or 1 unstable, the leading one first."""
-    return _eigenvalues(_system(trial), trial.x, side)[0]
+    return _eigenvalues(trial, side)[0]
 
 
-def _eigenvalues(system: ConnectionCollocation, x: Array, side: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+@functools.lru_cache(maxsize=8)
+def _eigenvalues(trial: Trial, side: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Return the eigenvalues of one side, the leading one first, and its right and left eigenvector."""
-    values, vectors = np.linalg.eig(system.saddle_jacobian(x))
+    system = _system(trial)
+    values, vectors = np.linalg.eig(system.saddle_jacobian(trial.x))
     order = np.argsort(-values.real)
     count = system.problem.unstable
     chosen = order[:count][::-1] if side else order[count:]
@@ -192,10 +201,10 @@ def _eigenvalues(system: ConnectionCollocation, x: Array, side: int) -> tuple[Co
     return values[chosen].astype(complex), vectors[:, chosen[0]].astype(complex), left.astype(complex)
 
 
-def _leading_vectors(system: ConnectionCollocation, x: Array, side: int) -> tuple[Array, Array]:
+def _leading_vectors(trial: Trial, side: int) -> tuple[Array, Array]:
     """Return the eigenvectors, right and left, of a real leading eigenvalue, with the signs of the reference."""
-    _, *there = _eigenvalues(system, system.reference, side)
-    _, *here = _eigenvalues(system, x, side)
+    _, *there = _eigenvalues(_reference(_system(trial)), side)
+    _, *here = _eigenvalues(trial, side)
     signs = [np.sign((vector.conj() @ oriented(known)).real) for vector, known in zip(here, there)]
     right, left = (sign * vector.real / np.linalg.norm(vector.real) for sign, vector in zip(signs, here))
     return right, left
@@ -238,12 +247,12 @@ def _divergent(side: int) -> TestFunction:
     )  # fmt: skip
 
 
-def _flip(label: str, name: str, side: int, function: Callable[[ConnectionCollocation, Array], float]) -> TestFunction:
+def _flip(label: str, name: str, side: int, function: Callable[[Trial], float]) -> TestFunction:
     """Return the test function of a flip: NaN where the leading eigenvalue is complex."""
 
     def value(trial: Trial) -> float:
         complex_pair = _is_complex(_leading(trial, side)[0])
-        return float("nan") if complex_pair else function(_system(trial), trial.x)
+        return float("nan") if complex_pair else function(trial)
 
     return TestFunction(label, name, value)
 
@@ -255,11 +264,12 @@ def _component(unit: Array, vector: Array) -> float:
 
 
 def _orbit_flip(side: int) -> TestFunction:
-    def component(system: ConnectionCollocation, x: Array) -> float:
+    def component(trial: Trial) -> float:
+        system, x = _system(trial), trial.x
         gap = system.apart(x)[1 - side]
         if not np.linalg.norm(gap) > _TOO_NEAR * np.max(np.abs(x[: system.state_size])):
             return float("nan")
-        return _component(_leading_vectors(system, x, side)[1], gap)
+        return _component(_leading_vectors(trial, side)[1], gap)
 
     return _flip("OFU" if side else "OFS", "orbit flip", side, component)
 
@@ -270,24 +280,35 @@ def _inclination_flip(side: int, known: bool = False) -> TestFunction:
     Right at a flip a(0), or a(1), is as small as its second exponential.
     """
 
-    def component(system: ConnectionCollocation, x: Array) -> float:
-        border = _left_null_vector(system, system.reference, None)
-        if not known and not np.linalg.norm(system.adjoint_at_ends(x, border)[side]) > _NOTHING:
+    def component(trial: Trial) -> float:
+        system, x = _system(trial), trial.x
+        if not known and not np.linalg.norm(system.adjoint_at_ends(x, _border(system))[side]) > _NOTHING:
             return float("nan")
-        adjoint = system.adjoint_at_ends(x, _left_null_vector(system, x, border))[side]
-        unit = _leading_vectors(system, x, side)[0]
+        adjoint, unit = system.adjoint_at_ends(x, _adjoint(trial))[side], _leading_vectors(trial, side)[0]
         return float(unit @ adjoint) if known else _component(unit, adjoint)
 
     return _flip("IFU" if side else "IFS", "inclination flip", side, component)
 
 
-def _left_null_vector(system: ConnectionCollocation, x: Array, border: Array | None) -> Array:
-    """Return w with w F_z = 0, of unit length, and its product with the border (random without one) positive."""
+@functools.lru_cache(maxsize=4)
+def _border(system: ConnectionCollocation) -> Array:
+    """Return the left null vector at the reference."""
+    return _left_null_vector(system, system.reference, np.random.default_rng(11).standard_normal(system.equations))
+
+
+@functools.lru_cache(maxsize=4)
+def _adjoint(trial: Trial) -> Array:
+    """Return the left null vector at a point, with the sign of that at the reference."""
+    system = _system(trial)
+    return _left_null_vector(system, trial.x, _border(system))
+
+
+def _left_null_vector(system: ConnectionCollocation, x: Array, border: Array) -> Array:
+    """Return w with w F_z = 0, of unit length, and its product with the border positive."""
     own = [name for name in system.free if name not in system.problem.multipliers]
     held = np.zeros((len(own), system.size + 1))
     held[range(len(own)), [system.parameter_index(name) for name in own]] = 1.0
-    column = np.random.default_rng(11).standard_normal(system.equations) if border is None else border
-    _, factors = system.linearize(x, held, column[None])
+    _, factors = system.linearize(x, held, border[None])
     unit = np.zeros(system.size + 1)
     unit[-1] = 1.0
     w: Array = factors.solve_transposed(unit)[: system.equations]

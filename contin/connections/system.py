@@ -169,13 +169,17 @@ class ConnectionCollocation(Conditioned):
         return {}
 
     def _subspace(self, p: Array, end: int) -> tuple[Array, Array, Callable[[Array], Array]]:
+        A, Q = self._jacobian_at(self._places(p[None])[end][0], p), self._bases[end]
+        L, N = _normalized(_left_subspace(A, self.problem.conditions[end], stable=end == 0), Q), self._complements[end]
+        made = functools.cache(lambda: _sylvester(-(L @ A @ Q.T), N.T @ (A - A @ Q.T @ L) @ N))  # residuals need none
+        return Q, L, lambda right: made()(-right @ N) @ N.T
+
+    @functools.cached_property
+    def _complements(self) -> list[Array]:
+        """The orthonormal N of the complements of Q."""
         from scipy.linalg import null_space  # type: ignore[import-untyped]  # .1 s; only this needs it
 
-        A, Q = self._jacobian_at(self._places(p[None])[end][0], p), self._bases[end]
-        L = _normalized(_left_subspace(A, self.problem.conditions[end], stable=end == 0), Q)
-        N = null_space(Q) if len(Q) else np.eye(self._n)
-        solve = _sylvester(-(L @ A @ Q.T), N.T @ (A - A @ Q.T @ L) @ N)
-        return Q, L, lambda right: solve(-right @ N) @ N.T
+        return [null_space(Q) if len(Q) else np.eye(self._n) for Q in self._bases]
 
     def _jacobians_along(self, p: Array, directions: Sequence[Array], end: int) -> dict[Numbers, Array]:
         """Return the Jacobian at the equilibrium of an end, and its derivatives along all subsets of the directions."""

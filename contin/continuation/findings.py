@@ -28,8 +28,8 @@ IndexChange = tuple[int | None, int | None]
 
 def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
     """Return a special point located again on finer meshes, with its errors, if these are wanted; and its normal form."""
-    if not found.label:
-        return found  # a regular point
+    if not found.label or not (found.is_located or found.stop is not None):
+        return found  # a regular point, or one that gets no label
     labelled = found.label != "MX" and not found.closes
     first, coarse = found.trial, found.trial.system.coefficient(found)
     if found.errors is None and labelled and settings.errors:

@@ -225,6 +225,9 @@ def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
     known = [trial.value(test) for _, trial in knots]
     if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, MINUS_ONE):
         return []
+    if _mean_little(segment.before) and _mean_little(segment.trial):  # what is found is round-off, and takes long
+        lost = SpecialPoint(segment.step, test.label, test.name, segment.trial, test=test, is_located=False)
+        return [lost] if sign_changed(known[0], known[-1]) else []
     inside = [segment.step * part for part in LOOKS]
     looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
     values = [trial.value(test) for _, trial in looked]
@@ -368,13 +371,15 @@ def _unstable(trial: Trial) -> int:
 
 
 def _doubtful(point: SpecialPoint) -> SpecialPoint:
-    """Return a special point, as not located where the multiplier that is 1 has such an error that others mean little."""
-    system: Any = point.trial.system
-    trivial = _trivial(system, point.trial.x)
-    if trivial is None or not point.is_located:
-        return point
-    error = abs(np.expm1(system.eigenvalues(point.trial.x)[trivial]))
-    return dataclasses.replace(point, is_located=error <= _MEANINGLESS)
+    """Return a special point, as not located where multipliers mean little."""
+    return dataclasses.replace(point, is_located=point.is_located and not _mean_little(point.trial))
+
+
+def _mean_little(trial: Trial) -> bool:
+    """Return whether the multiplier that is 1 has such an error that others mean little."""
+    system: Any = trial.system
+    trivial = _trivial(system, trial.x)
+    return trivial is not None and not abs(np.expm1(system.eigenvalues(trial.x)[trivial])) <= _MEANINGLESS
 
 
 def _passes(segment: Segment, point: SpecialPoint) -> bool:

@@ -7,7 +7,8 @@ eigenvalues negative.
 1. Of a small matrix all eigenvalues are computed.
 2. On a mesh the small matrix that condensation leaves (`contin.linalg.ends`) takes its place, as long as the relations between
    mesh points turn little from one point of the curve to the other, all along the mesh. The condensed matrix cannot tell
-   solutions that have gained a half-wave from those that have not; this is what the turn tells.
+   solutions that have gained a half-wave from those that have not; this is what the turn tells. Where they turn more, places
+   between are looked at, too, on the cubic: over a piece of the step they turn less.
 3. Otherwise the eigenvalues are computed in the directions in which the inverses differ most, by a block Krylov method.
    Directions in which the matrix is nearest to singular are not the same: small singular values that stay as they are would
    hide those that pass.
@@ -15,6 +16,7 @@ eigenvalues negative.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -36,6 +38,9 @@ _MEDIUM = 128
 #: matrix decides. It disagreed with the whole one in none of 7,300 steps of the tests (from a turn of .55 and a pivot of .35 on
 #: in some), except beside a layer, where it is right.
 TURN, PIVOT = 0.5, 0.2
+#: How often a step is halved where relations turn more over it: over half of it, they turn a quarter as much. With two, 25
+#: steps of AUTO's demo ``ab`` stay undecided, with three 16.
+_HALVINGS = 3
 #: A condensed matrix that differs from the identity by less has no eigenvalue near zero.
 NEAR_ONE = 0.9
 #: Directions added in a round, and the largest number of them: where more change, the step is divided, which takes as long as
@@ -86,14 +91,59 @@ def quotients(before: Factors, after: Factors, size: int) -> ComplexArray:
     return _all(before, after, size) if size <= _MEDIUM else np.full(1, np.nan, dtype=complex)
 
 
-def _condensed(before: Factors, after: Factors) -> Array | None:
-    """Return the quotient of the condensed matrices; None where there are none, and where they do not decide."""
-    if not (isinstance(before, Factorization) and isinstance(after, Factorization) and before.ends and after.ends):
+def quotients_along(factors: Callable[[float], Factors], pivot: float = PIVOT) -> ComplexArray | None:
+    """Return how singular values change from each of some places of a step to the next, where condensed matrices decide.
+
+    Parameters
+    ----------
+    factors : callable
+        Returns those of [F_x; row] at a part of the step, from 0 to 1.
+    pivot : float
+        The least pivot of condensed matrices that decide.
+
+    Returns
+    -------
+    ndarray or None
+        Eigenvalues of the quotients; NaN where relations turn too much, None where matrices are not condensed.
+    """
+    if not _is_condensed(factors(1.0), pivot):
         return None
-    if not min(before.ends.least_pivot, after.ends.least_pivot) > PIVOT:
+    quotients = list(_along(factors, 0.0, 1.0, _HALVINGS, pivot))
+    return np.concatenate([np.full(1, np.nan, complex) if found is None else _finite_eigenvalues(found) for found in quotients])
+
+
+def _along(
+    factors: Callable[[float], Factors], start: float, end: float, halvings: int, pivot: float
+) -> Iterator[Array | None]:
+    """Yield quotients of condensed matrices over pieces of a step, halved where these do not decide; None, last, in the end."""
+    quotient = _condensed(factors(start), factors(end), pivot)
+    if quotient is not None or not halvings:
+        yield quotient
+        return
+    middle = (start + end) / 2
+    for quotient in _along(factors, start, middle, halvings - 1, pivot):
+        yield quotient
+        if quotient is None:
+            return
+    yield from _along(factors, middle, end, halvings - 1, pivot)
+
+
+def _is_condensed(factors: Any, pivot: float) -> bool:
+    """Return whether a matrix has been condensed with no pivot less than a part of their mean."""
+    return isinstance(factors, Factorization) and factors.ends is not None and factors.ends.least_pivot > pivot
+
+
+def _condensed(before: Any, after: Any, pivot: float = PIVOT) -> Array | None:
+    """Return the quotient of the condensed matrices; None where there are none, and where they do not decide."""
+    if not (_is_condensed(before, pivot) and _is_condensed(after, pivot)):
         return None
     quotient, turn = compared(before.ends, after.ends)
     return quotient if turn < TURN and np.isfinite(quotient).all() else None
+
+
+def is_watched(before: Factors, after: Factors, size: int) -> bool:
+    """Return whether the quotient is so large that not all its eigenvalues are computed, and nothing condensed decides."""
+    return size > _SMALL and _condensed(before, after) is None
 
 
 def _finite_eigenvalues(matrix: Array) -> ComplexArray:

@@ -32,7 +32,7 @@ from contin.events.segment import Segment
 #: Numbers of nodes, even: none is right at the zero. The second number is for the error estimate.
 _NODES = 12, 10
 #: Half the width of the interval of the nodes as parts of the step: narrow ones suffer from nodes that are close to the zero,
-#: wide ones from bends of the curve. The one with the smallest estimated error is taken.
+#: wide ones from bends of the curve. Narrower ones are tried as long as they lower the estimated error.
 _WIDTHS = (2.0, 1.0, 0.5, 0.25)
 #: Points that an extrapolation goes through, at most, and points without one, which lie close to the beginning of the step.
 _BEHIND, _FEWEST = 6, 2
@@ -121,8 +121,9 @@ def interpolated_zero(segment: Segment, functions: Functions, near: float) -> In
         except ConvergenceError:
             continue
         change = float(np.abs(found.trial.x - other.trial.x).max())
-        if change < least:
-            best, least = found, change
+        if not change < least:
+            break
+        best, least = found, change
     return best
 
 

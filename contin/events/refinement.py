@@ -21,6 +21,7 @@ from contin.events.branch_point import BranchPoint, locate_branch_point, rounded
 from contin.events.interpolated import InterpolatedZero
 from contin.events.multiple_point import MultiplePoint, locate_multiple_point
 from contin.events.segment import SpecialPoint
+from contin.linalg.factors import Factors
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.
 _FAR = 0.05
@@ -254,9 +255,10 @@ def _zero_again(
         Newton's method fails, or there is no zero.
     """
     state = standing_at(system, x, tangent / np.sqrt(inner(system, tangent, tangent)), 1.0)
+    factors: Factors | None = None
 
     def at(s: float) -> Trial:
-        trial = located(state, x + s * state.tangent, s, newton)
+        trial = located(state, x + s * state.tangent, s, newton, factors)
         for _ in range(ROUNDS):
             moved = trial.system.on_switches(trial.x, closely=True)
             if moved is None:
@@ -270,16 +272,17 @@ def _zero_again(
     trial = here = at(0.0)
     if test is None:
         return trial, 0.0
+    factors = here.factors if here.system is system else None
     s, last, value = _FIRST, 0.0, test.function(trial)
     for _ in range(_SECANTS):
         if value == 0:
             return trial, 0.0
         trial, before = at(s), value
+        if abs(s - last) < _LAST:
+            return trial, 0.0
         value = test.function(trial)
         if test.label == "LP" and max(abs(before), abs(value)) < _FLAT:
             return trial, 0.0  # the parameter stands still all around: its value there is that of the fold
-        if abs(s - last) < _LAST:
-            return trial, 0.0
         if value == before:
             break  # it does not depend on the place, and is not zero
         s, last = s - value * (s - last) / (value - before), s

@@ -16,7 +16,7 @@ import numpy as np
 from contin.arrays import Array
 from contin.core.newton import UNITS, Newton, correct
 from contin.core.protocol import Discretization
-from contin.core.step import CLEAR
+from contin.core.step import CLEAR, trial_of
 from contin.core.trial import TestFunction, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.segment import Segment, SpecialPoint
@@ -49,8 +49,10 @@ def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
     rate = trial.value(fold)
     if not abs(rate) < CLEAR:
         return float(np.sign(rate))
-    if trial.system.refined() is None:  # without a mesh, there is round-off only
+    if not trial.system.intervals:  # without a mesh, there is round-off only
         return float(np.sign(rate)) if abs(rate) > _noise(trial, fold) else 0.0
+    if not (1 + _AGREES) * abs(rate) > _ROUND_OFF:
+        return 0.0  # one that agrees is round-off, too
     finer = on_finer_mesh(trial, newton)
     if finer is None:
         return 0.0
@@ -102,10 +104,9 @@ def on_finer_mesh(trial: Trial, newton: Newton) -> Trial | None:
     system, carry = finer
     x, row = carry(trial.x), system.weights * carry(trial.tangent)
     try:
-        better = correct(system, x, row, row @ x, newton).x
+        return trial_of(system, correct(system, x, row, row @ x, newton, linearize=True), row)
     except ConvergenceError:
         return None
-    return Trial(system, better, linearization(system, better, row))
 
 
 def senses(segment: Segment, fold: TestFunction) -> tuple[float, float]:
