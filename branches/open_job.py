@@ -443,6 +443,6 @@ def _settings(config: OpenConfig, number: int, system: Collocation, x: np.ndarra
     return Settings(
         primary=stage.follow, direction=int(np.sign(to - here)) or 1, step=steps.first_step, min_step=steps.smallest,
         max_step=steps.largest, max_points=stage.max_points or steps.max_points, angle=steps.angle, limits=limits, zeros=zeros,
-        mesh=_mesh_control(config), test_functions=config.strip(number).domain_tests(),
+        mesh=_mesh_control(config), events=config.strip(number).domain_tests(),
         scales=config.strip(number).sizes(system, x),
     )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from contin import ConvergenceError, TestFunction
+from contin import ConvergenceError, Event
 from contin.lowlevel import correct
 from ribbon_model.convexity import margin
 from ribbon_model.laws import Law
@@ -155,7 +155,7 @@ class Watch:
         result = self._within_law(point.system, there.x, point)
         return result.index if result is not None and result.decided else UNDECIDED
 
-    def _monitor(self, name) -> TestFunction:
+    def _monitor(self, name) -> Event:
         """Return the test function of one symmetry class: its determinant, which is zero where the symmetry is broken."""
 
         def determinant(trial):
@@ -177,7 +177,7 @@ class Watch:
             return float(np.prod(values))
 
         mode = Mode(self._n, *name)
-        return TestFunction(LABEL, str(mode), determinant, looks=_LOOKS, describe=lambda trial: mode)
+        return Event(LABEL, str(mode), determinant, looks=_LOOKS, describe=lambda trial: mode)
 
 
 def _broken(point) -> tuple[int, str]:

@@ -23,7 +23,7 @@ _BESIDE = 1e-2
 _SAME_PLACE = 1e-6
 
 
-def settings_of(config: Config, test_functions=()) -> Settings:
+def settings_of(config: Config, events=()) -> Settings:
     """Return the engine's settings for a scene, with further test functions."""
     mesh, steps = config.mesh, config.steps
     # near a bifurcation that the branch leaves slowly, round-off moves solutions by this much along the kernel
@@ -31,7 +31,7 @@ def settings_of(config: Config, test_functions=()) -> Settings:
     return Settings(
         primary="kappa_n", step=steps.first_step, min_step=steps.smallest, max_step=steps.largest,
         max_points=steps.max_points, angle=steps.angle, limits=config.limits, zeros=config.zeros, errors=True,
-        trivial=None if config.origin else "M2", test_functions=test_functions, newton=newton,
+        trivial=None if config.origin else "M2", events=events, newton=newton,
         mesh=MeshControl(mesh.tolerance, min(8, mesh.max_intervals), mesh.max_intervals, mesh.adapt_every),
     )  # fmt: skip
 

@@ -131,7 +131,7 @@ def at_natural_curvatures(
     limits = {"kappa_n": (min(start, *kappas) - _REACH, max(start, *kappas) + _REACH)}
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 8, 7, Gamma=Gamma)
     ends = convexity.test_functions(FINITE_WIDTH)
-    settings = Settings(trivial="M2", limits=limits, zeros={"kappa_n": list(kappas)}, test_functions=ends, errors=False)
+    settings = Settings(trivial="M2", limits=limits, zeros={"kappa_n": list(kappas)}, events=ends, errors=False)
     for point in follow(system, x, settings, tangent):
         if point.label == "LP" and folds is not None:
             folds.append((f"fold of ({m}, {n})", point["kappa_n"]))

@@ -21,14 +21,15 @@ import lazy_loader
 __version__ = "0.2.0"
 
 _public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-#: Modules to which names have moved that were here in version 0.2; the names stay here for one version, with a warning.
-_MOVED = ("lowlevel", "auto07p")
+#: Modules to which names have moved that were here in version 0.2, and new names of classes; the old ones stay here for one
+#: version, with a warning.
+_MOVED, _RENAMED = ("lowlevel", "auto07p"), {"Monitor": "Event", "TestFunction": "Event"}
 
 
 def __getattr__(name: str) -> Any:
     """Return a public name, imported when it is first used."""
     if name == "Monitor":  # the first name of the class
-        name = "TestFunction"
+        name = "Event"
     try:
         return _public(name)
     except AttributeError:

@@ -8,7 +8,7 @@ from .connections.statement import ConnectionProblem
 from .core.newton import Newton
 from .core.settings import Settings
 from .core.state import Reason, Stop
-from .core.trial import TestFunction
+from .core.trial import Event
 from .cycles.map_statement import MapProblem
 from .cycles.statement import CycleProblem
 from .equilibria.statement import AlgebraicProblem
@@ -32,6 +32,6 @@ __all__ = [
     "auto07p", "lowlevel",
     "AlgebraicProblem", "BoundaryValueProblem", "Branch", "ConnectionProblem", "ContinError", "ConvergenceError",
     "CycleProblem", "Diagram", "MapProblem", "MeshControl", "Newton", "Point", "ProblemError", "Reason", "Segment",
-    "SegmentedProblem", "Settings", "Stop", "TestFunction", "VariationalProblem", "curve", "cycle", "diagram",
+    "SegmentedProblem", "Settings", "Stop", "Event", "VariationalProblem", "curve", "cycle", "diagram",
     "gradient", "homoclinic", "least", "load", "minimum", "root", "save", "sensitivities", "solve", "trace",
 ]  # fmt: skip

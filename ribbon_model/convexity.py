@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contin import TestFunction
+from contin import Event
 from contin.lowlevel import Batch
 from ribbon_model.domains import StripProblem
 from ribbon_model.equilibrium import moment_with_force, moment_without_force
@@ -55,7 +55,7 @@ def _strains(problem: StripProblem) -> Batch:
     return Batch([problem.law.at_points(moment, strains)], [3], problem.state_names, tuple(problem.parameters))
 
 
-def test_functions(law: Law) -> list[TestFunction]:
+def test_functions(law: Law) -> list[Event]:
     """Return the test function that ends a run where the law ends; none for a law with a closed expression for H."""
     least = margin(law)
-    return [TestFunction("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []
+    return [Event("EP", NAME, lambda trial: least(trial.system, trial.x), terminal=True)] if least else []

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from contin import TestFunction
+from contin import Event
 from contin.lowlevel import Collocation, Continuation, Trial
 from ribbon_model.equilibrium import moment_on_directors, strains_of
 from ribbon_model.laws import FINITE_WIDTH, RIBBON
@@ -32,7 +32,7 @@ _ROUNDS = 3
 _PLACES = 17
 
 
-def tests(material: Material, strains: Strains) -> list[TestFunction]:
+def tests(material: Material, strains: Strains) -> list[Event]:
     """Return the test function that ends a run where the law ends; none for a law that is regular everywhere.
 
     Parameters
@@ -48,7 +48,7 @@ def tests(material: Material, strains: Strains) -> list[TestFunction]:
         RIBBON.name: functools.partial(_ribbon_margin, material),
         FINITE_WIDTH.name: functools.partial(_convexity, material, strains),
     }[law.name]
-    return [TestFunction("EP", f"the end of the law {law.name!r}", margin, terminal=True)]
+    return [Event("EP", f"the end of the law {law.name!r}", margin, terminal=True)]
 
 
 def explained(material: Material, strains: Strains, run: Continuation) -> str | None:

@@ -18,7 +18,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from contin import ContinError, Point, ProblemError, TestFunction, VariationalProblem, solve
+from contin import ContinError, Event, Point, ProblemError, VariationalProblem, solve
 from contin.lowlevel import Collocation, Continuation
 from ribbon_model import ends, first_guesses, integral_conditions, law_end, loads, natural_state
 from ribbon_model.ends import CLAMP, CLAMPED, DIRECTIONS, FREE, HINGED, JOINT, LOOSE, PLACE, End
@@ -390,7 +390,7 @@ class OpenStrip(Shown):
 
     # --- where the law ends -------------------------------------------------------------------------------------------
 
-    def domain_tests(self) -> list[TestFunction]:
+    def domain_tests(self) -> list[Event]:
         """Return the test function that ends a run where the law ends; none for a law that is regular everywhere."""
         return law_end.tests(self.material, self.strains)
 

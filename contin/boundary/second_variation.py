@@ -31,7 +31,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.collocation.basis import interpolation
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 from contin.events.index import Stability, nullity_of
 from contin.events.segment import SpecialPoint
@@ -107,7 +107,7 @@ def _index(trial: Trial) -> float:
 
 
 #: The index of a state with an energy. One object, so that a trial computes it once.
-INDEX = TestFunction("", "index", _index)
+INDEX = Event("", "index", _index)
 
 
 def stability_of(point: SpecialPoint) -> Stability:
@@ -124,7 +124,7 @@ def stability_of(point: SpecialPoint) -> Stability:
     return Stability(found.index(nullity), nullity, breaks)
 
 
-def legendre() -> TestFunction:
+def legendre() -> Event:
     """Return the test function that ends a run where the energy ceases to be convex in the controls (Legendre's condition)."""
 
     def margin(trial: Trial) -> float:
@@ -137,7 +137,7 @@ def legendre() -> TestFunction:
             value = system.problem.margin(system.gauss_times, points, system.all_parameters(trial.x))
         return value if np.isfinite(value) else 1.0
 
-    return TestFunction("EP", "loss of convexity in the controls (Legendre's condition)", margin, terminal=True)
+    return Event("EP", "loss of convexity in the controls (Legendre's condition)", margin, terminal=True)
 
 
 def _convexity(hll: Array) -> float:

@@ -19,7 +19,7 @@ from contin.functions.signature import Arguments, Signature, argument_count, res
 from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 if TYPE_CHECKING:
-    from contin.core.trial import TestFunction
+    from contin.core.trial import Event
     from contin.events.index import Stability
     from contin.events.segment import SpecialPoint
 
@@ -127,12 +127,12 @@ class BoundaryValueProblem(Restated):
         """Return why a solution x comes with others around it; see `Discretization.undetermined`."""
         return ""
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return the test functions that the statement brings."""
         return []
 
     @property
-    def index(self) -> TestFunction | None:
+    def index(self) -> Event | None:
         """The test function whose value is the index of a solution; None without an energy."""
         return None
 

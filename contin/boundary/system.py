@@ -33,7 +33,7 @@ from contin.linalg.segments import run, share
 
 if TYPE_CHECKING:
     from contin.boundary.statement import BoundaryValueProblem
-    from contin.core.trial import TestFunction
+    from contin.core.trial import Event
     from contin.events.index import Stability
     from contin.events.segment import SpecialPoint
 
@@ -629,7 +629,7 @@ class Collocation(System):
 
     # --- what the kind knows of its branches --------------------------------------------------------------------------
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of the statement."""
         return self.problem.events()
 
@@ -655,7 +655,7 @@ class Collocation(System):
         return self.problem.undetermined(self, x)
 
     @property
-    def index(self) -> TestFunction | None:
+    def index(self) -> Event | None:
         """That of the statement."""
         return self.problem.index
 

@@ -13,7 +13,7 @@ from contin.boundary.canonical import Canonical, Variation, canonical
 from contin.boundary.second_variation import INDEX, degeneracy, dependent_conditions, legendre, stability_of
 from contin.boundary.statement import BoundaryValueProblem
 from contin.boundary.system import Collocation
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.errors import ProblemError
 from contin.events.index import Stability
 from contin.events.segment import SpecialPoint
@@ -156,7 +156,7 @@ class VariationalProblem(BoundaryValueProblem):
             "hamiltonian": [None, v.states, v.states, v.parameters],
         }  # fmt: skip
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return that of Legendre's condition: where it fails, the energy is not convex in the controls."""
         return [legendre()]
 
@@ -174,7 +174,7 @@ class VariationalProblem(BoundaryValueProblem):
         return dependent_conditions(system, x)
 
     @property
-    def index(self) -> TestFunction:
+    def index(self) -> Event:
         """The number of independent ways to lower the energy."""
         return INDEX
 

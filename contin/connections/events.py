@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.events.segment import SpecialPoint
 from contin.linalg.orientation import oriented
 
@@ -56,18 +56,18 @@ _LOCATED_AS = {"NSF": "NSS", "NFF": "NSS", "SH": "NCH"}
 _REAL = 1e-8
 
 
-def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
+def homoclinic_points(system: ConnectionCollocation) -> list[Event]:
     """Return the test functions of a curve of homoclinic orbits, those for which there are enough eigenvalues."""
     n, unstable = len(system.problem.state_names), system.problem.unstable
     counts = n - unstable, unstable
     why = "the ends of the orbit are far from the saddle: it needs a longer time"
-    near = TestFunction("EP", why, _closeness, terminal=True)
+    near = Event("EP", why, _closeness, terminal=True)
     if system.problem.saddle_node:
         others = [_second_zero(side) for side in (0, 1) if (unstable if side else n - 1 - unstable)]
         return [near, _NON_CENTRAL[0], _NON_CENTRAL[1], _CUSP, *others]
     found = [
         near,
-        TestFunction("NSS", "neutral saddle", lambda trial: _total(_leading(trial, 0)[0].real, _leading(trial, 1)[0].real)),
+        Event("NSS", "neutral saddle", lambda trial: _total(_leading(trial, 0)[0].real, _leading(trial, 1)[0].real)),
         *(_ends(side) for side in (0, 1)),
     ]
     for side in (0, 1):
@@ -76,7 +76,7 @@ def homoclinic_points(system: ConnectionCollocation) -> list[TestFunction]:
     return found
 
 
-def own_test_of(label: str, system: ConnectionCollocation, x: Array) -> TestFunction | None:
+def own_test_of(label: str, system: ConnectionCollocation, x: Array) -> Event | None:
     """Return the test function that labels a special point x of a curve of homoclinic orbits so; None where none does.
 
     Labels of `named` are those of the function that was located. Where two have the same label it is the one that vanishes.
@@ -100,7 +100,7 @@ def _slow_component(trial: Trial, end: int) -> float:
 
 #: The test functions of the first and of the last end of an orbit to a saddle-node, positive where it is a central one.
 _NON_CENTRAL = tuple(
-    TestFunction(
+    Event(
         "NCH",
         "non-central homoclinic orbit to a saddle-node",
         (lambda trial: -_slow_component(trial, 1)) if end else (lambda trial: _slow_component(trial, 0)),
@@ -117,10 +117,10 @@ def _bend(trial: Trial) -> float:
 
 
 #: The test function of a cusp.
-_CUSP = TestFunction("CP", "cusp: the saddle-node meets a third equilibrium", _bend, terminal=True)
+_CUSP = Event("CP", "cusp: the saddle-node meets a third equilibrium", _bend, terminal=True)
 
 
-def _second_zero(side: int) -> TestFunction:
+def _second_zero(side: int) -> Event:
     """Return the test function of a second eigenvalue zero, a stable (0) or unstable one: the sum of both that meet."""
 
     def total(trial: Trial) -> float:
@@ -129,7 +129,7 @@ def _second_zero(side: int) -> TestFunction:
         first = system.problem.unstable - side
         return float(rates[first] + rates[first + 1]) * (1 if side else -1)
 
-    return TestFunction("BT", "Bogdanov-Takens: the saddle-node has two eigenvalues zero", total, terminal=True)
+    return Event("BT", "Bogdanov-Takens: the saddle-node has two eigenvalues zero", total, terminal=True)
 
 
 def crossing(point: Any) -> tuple[bool, int]:
@@ -143,7 +143,7 @@ def crossing(point: Any) -> tuple[bool, int]:
     return True, int(np.argmin([abs(_leading(trial, side)[0].real) for side in (0, 1)]))
 
 
-def ending(system: ConnectionCollocation, side: int) -> TestFunction:
+def ending(system: ConnectionCollocation, side: int) -> Event:
     """Return the test function NCH of an end (of orbits to a saddle-node) or side; it is positive on the curve."""
     return _NON_CENTRAL[side] if system.problem.saddle_node else _ends(side)
 
@@ -220,41 +220,41 @@ def _total(first: float, second: float) -> float:
     return total if abs(total) > _NEUTRAL * (abs(first) + abs(second)) else 0.0
 
 
-def _ends(side: int) -> TestFunction:
+def _ends(side: int) -> Event:
     """Return the test function that ends a curve: a leading eigenvalue of one side reaches the imaginary axis."""
     sign = 1 if side else -1
-    return TestFunction(
+    return Event(
         "NCH", "non-central homoclinic orbit to a saddle-node",
         lambda trial: sign * _leading(trial, side)[0].real, terminal=True,
     )  # fmt: skip
 
 
-def _double(side: int) -> TestFunction:
+def _double(side: int) -> Event:
     def square(trial: Trial) -> float:
         first, second = _leading(trial, side)[:2]
         return float(((first - second) ** 2).real)
 
-    return TestFunction("DRU" if side else "DRS", f"double real leading {('stable', 'unstable')[side]} eigenvalue", square)
+    return Event("DRU" if side else "DRS", f"double real leading {('stable', 'unstable')[side]} eigenvalue", square)
 
 
-def _divergent(side: int) -> TestFunction:
+def _divergent(side: int) -> Event:
     def total(trial: Trial) -> float:
         return _total(2 * _leading(trial, side)[0].real, _leading(trial, 1 - side)[0].real)
 
-    return TestFunction(
+    return Event(
         "NDU" if side else "NDS", "neutrally divergent saddle-focus", total,
         confirm=lambda trial: _is_complex(_leading(trial, side)[0]),
     )  # fmt: skip
 
 
-def _flip(label: str, name: str, side: int, function: Callable[[Trial], float]) -> TestFunction:
+def _flip(label: str, name: str, side: int, function: Callable[[Trial], float]) -> Event:
     """Return the test function of a flip: NaN where the leading eigenvalue is complex."""
 
     def value(trial: Trial) -> float:
         complex_pair = _is_complex(_leading(trial, side)[0])
         return float("nan") if complex_pair else function(trial)
 
-    return TestFunction(label, name, value)
+    return Event(label, name, value)
 
 
 def _component(unit: Array, vector: Array) -> float:
@@ -263,7 +263,7 @@ def _component(unit: Array, vector: Array) -> float:
     return component if abs(component) > _NOTHING * float(np.linalg.norm(vector)) else 0.0
 
 
-def _orbit_flip(side: int) -> TestFunction:
+def _orbit_flip(side: int) -> Event:
     def component(trial: Trial) -> float:
         system, x = _system(trial), trial.x
         gap = system.apart(x)[1 - side]
@@ -274,7 +274,7 @@ def _orbit_flip(side: int) -> TestFunction:
     return _flip("OFU" if side else "OFS", "orbit flip", side, component)
 
 
-def _inclination_flip(side: int, known: bool = False) -> TestFunction:
+def _inclination_flip(side: int, known: bool = False) -> Event:
     """Return the test function of an inclination flip; of one that is ``known`` it is followed below round-off, too.
 
     Right at a flip a(0), or a(1), is as small as its second exponential.

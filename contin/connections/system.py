@@ -16,7 +16,7 @@ from contin.connections.events import homoclinic_points, named, own_test_of
 from contin.core.multilinear import Numbers, shares, subsets
 from contin.core.protocol import Carrier
 from contin.core.scales import Scales
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.defining.event_curve import EventCurve
 from contin.errors import ConvergenceError, ProblemError
 from contin.events.segment import SpecialPoint
@@ -420,7 +420,7 @@ class ConnectionCollocation(Conditioned):
 
     # --- what the kind knows of its branches --------------------------------------------------------------------------
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of special homoclinic orbits; those of a given time, and orbits between two equilibria, have none."""
         return homoclinic_points(self) if self.problem.homoclinic and TIME not in self.free else []
 
@@ -448,7 +448,7 @@ class ConnectionCollocation(Conditioned):
         test = own_test_of(point.label, self, x) if self.problem.homoclinic else None
         return None if test is None else (EventCurve(self, test.function, label=test.label), x)
 
-    def events_on_curves(self) -> list[TestFunction]:
+    def events_on_curves(self) -> list[Event]:
         """Return those of homoclinic orbits that are special in another way, too."""
         return homoclinic_points(self)
 

@@ -13,7 +13,7 @@ from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.state import Reason, State, Stop
 from contin.core.step import aims, corrected, judged, predict
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.names import exact_text
 
@@ -39,7 +39,7 @@ _CORNER, _JUMP = 1e-4, 0.1
 _LIKE = 0.05
 
 
-def met(ends: Sequence[TestFunction], here: Trial, first: Trial) -> Stop | None:
+def met(ends: Sequence[Event], here: Trial, first: Trial) -> Stop | None:
     """Return the reason to stop where the domain of the equations ends: a test function that ends runs is nearly zero."""
     for test in ends:
         if abs(here.value(test)) < _NEARLY * abs(first.value(test)):

@@ -10,7 +10,7 @@ import numpy as np
 
 from contin.continuation.notes import Notes, why_lost
 from contin.core.settings import Settings
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.events.index import Stability, nullity_of
 from contin.events.refinement import refined
 from contin.events.segment import Segment, SpecialPoint
@@ -61,7 +61,7 @@ def is_confirmed(point: SpecialPoint, segment: Segment, notes: Notes) -> bool:
 
 
 def index_changes(
-    index: TestFunction | None, segment: Segment, special: Sequence[SpecialPoint], notes: Notes
+    index: Event | None, segment: Segment, special: Sequence[SpecialPoint], notes: Notes
 ) -> list[IndexChange | None]:
     """Return the index before and after each special point of a step, and note what contradicts itself."""
     if index is None or not special:
@@ -82,9 +82,7 @@ def index_changes(
     return changes
 
 
-def told(
-    found: SpecialPoint, arclength: float, index: TestFunction | None, change: IndexChange | None, mesh_error: float
-) -> Point:
+def told(found: SpecialPoint, arclength: float, index: Event | None, change: IndexChange | None, mesh_error: float) -> Point:
     """Return what is told of a special point, or of a regular one: the point of a branch."""
     trial, system = found.trial, found.trial.system
     parameters = dict(zip(system.problem.parameters, map(float, system.all_parameters(trial.x))))

@@ -15,7 +15,7 @@ from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.settling import ROUNDS
 from contin.core.state import Reason, State, Stop, standing_at
-from contin.core.trial import Linearization, TestFunction, Trial, linearization
+from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.accuracy import accuracy_of
 from contin.events.significance import growing
@@ -122,7 +122,7 @@ def _correction(system: Discretization, x: Array, primary: str, newton: Newton) 
     raise failed
 
 
-def begins_outside(trial: Trial, settings: Settings, own: Sequence[TestFunction], singular: bool) -> Stop | None:
+def begins_outside(trial: Trial, settings: Settings, own: Sequence[Event], singular: bool) -> Stop | None:
     """Return the reason to stop at the first point: it lies outside a limit, or outside the domain of the equations.
 
     ``own`` are the test functions of the kind of problem. Where a curve begins, one that ends runs may be zero up to round-off,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from contin.core.settings import Settings
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.events.index import contradiction
 from contin.events.inspection import Inspection, Start
 from contin.events.segment import Segment
@@ -22,17 +22,17 @@ class Judge:
     start : tuple (system, x, tangent)
         The first point of the run.
     settings : Settings
-    tests, general : sequence of TestFunction
+    tests, general : sequence of Event
         All, and those that have the same sign on every mesh.
-    fold : TestFunction, optional
+    fold : Event, optional
         None where folds are not wanted.
     sense : callable
         ``sense(trial)``: the sense in which the primary parameter goes.
     """
 
     def __init__(
-        self, start: Start, settings: Settings, tests: Sequence[TestFunction], general: Sequence[TestFunction],
-        fold: TestFunction | None, sense: Callable[[Trial], float],
+        self, start: Start, settings: Settings, tests: Sequence[Event], general: Sequence[Event],
+        fold: Event | None, sense: Callable[[Trial], float],
     ) -> None:  # fmt: skip
         self._start, self._tests, self._general, self._fold, self._sense = start, tests, general, fold, sense
         self._ends = [test for test in tests if test.terminal and not test.limit]
@@ -69,7 +69,7 @@ class Judge:
         return any(test.passed(before.value(test), trial.value(test)) for test in self._ends)
 
     @property
-    def ends(self) -> Sequence[TestFunction]:
+    def ends(self) -> Sequence[Event]:
         """The test functions at whose zeros the run ends, but for limits."""
         return self._ends
 

@@ -55,7 +55,7 @@ from contin.core.settings import Settings
 from contin.core.small import equations_of, linear_of
 from contin.core.state import State
 from contin.core.step import aims
-from contin.core.trial import Linearization, TestFunction, Trial
+from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.inspection import Start, is_elsewhere
 from contin.events.segment import SpecialPoint
@@ -72,14 +72,14 @@ Handed = tuple[float, Trial]
 
 
 def lane_of(
-    system: Discretization, settings: Settings, start: Start, tests: Sequence[TestFunction], own: Sequence[TestFunction],
+    system: Discretization, settings: Settings, start: Start, tests: Sequence[Event], own: Sequence[Event],
     noisy: bool,
 ) -> Lane | None:  # fmt: skip
     """Return the lane of a run; None where every step must be made one by one.
 
     Parameters
     ----------
-    tests, own : sequence of TestFunction
+    tests, own : sequence of Event
         All of the run, and those among them that the kind of problem brings.
     noisy : bool
         Round-off of Newton's method was noted.
@@ -115,13 +115,13 @@ class Lane(ABC):
     settings : Settings
     start : tuple (system, x, tangent)
         The first point of the run.
-    tests, others : sequence of TestFunction
+    tests, others : sequence of Event
         All, and those that the kernel does not know.
     noisy : bool
     """
 
     def __init__(
-        self, system: Any, settings: Settings, start: Start, tests: Sequence[TestFunction], others: Sequence[TestFunction],
+        self, system: Any, settings: Settings, start: Start, tests: Sequence[Event], others: Sequence[Event],
         noisy: bool,
     ) -> None:  # fmt: skip
         self.system, self.settings, self.noisy, self._start = system, settings, noisy, start
@@ -146,7 +146,7 @@ class Lane(ABC):
         )  # fmt: skip
 
     @staticmethod
-    def knows(test: TestFunction) -> bool:
+    def knows(test: Event) -> bool:
         """Return whether the kernel watches for what a test function, one of the kind of problem, looks for."""
         return test.asks is not None
 
@@ -260,7 +260,7 @@ class MeshLane(Lane):
         return True
 
     @staticmethod
-    def knows(test: TestFunction) -> bool:
+    def knows(test: Event) -> bool:
         """Return whether the kernel watches for what a test function, one of the kind of problem, looks for."""
         return test.asks is not None or test.still > 0
 
@@ -331,7 +331,7 @@ class Lanes:
         As in `lane_of`.
     """
 
-    def __init__(self, start: Start, tests: Sequence[TestFunction], own: Sequence[TestFunction]) -> None:
+    def __init__(self, start: Start, tests: Sequence[Event], own: Sequence[Event]) -> None:
         self._run = start, tests, own
         self._for: object = None
         self._known: Lane | None = None

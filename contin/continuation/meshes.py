@@ -19,7 +19,7 @@ from contin.core.newton import correct
 from contin.core.protocol import Carrier, Discretization, inner
 from contin.core.state import State
 from contin.core.step import Judgement, trial_of
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.accuracy import Accuracy, accuracy_of
 from contin.events.segment import Segment
@@ -97,12 +97,12 @@ class MeshPolicy:
     ----------
     steps : Steps
         How the steps of the run are made, with its settings.
-    tests : sequence of TestFunction
+    tests : sequence of Event
         Those that have the same sign on every mesh.
     """
 
     steps: Steps
-    tests: Sequence[TestFunction]
+    tests: Sequence[Event]
 
     def adapted(self, state: State, here: Callable[[], Trial]) -> Moved | None:
         """Return the state on a mesh that is adapted to it, if one serves; ``here`` returns the state's point."""

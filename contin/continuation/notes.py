@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from contin.collocation.switching import Switching
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.events.index import contradiction
 from contin.events.labelled import finding_of
 from contin.events.phase_loads import phase_loads
@@ -48,7 +48,7 @@ class Notes:
         ends = (trial[self.primary] for trial in (segment.before, segment.trial))
         self.add(f"{text} (between {self.primary} = {' and '.join(f'{end:.10g}' for end in ends)})")
 
-    def doubts(self, index: TestFunction | None, segment: Segment, found: list[SpecialPoint], doubt: str) -> None:
+    def doubts(self, index: Event | None, segment: Segment, found: list[SpecialPoint], doubt: str) -> None:
         """Note what the labelled points of a step do not explain: a change of the index or, without one, a doubt."""
         contradicts = contradiction(index, segment, found)
         if contradicts and not found:  # beside points, changes of the index are noted

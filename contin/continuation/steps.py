@@ -21,7 +21,7 @@ from contin.core.step import (
     longest_step,
     predict,
 )
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.segment import Place, Segment, SpecialPoint
 from contin.events.significance import STANDS, free_values, sense
@@ -68,13 +68,13 @@ class Steps:
     settings : Settings
     primary : str
         The parameter whose folds are told.
-    fold : TestFunction, optional
+    fold : Event, optional
         None where folds are not wanted.
     """
 
     settings: Settings
     primary: str
-    fold: TestFunction | None
+    fold: Event | None
 
     def attempt(self, state: State, here: Trial, step: float, made: Trial | None = None) -> tuple[Segment, Judgement]:
         """Make one step of a given length from the state's point, as far as it can be believed by itself.

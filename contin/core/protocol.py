@@ -21,7 +21,7 @@ from contin.problems.statement import Statement
 
 if TYPE_CHECKING:
     from contin.core.state import Stop
-    from contin.core.trial import TestFunction, Trial
+    from contin.core.trial import Event, Trial
     from contin.events.coefficient import Coefficient
     from contin.events.segment import Segment, SpecialPoint
     from contin.functions.batch import Batch
@@ -246,7 +246,7 @@ class Discretization(Equations, Protocol):
         """
         return None
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return the test functions that the kind brings, beyond folds and branch points.
 
         Their signs may differ between meshes. They ask ``trial.system``: the mesh changes along a branch.
@@ -254,7 +254,7 @@ class Discretization(Equations, Protocol):
         return []
 
     @property
-    def index(self) -> TestFunction | None:
+    def index(self) -> Event | None:
         """The test function whose value is the index of a point, of a problem with an energy."""
         return None
 
@@ -263,7 +263,7 @@ class Discretization(Equations, Protocol):
         return None
 
     @property
-    def size_of_solutions(self) -> TestFunction | None:
+    def size_of_solutions(self) -> Event | None:
         """The test function of the size of a solution, with a sign, where solutions can shrink onto others."""
         return None
 
@@ -296,11 +296,11 @@ class Discretization(Equations, Protocol):
         """Return the coefficient of the normal form at a special point."""
         return None
 
-    def events_on_folds(self) -> list[TestFunction]:
+    def events_on_folds(self) -> list[Event]:
         """Return the test functions of a curve of folds, beyond cusps and branch points."""
         return []
 
-    def events_on_curves(self) -> list[TestFunction]:
+    def events_on_curves(self) -> list[Event]:
         """Return the test functions of a curve along which one of `events` stays zero."""
         return []
 

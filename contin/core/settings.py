@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypedDict
@@ -11,7 +12,7 @@ from contin import checks, threads
 from contin.collocation.mesh import MeshControl
 from contin.core.newton import Newton
 from contin.core.protocol import Discretization
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.errors import ProblemError
 from contin.names import exact_text
 
@@ -40,10 +41,9 @@ class Settings:
         Parameters and functionals whose extrema along the branch are labelled (EX).
     trivial : str, optional
         A parameter or functional that vanishes on a known trivial branch only: the run ends where it changes sign.
-    test_functions : sequence of TestFunction
-        Further functions of a point whose zeros are labelled.
-    monitors : sequence of TestFunction
-        The same, by its first name.
+    events : sequence of Event
+        Further functions of a point whose zeros are labelled. ``test_functions`` and ``monitors`` are its first names, which
+        warn and will go.
     folds, branch_points : bool
         Look for folds, for branch points.
     errors : bool
@@ -81,7 +81,7 @@ class Settings:
     limits: Mapping[str, Sequence[float]] = field(default_factory=dict)
     zeros: Mapping[str, Sequence[float]] = field(default_factory=dict)
     trivial: str | None = None
-    monitors: Sequence[TestFunction] = ()
+    monitors: Sequence[Event] = ()
     folds: bool = True
     branch_points: bool = True
     errors: bool = True
@@ -90,9 +90,15 @@ class Settings:
     accuracy: float | None = None
     newton: Newton = field(default_factory=Newton)
     mesh: MeshControl = field(default_factory=MeshControl)
-    test_functions: Sequence[TestFunction] = ()
+    test_functions: Sequence[Event] = ()
     scales: Mapping[str, float] = field(default_factory=dict)
     extrema: Sequence[str] = ()
+    events: Sequence[Event] = ()
+
+    @property
+    def wanted(self) -> Sequence[Event]:
+        """The events that were asked for, by whichever name."""
+        return (*self.monitors, *self.test_functions, *self.events)
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -106,9 +112,11 @@ class Settings:
         for name in ("folds", "branch_points", "errors"):
             checks.truth(name, getattr(self, name))
         checks.names("extrema", self.extrema)
-        for name in ("test_functions", "monitors"):
-            for test in checks.sequence(name, getattr(self, name), "TestFunction"):
-                checks.instance(name, test, TestFunction, "a TestFunction")
+        for name in ("events", "test_functions", "monitors"):
+            for test in checks.sequence(name, getattr(self, name), "Event"):
+                checks.instance(name, test, Event, "an Event")
+            if name != "events" and getattr(self, name):
+                warnings.warn(f"{name}= is called events= now", DeprecationWarning, stacklevel=5)
         checks.instance("newton", self.newton, Newton, "a Newton")
         checks.instance("mesh", self.mesh, MeshControl, "a MeshControl")
 
@@ -172,7 +180,7 @@ class Options(TypedDict, total=False):
     limits: Mapping[str, Sequence[float]]
     zeros: Mapping[str, Sequence[float]]
     trivial: str | None
-    monitors: Sequence[TestFunction]
+    monitors: Sequence[Event]
     folds: bool
     branch_points: bool
     errors: bool
@@ -181,9 +189,10 @@ class Options(TypedDict, total=False):
     accuracy: float | None
     newton: Newton
     mesh: MeshControl
-    test_functions: Sequence[TestFunction]
+    test_functions: Sequence[Event]
     scales: Mapping[str, float]
     extrema: Sequence[str]
+    events: Sequence[Event]
 
 
 def settings_with(settings: Settings | None, options: Mapping[str, Any]) -> Settings:

@@ -58,10 +58,10 @@ class Trial:
 
     Examples
     --------
-    >>> from contin import AlgebraicProblem, TestFunction, solve, trace
+    >>> from contin import AlgebraicProblem, Event, solve, trace
     >>> parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
-    >>> half = TestFunction("UZ", "x = 0.5", lambda trial: trial.x[0] - 0.5)
-    >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)}, test_functions=[half])
+    >>> half = Event("UZ", "x = 0.5", lambda trial: trial.x[0] - 0.5)
+    >>> branch = trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)}, events=[half])
     >>> round(branch.labelled("UZ")[0]["a"], 10)
     0.25
     """
@@ -82,7 +82,7 @@ class Trial:
         self._linearize = linear if callable(linear) else None
         self._functionals: dict[str, float] | None = None
         self._discretization_error: float | None = None
-        self._values: dict[TestFunction, float] = {}
+        self._values: dict[Event, float] = {}
 
     @classmethod
     def without_tangent(cls, system: Discretization, x: Array) -> Trial:
@@ -121,7 +121,7 @@ class Trial:
         """Take the factors anew, bordered by ``row``; tangent and sign stay."""
         self._linear = dataclasses.replace(self.linear, factors=self.system.linearize(self.x, (row,))[1])
 
-    def value(self, test: TestFunction) -> float:
+    def value(self, test: Event) -> float:
         """Return the value of a test function, computed once: a point that two steps share has one value for both."""
         try:
             return self._values[test]
@@ -159,7 +159,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class TestFunction:
+class Event:
     """A function of a trial point whose zeros are special points.
 
     Attributes
@@ -199,7 +199,7 @@ class TestFunction:
     A label where the middle of the solution reaches 2:
 
     >>> import numpy as np
-    >>> hot = TestFunction("UZ", "hot", lambda trial: trial.system.evaluate(trial.x, np.array([0.5]))[0, 0] - 2.0)
+    >>> hot = Event("UZ", "hot", lambda trial: trial.system.evaluate(trial.x, np.array([0.5]))[0, 0] - 2.0)
     """
 
     __test__ = False  # for pytest: not a class of tests
@@ -228,14 +228,10 @@ class TestFunction:
 
         Examples
         --------
-        >>> TestFunction("UZ", "a", lambda trial: trial["a"]).passed(-1.0, 2.0)
+        >>> Event("UZ", "a", lambda trial: trial["a"]).passed(-1.0, 2.0)
         True
         """
         return after >= 0 if self.limit else sign_changed(before, after)
-
-
-#: The first name of the class, for programs that use it.
-Monitor = TestFunction
 
 
 def sign_changed(before: float, after: float) -> bool:

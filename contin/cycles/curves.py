@@ -15,7 +15,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.system import System
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.cycles.multiplier_curves import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.cycles.normal_forms import NormalForms
 from contin.cycles.round import Round
@@ -95,7 +95,7 @@ class DoublingCurve(Doubling, CycleCurve):
         """Return c."""
         return NormalForms(self.cycles, x).period_doubling()
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of a second multiplier -1, of generalized period doublings, and of folds."""
         return [
             *shrinking(self.cycles), second_doubling(), degenerate("GPD", "generalized period doubling"),
@@ -115,7 +115,7 @@ class TorusCurve(Pair, CycleCurve):
             return Coefficient(math.nan, math.nan, math.nan)
         return NormalForms(self.cycles, x[: self.base.size]).torus(self.angle(x))
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of strong resonances, Chenciner points, and folds."""
         return [*shrinking(self.cycles), *resonances(), degenerate("CH", "Chenciner"), _at_fold("LPTR", "fold-torus")]
 
@@ -124,7 +124,7 @@ def _curve(trial: Trial) -> CycleCurve:
     return cast(CycleCurve, trial.system)
 
 
-def _at_fold(label: str, name: str) -> TestFunction:
+def _at_fold(label: str, name: str) -> Event:
     """Return the test function of points where the cycle is at a fold, too: two multipliers are one, up to a square root."""
 
     def confirm(trial: Trial) -> bool:
@@ -134,4 +134,4 @@ def _at_fold(label: str, name: str) -> TestFunction:
         known = int(curve.cycles.autonomous) + own
         return len(exponents) > known and bool(np.sort(np.abs(exponents))[known] < _DOUBLE)
 
-    return TestFunction(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)
+    return Event(label, name, lambda trial: _curve(trial).fold(trial.x), confirm=confirm)

@@ -23,7 +23,7 @@ from contin.core.newton import Newton, correct
 from contin.core.protocol import Discretization
 from contin.core.rounding import changes_of_multipliers
 from contin.core.state import Reason, Stop
-from contin.core.trial import TestFunction, Trial, sign_changed
+from contin.core.trial import Event, Trial, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import frequency_of
@@ -178,14 +178,14 @@ def has_double_one(system: PeriodicCollocation, x: Array) -> bool:
 
 
 @functools.cache  # one for all steps: a point that two steps share has its value once
-def doubling(order: int = 1) -> TestFunction:
+def doubling(order: int = 1) -> Event:
     """Return the test function of period doublings: det(M + I), each factor divided by 1 + |multiplier|.
 
     With a symmetry of even order n, M being the map over one n-th of the period, the multiplier over the whole period is
     (-1)^n = 1 there: cycles of the same period branch off that have lost the symmetry.
     """
     label, name = ("PD", "period doubling") if order % 2 else ("BP", "symmetry breaking")
-    return TestFunction(label, name, _antiperiodic, search=_doublings, asks=_may_double, describe=_of_doubling)
+    return Event(label, name, _antiperiodic, search=_doublings, asks=_may_double, describe=_of_doubling)
 
 
 def _antiperiodic(trial: Trial) -> float:
@@ -265,7 +265,7 @@ def keep_off_one(segment: Segment) -> bool:
     return not _comes_near(segment, ONE)
 
 
-def _changes_on_finer_mesh(left: Trial, right: Trial, test: TestFunction, newton: Newton) -> bool:
+def _changes_on_finer_mesh(left: Trial, right: Trial, test: Event, newton: Newton) -> bool:
     """Return whether a test function changes its sign on the mesh halved, too; looked at where multipliers are in doubt."""
     system: Any = left.system
     if not any(system.is_drifted(trial.x) for trial in (left, right)):
@@ -303,14 +303,14 @@ def _parabola(places: Sequence[float], values: Sequence[float]) -> tuple[float, 
     return b - linear / (2 * square), square, middle - linear**2 / (4 * square)
 
 
-def _below(segment: Segment, knots: list[Place], test: TestFunction) -> list[Place]:
+def _below(segment: Segment, knots: list[Place], test: Event) -> list[Place]:
     """Return places of the other sign, found by following the dips between places of one sign."""
     dips = _dips(knots, [trial.value(test) for _, trial in knots])
     found = (_followed(segment, at, square, test) for at, square in dips)
     return [place for place in found if place is not None]
 
 
-def _followed(segment: Segment, at: float, square: float, test: TestFunction) -> Place | None:
+def _followed(segment: Segment, at: float, square: float, test: Event) -> Place | None:
     """Return a place near ``at`` where a function that dips towards zero has passed it; None where it turns before.
 
     ``square`` is about half its second derivative: by that and the value, the lowest place is no further off than the places
@@ -346,9 +346,9 @@ def critical_angle(system: PeriodicCollocation | MapSystem, point: Any, x: Array
     return float(abs(values[np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))].imag))
 
 
-def torus() -> TestFunction:
+def torus() -> Event:
     """Return the test function of torus bifurcations: the largest real part of the logarithm of a complex multiplier."""
-    return TestFunction("TR", "torus", hopf().function, search=_tori, asks=_may_twist)
+    return Event("TR", "torus", hopf().function, search=_tori, asks=_may_twist)
 
 
 def _may_twist(segment: Segment) -> bool:

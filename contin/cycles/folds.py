@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import signed_smallest
 from contin.defining.fold_curve import NORMAL, normal_product, shrinking
 
@@ -20,7 +20,7 @@ _REAL = 1e-12
 _NORMAL_OF_MAPS = 1e-14
 
 
-def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[TestFunction]:
+def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[Event]:
     """Return the test functions of points where a further multiplier is one, or another is -1, and of where cycles shrink.
 
     The change of g with the multiplier vanishes where a further one is one.
@@ -43,4 +43,4 @@ def events_on_folds(cycles: PeriodicCollocation | MapSystem) -> list[TestFunctio
         multipliers.imag[np.abs(multipliers.imag) <= _REAL * np.abs(multipliers)] = 0.0
         return signed_smallest(np.exp(-size) + multipliers)
 
-    return [*shrinking(cycles), TestFunction("R1", "resonance 1:1", further), TestFunction("LPPD", "fold-flip", flip)]
+    return [*shrinking(cycles), Event("R1", "resonance 1:1", further), Event("LPPD", "fold-flip", flip)]

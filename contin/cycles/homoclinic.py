@@ -17,7 +17,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray
 from contin.core.newton import correct
 from contin.core.state import Stop
-from contin.core.trial import TestFunction, Trial, linearization
+from contin.core.trial import Event, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.linalg.dense import eigenvalues
 from contin.linalg.orientation import first_least
@@ -81,9 +81,9 @@ def _number(value: complex) -> str:
 
 
 @functools.cache  # one for all runs
-def homoclinic() -> TestFunction:
+def homoclinic() -> Event:
     """Return the test function that ends a branch of cycles at a homoclinic orbit, unless the user has limited the period."""
-    return TestFunction("EP", "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD, still=STILL)
+    return Event("EP", "homoclinic orbit", _liveliness, terminal=True, unless=PERIOD, still=STILL)
 
 
 def _liveliness(trial: Trial) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.state import Reason, Stop
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.root import find_zero
 from contin.events.segment import Segment, SpecialPoint
@@ -41,7 +41,7 @@ _ON_AXIS = 1e-9
 
 
 #: The size of a cycle as a part of an earlier one of the run, with a sign.
-AMPLITUDE = TestFunction("HB", "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
+AMPLITUDE = Event("HB", "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
 
 
 def hopf_point_inside(system: CycleCollocation, segment: Segment) -> SpecialPoint | None:

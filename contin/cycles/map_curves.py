@@ -18,7 +18,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.system import System
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.cycles.map_normal_forms import period_doubling, torus
 from contin.cycles.multiplier_curves import Doubling, MultiplierCurve, Pair, degenerate, resonances, second_doubling
 from contin.defining.extended import Borders
@@ -80,7 +80,7 @@ class MapDoublingCurve(Doubling, MapCurve):
         """Return those of the underlying problem, and c."""
         return np.append(super().functionals(x), self.normal_form(x).value)
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of a second multiplier -1, and of generalized period doublings."""
         return [second_doubling(), degenerate("GPD", "generalized period doubling")]
 
@@ -101,7 +101,7 @@ class MapTorusCurve(Pair, MapCurve):
         *known, angle = super().functionals(x)
         return np.array([*known, self.normal_form(x).value, angle])
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of strong resonances and Chenciner points."""
         return [*resonances(), degenerate("CH", "Chenciner")]
 

@@ -11,7 +11,7 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Mask
 from contin.core.rounding import on_circle
 from contin.core.scales import Scales
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.cycles.floquet import critical_angle, doubled, doubling, torus, unstable
 from contin.cycles.folds import events_on_folds
 from contin.cycles.map_curves import MapDoublingCurve, MapTorusCurve
@@ -355,7 +355,7 @@ class MapSystem(Algebraic):
             return MapDoublingCurve(self), x
         return (MapTorusCurve(self), np.append(x, math.cos(critical_angle(self, point, x)))) if point.label == "TR" else None
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of period doublings and torus bifurcations."""
         return [doubling(), torus()]
 
@@ -365,7 +365,7 @@ class MapSystem(Algebraic):
         known: Batch = self.problem.batch("map")
         return known if type(self) is MapSystem and self.rounds == 1 else None
 
-    def events_on_folds(self) -> list[TestFunction]:
+    def events_on_folds(self) -> list[Event]:
         """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
         return events_on_folds(self)
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.state import Reason, Stop
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import CriticalCurve
 from contin.defining.fold_curve import normal_product, turns_back
 from contin.events.coefficient import Coefficient
@@ -109,12 +109,12 @@ class Pair(MultiplierCurve):
         return np.append(super().functionals(x), self.angle(x))
 
 
-def resonances() -> list[TestFunction]:
+def resonances() -> list[Event]:
     """Return the test functions of strong resonances on curves of a `Pair`."""
     return [_resonance(label, kappa) for label, kappa in RESONANCES.items()]
 
 
-def second_doubling() -> TestFunction:
+def second_doubling() -> Event:
     """Return the test function of a second multiplier -1: the derivative of g by the multiplier vanishes."""
 
     def double(trial: Trial) -> float:
@@ -122,12 +122,12 @@ def second_doubling() -> TestFunction:
         right, _, left = curve.null_vectors(trial.x)
         return normal_product(curve.starts(right[0]), curve.ends(left[0, 0]))
 
-    return TestFunction("R2", "resonance 1:2", double)
+    return Event("R2", "resonance 1:2", double)
 
 
-def degenerate(label: str, name: str) -> TestFunction:
+def degenerate(label: str, name: str) -> Event:
     """Return the test function of points where the coefficient of the normal form is zero."""
-    return TestFunction(
+    return Event(
         label, name, lambda trial: _curve(trial).normal_form(trial.x).signed,
         confirm=lambda trial: _curve(trial).normal_form(trial.x).vanishes,
     )  # fmt: skip
@@ -137,7 +137,7 @@ def _curve(trial: Trial) -> MultiplierCurve:
     return cast(MultiplierCurve, trial.system)
 
 
-def _resonance(label: str, kappa: float) -> TestFunction:
+def _resonance(label: str, kappa: float) -> Event:
     """Return the test function of the angle with this cosine: a strong resonance; the curve ends where the angle is 0 or pi.
 
     A test function that ends a run is positive on it. With a symmetry the angle may come to 0 or pi and go back: `_touched`.
@@ -151,11 +151,11 @@ def _resonance(label: str, kappa: float) -> TestFunction:
         return _touched(segment, test, distance)
 
     at_end = abs(kappa) == 1
-    test = TestFunction(label, name, distance, terminal=at_end, search=search if at_end else None)
+    test = Event(label, name, distance, terminal=at_end, search=search if at_end else None)
     return test
 
 
-def _touched(segment: Segment, test: TestFunction, distance: Callable[[Trial], float]) -> list[SpecialPoint] | None:
+def _touched(segment: Segment, test: Event, distance: Callable[[Trial], float]) -> list[SpecialPoint] | None:
     """Return the resonance where the angle has an extremum; None where there is none in a step.
 
     A symmetry makes a round of equal parts. Where the pair of half a round passes i and -i, that of the round comes to -1 and

@@ -22,7 +22,7 @@ from contin.core.rounding import on_circle
 from contin.core.scales import Scales
 from contin.core.state import Reason, Stop
 from contin.core.step import COLLAPSED
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.cycles.curves import DoublingCurve, TorusCurve
 from contin.cycles.floquet import critical_angle, doubled, doubling, keep_off_one, torus, unstable
 from contin.cycles.folds import events_on_folds
@@ -345,7 +345,7 @@ class PeriodicCollocation(Collocation):
             return DoublingCurve(self), x
         return (TorusCurve(self), np.append(x, math.cos(critical_angle(self, point, x)))) if point.label == "TR" else None
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
         return [doubling(self.order), torus()]
 
@@ -353,7 +353,7 @@ class PeriodicCollocation(Collocation):
         """Return whether no multiplier but the one that is 1 comes near 1: that is where cycles branch."""
         return keep_off_one(segment)
 
-    def events_on_folds(self) -> list[TestFunction]:
+    def events_on_folds(self) -> list[Event]:
         """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
         return events_on_folds(self)
 
@@ -587,12 +587,12 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
 
     # --- what the kind knows of its branches --------------------------------------------------------------------------
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return also that of homoclinic orbits."""
         return [*super().events(), homoclinic()]
 
     @property
-    def size_of_solutions(self) -> TestFunction:
+    def size_of_solutions(self) -> Event:
         """The amplitude: cycles can shrink onto an equilibrium."""
         return AMPLITUDE
 

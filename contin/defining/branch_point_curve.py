@@ -12,7 +12,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.system import System
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.defining.extended import FITS, Borders, Extended, cosine
 from contin.defining.fold_curve import shrinking
 from contin.events.bordered import BorderedMatrix
@@ -77,6 +77,6 @@ class BranchPointCurve(Extended):
         residual, factors = base.linearize(y, np.vstack([top, rows]), np.vstack([psi, columns[:, :-2]]))
         return np.concatenate([residual + x[-1] * psi, matrix.g]), factors
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return that of the end where cycles shrink onto an equilibrium."""
         return shrinking(self.base)

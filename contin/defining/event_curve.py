@@ -23,7 +23,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.differences import derivative
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.defining.extended import FITS, Borders, Extended
 from contin.defining.fold_curve import shrinking
 from contin.events.extrema import orthonormal
@@ -39,7 +39,7 @@ class EventCurve(Extended):
     base : System or Extended
         With one free parameter more than its curves need.
     function : callable
-        ``function(trial)``, as in `TestFunction`.
+        ``function(trial)``, as in `Event`.
     gradient : callable, optional
         ``gradient(system, x)`` returns the derivatives by x, shape (size,).
     borders : pair of ndarray, optional
@@ -123,7 +123,7 @@ class EventCurve(Extended):
         """Return F and e, and the factored bordered matrix; the row of e comes first among the border rows."""
         return self.with_own_rows(x, (self.gradient(x)[None], np.array([self._own_value(x)])), rows, columns)
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return that of the end where cycles shrink, and those of solutions that are special in another way, too."""
         others = [test for test in self.base.events_on_curves() if test.label != self.label]
         inside = [

@@ -14,7 +14,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.system import System
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.defining.extended import FITS, Borders, Extended
 from contin.defining.fold_curve import shrinking
 from contin.events.extrema import Stationarity, curvatures
@@ -74,7 +74,7 @@ class ExtremumCurve(Extended):
         found = self.stationarity(x)
         return self.with_own_rows(x, (found.gradients(), found.g), rows, columns)
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of extrema in one parameter more: the derivative by the held parameter vanishes, too.
 
         That along the curve vanishes where the curve turns, as well.
@@ -85,5 +85,5 @@ class ExtremumCurve(Extended):
             return float(system.stationarity(trial.x).by_held[0])
 
         name = self.objective
-        found = TestFunction("EX", name, slope, describe=lambda trial: curvatures(trial, name), column=name)
+        found = Event("EX", name, slope, describe=lambda trial: curvatures(trial, name), column=name)
         return [found, *shrinking(self.base)]

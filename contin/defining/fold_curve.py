@@ -22,7 +22,7 @@ from contin.arrays import Array
 from contin.core.protocol import Discretization
 from contin.core.state import Reason, Stop
 from contin.core.system import System
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.defining.extended import FITS, Borders, Extended, cosine
 from contin.events.interpolated import interpolated_zero
 from contin.events.segment import Segment, SpecialPoint
@@ -109,9 +109,9 @@ class FoldCurve(Extended):
         """The parameter of the folds."""
         return "" if self.base.on_curve else self.free[0]
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of cusps (w.F_zz v v = 0), of folds that meet a branch point (w.F_lambda = 0), and of the kind."""
-        cusp = TestFunction("CP", "cusp", _bend, search=lambda segment, _: None if _may_be_cusp(segment) else [])
+        cusp = Event("CP", "cusp", _bend, search=lambda segment, _: None if _may_be_cusp(segment) else [])
         return [cusp, _MEETS, *self.base.events_on_folds()]
 
 
@@ -177,10 +177,10 @@ def turns_back(trial: Trial, parameters: Any) -> bool:
 
 
 #: Where the fold meets a branch point: w.F_lambda = 0.
-_MEETS = TestFunction("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment))
+_MEETS = Event("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment))
 
 
-def shrinking(base: Discretization) -> list[TestFunction]:
+def shrinking(base: Discretization) -> list[Event]:
     """Return the test function of the end of a curve where cycles shrink onto an equilibrium; beyond it is itself.
 
     At the equilibrium the equations of the curve are singular, so the run ends a little before. Other solutions do not shrink.
@@ -191,7 +191,7 @@ def shrinking(base: Discretization) -> list[TestFunction]:
         return float(system.base.amplitude(trial.x[: system.base.size])) - _SHRUNK
 
     name = "the end, near a Hopf point where the cycles have no size"
-    return [TestFunction("EP", name, amplitude, terminal=True)] if base.size_of_solutions is not None else []
+    return [Event("EP", name, amplitude, terminal=True)] if base.size_of_solutions is not None else []
 
 
 def normal_product(v: Array, w: Array, noise: float = NORMAL) -> float:

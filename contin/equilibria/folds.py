@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import other_pairs
 
 
-def events_on_folds() -> list[TestFunction]:
+def events_on_folds() -> list[Event]:
     """Return those of a second eigenvalue zero (Bogdanov-Takens), and of a pair on the imaginary axis (zero-Hopf)."""
 
     def double_zero(trial: Trial) -> float:
@@ -26,6 +26,6 @@ def events_on_folds() -> list[TestFunction]:
         return other_pairs(np.delete(values, np.argmin(np.abs(values))))
 
     return [
-        TestFunction("BT", "Bogdanov-Takens", double_zero),
-        TestFunction("ZH", "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
+        Event("BT", "Bogdanov-Takens", double_zero),
+        Event("ZH", "zero-Hopf", lambda trial: others(trial)[0], confirm=lambda trial: others(trial)[1]),
     ]

@@ -15,7 +15,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.core.system import System
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import CriticalCurve, other_pairs, signed_smallest
 from contin.defining.extended import Borders
 from contin.equilibria.lyapunov import critical_pair, first_lyapunov
@@ -79,7 +79,7 @@ class HopfCurve(CriticalCurve):
         values = eigenvalues(self.matrix(x))
         return values[np.argsort(np.abs(values**2 + self.kappa(x)))[2:]]
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return those of Bogdanov-Takens, generalized Hopf (Bautin), zero-Hopf (fold-Hopf) and double Hopf points."""
 
         def curve(trial: Trial) -> HopfCurve:
@@ -104,9 +104,9 @@ class HopfCurve(CriticalCurve):
             return other_pairs(curve(trial).others(trial.x))[1]
 
         found = [
-            TestFunction("BT", "Bogdanov-Takens", kappa, terminal=True),
-            TestFunction("GH", "generalized Hopf", lyapunov, confirm=is_zero),
+            Event("BT", "Bogdanov-Takens", kappa, terminal=True),
+            Event("GH", "generalized Hopf", lyapunov, confirm=is_zero),
         ]
         if self.base.state_size > 2:
-            found += [TestFunction("ZH", "zero-Hopf", zero), TestFunction("HH", "double Hopf", pairs, confirm=has_pair)]
+            found += [Event("ZH", "zero-Hopf", zero), Event("HH", "double Hopf", pairs, confirm=has_pair)]
         return found

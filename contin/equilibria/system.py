@@ -14,7 +14,7 @@ from contin.core.protocol import Carrier, Discretization
 from contin.core.rounding import may_be_on_axis, off_axis
 from contin.core.scales import Scales, usual
 from contin.core.system import System
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.equilibria.dependence import dependence
 from contin.equilibria.folds import events_on_folds
 from contin.equilibria.given import check_given
@@ -401,7 +401,7 @@ class Algebraic(System):
 
     # --- what the kind knows of its branches --------------------------------------------------------------------------
 
-    def events(self) -> list[TestFunction]:
+    def events(self) -> list[Event]:
         """Return the test function of Hopf points, where the states move in time."""
         return [hopf()] if self.problem.dynamics and self.state_size > 1 else []
 
@@ -444,7 +444,7 @@ class Algebraic(System):
         frequency = critical_pair(self.jacobian(x), frequency_of(point)).frequency
         return HopfCurve(self.as_field(), size=frequency**2), np.append(x, 1.0)
 
-    def events_on_folds(self) -> list[TestFunction]:
+    def events_on_folds(self) -> list[Event]:
         """Return those of a second eigenvalue zero, or a pair on the imaginary axis."""
         return events_on_folds() if self.problem.dynamics else []
 

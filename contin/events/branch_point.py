@@ -16,12 +16,14 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.newton import Newton
-from contin.core.protocol import Discretization, inner
+from contin.core.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
 from contin.events.bordered import BorderedMatrix
-from contin.events.labelled import Finding
+from contin.events.labelled import Elsewhere, Finding
 from contin.linalg.orientation import ordered, oriented, oriented_along
 
+#: Cosine between the kernels of a branch point on two meshes, below which they are two points.
+_SAME_KERNEL = 0.9
 #: An update at least this part of the one before is expected to follow: between new Hessians convergence is linear.
 _LINEAR = 0.1
 #: Updates that small and no longer shrinking (by less than `_SHRINKING`) are round-off.
@@ -78,6 +80,40 @@ class BranchPoint(Finding):
     hessian: Array
     imperfection: float
     is_branch_point: ClassVar[bool] = True
+    has_equations: ClassVar[bool] = True
+
+    def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> BranchPoint:
+        """Return the branch point with the same kernel on another mesh.
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem
+        >>> from contin.lowlevel import Algebraic
+        >>> system = Algebraic(AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0}), ["a"])
+        >>> found = locate_branch_point(system, np.array([0.1, 0.1]))
+        >>> bool(np.abs(found.again(system, np.array, found.x, Newton()).x).max() < 1e-12)  # there is no other mesh
+        True
+        """
+        kernel = np.array([carry(vector) for vector in self.kernel])
+        found = locate_branch_point(system, carry(x), newton, kernel)
+        overlap = found.kernel @ (system.weights * kernel[:, : system.size]).T
+        if np.linalg.svd(overlap, compute_uv=False)[-1] < _SAME_KERNEL:
+            raise Elsewhere("another branch point was found on the finer mesh")
+        return found.along(system, carry(self.tangents[0])) if self.tangents else found
+
+    def round_off(self, system: Discretization, newton: Newton) -> Array:
+        """Return by how much free parameters change by round-off, shape (free parameters,).
+
+        Examples
+        --------
+        >>> from contin import AlgebraicProblem
+        >>> from contin.lowlevel import Algebraic
+        >>> system = Algebraic(AlgebraicProblem(lambda u, p: (u.x * (p.a - u.x),), ["x"], {"a": 0.0}), ["a"])
+        >>> bool(locate_branch_point(system, np.array([0.1, 0.1])).round_off(system, Newton()).max() < 1e-12)
+        True
+        """
+        found: Array = rounded_off(system, self, newton)[system.state_size :]
+        return found
 
     @property
     def leaving(self) -> tuple[Array, ...]:

@@ -22,7 +22,7 @@ from contin.arrays import Array
 from contin.core.differences import derivative
 from contin.core.protocol import Discretization
 from contin.core.system import System
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
 
 
@@ -105,7 +105,7 @@ def gradient_of(system: System, x: Array, column: str) -> Array:
     return found
 
 
-def extremum(column: str) -> TestFunction:
+def extremum(column: str) -> Event:
     """Return the test function of extrema of a column along a curve: its derivative along the tangent."""
 
     def slope(trial: Trial) -> float:
@@ -113,7 +113,7 @@ def extremum(column: str) -> TestFunction:
         gradient = system.column_gradient(trial.x, column)
         return _difference(trial, column) if gradient is None else float(gradient @ trial.tangent)
 
-    return TestFunction("EX", column, slope, describe=lambda trial: curvatures(trial, column), column=column)
+    return Event("EX", column, slope, describe=lambda trial: curvatures(trial, column), column=column)
 
 
 def _difference(trial: Trial, column: str) -> float:

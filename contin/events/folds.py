@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contin.core.protocol import inner
-from contin.core.trial import TestFunction, Trial, sign_changed
+from contin.core.trial import Event, Trial, sign_changed
 from contin.errors import ConvergenceError
 from contin.events.segment import Place, Segment, SpecialPoint
 from contin.events.significance import passed_before, senses
@@ -77,7 +77,7 @@ def ends_low(first: float, last: float, linear: float, square: float) -> bool:
     return min(first, last) < _BESIDE * square and inwards < _SHALLOW * square
 
 
-def may_turn(segment: Segment, fold: TestFunction) -> bool:
+def may_turn(segment: Segment, fold: Event) -> bool:
     """Return whether the primary parameter may turn inside a step, by its rates at both ends and their parabola.
 
     It may, too, where its sense cannot be told at an end, or is not that in which it went before.
@@ -96,13 +96,13 @@ class FoldSearch:
     Parameters
     ----------
     segment : Segment
-    fold : TestFunction
+    fold : Event
         The tangent's component of the primary parameter, which is its name.
     pitchfork : callable
         Returns the fold at the branch point inside the step, where the parameter turns right there, or None.
     """
 
-    def __init__(self, segment: Segment, fold: TestFunction, pitchfork: Callable[[], SpecialPoint | None]) -> None:
+    def __init__(self, segment: Segment, fold: Event, pitchfork: Callable[[], SpecialPoint | None]) -> None:
         self.segment, self.fold, self.pitchfork = segment, fold, pitchfork
         self._index = segment.trial.system.parameter_index(fold.name)
         self._outside = _OUTSIDE * segment.step

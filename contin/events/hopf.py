@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from contin.arrays import Array, ComplexArray, Indices
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.root import find_zero
 from contin.events.segment import Place, Segment, SpecialPoint
@@ -41,7 +41,7 @@ _BESIDE = 1e-3
 _ON_AXIS = 1e-7
 
 
-def hopf() -> TestFunction:
+def hopf() -> Event:
     """Return the test function of Hopf points: the largest real part of a complex eigenvalue. Several pairs are told apart."""
 
     def function(trial: Trial) -> float:
@@ -49,7 +49,7 @@ def hopf() -> TestFunction:
         parts = values[_is_complex(values)].real
         return float(parts.max()) if parts.size else float("nan")
 
-    return TestFunction("HB", "Hopf", function, search=hopf_points, asks=may_pass)
+    return Event("HB", "Hopf", function, search=hopf_points, asks=may_pass)
 
 
 def may_pass(segment: Segment) -> bool:
@@ -62,14 +62,14 @@ def critical_real_part(frequency: float) -> Callable[[Trial], float]:
     return _nearest(1j * frequency).function
 
 
-def _nearest(value: complex) -> TestFunction:
+def _nearest(value: complex) -> Event:
     """Return the test function of one pair: the real part of the eigenvalue that is nearest to a value."""
 
     def function(trial: Trial) -> float:
         values = _upper(trial)
         return float(values[np.argmin(np.abs(values - value))].real) if values.size else float("nan")
 
-    return TestFunction("HB", "Hopf", function, search=hopf_points)
+    return Event("HB", "Hopf", function, search=hopf_points)
 
 
 def _upper(trial: Trial) -> ComplexArray:

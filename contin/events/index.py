@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.events.labelled import finding_of
 from contin.events.segment import Segment, SpecialPoint
 
 
-def contradiction(index: TestFunction | None, segment: Segment, special: Iterable[SpecialPoint]) -> str:
+def contradiction(index: Event | None, segment: Segment, special: Iterable[SpecialPoint]) -> str:
     """Return how the index over a step contradicts its special points, as a clause; "" where it does not.
 
     It changes at special points only, by no more than the dimension of what vanishes there. A larger change means that

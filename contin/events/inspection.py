@@ -19,7 +19,7 @@ from contin.arrays import Array
 from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.state import Reason, Stop
-from contin.core.trial import Linearization, TestFunction, Trial
+from contin.core.trial import Event, Linearization, Trial
 from contin.events.branch_points import BranchPointSearch
 from contin.events.folds import FoldSearch
 from contin.events.labelled import finding_of
@@ -82,11 +82,11 @@ class Inspection:
     settings : Settings
     start : tuple (system, x, tangent)
         The first point of the run, to recognise a closed branch.
-    fold : TestFunction, optional
+    fold : Event, optional
         The tangent's component of the primary parameter; None where folds are not looked for.
     """
 
-    def __init__(self, segment: Segment, settings: Settings, start: Start, fold: TestFunction | None) -> None:
+    def __init__(self, segment: Segment, settings: Settings, start: Start, fold: Event | None) -> None:
         self.segment, self.settings, self.start, self.fold = segment, settings, start, fold
         self.branch_points = BranchPointSearch(segment)
         self._found: list[SpecialPoint] | None = None
@@ -115,7 +115,7 @@ class Inspection:
             what = _STRAYS
         return "" if located else what
 
-    def strays(self, tests: Iterable[TestFunction]) -> str:
+    def strays(self, tests: Iterable[Event]) -> str:
         """Return why the step may have left its branch by its folds and, where branch points are not looked for, by its sign.
 
         Where the parameter turns on the branch, a fold is located. The determinant changes its sign where branches cross,
@@ -138,7 +138,7 @@ class Inspection:
 
     # --- special points ------------------------------------------------------------------------------------------
 
-    def special_points(self, tests: Iterable[TestFunction]) -> list[SpecialPoint]:
+    def special_points(self, tests: Iterable[Event]) -> list[SpecialPoint]:
         """Return the special points inside the step, in order; they are looked for once.
 
         Raises
@@ -150,7 +150,7 @@ class Inspection:
             self._found = self._searched(tests)
         return self._found
 
-    def _searched(self, tests: Iterable[TestFunction]) -> list[SpecialPoint]:
+    def _searched(self, tests: Iterable[Event]) -> list[SpecialPoint]:
         found: list[SpecialPoint] = []
         home = self._home
         if home is not None:
@@ -207,7 +207,7 @@ class Inspection:
 
     # --- zeros of test functions ---------------------------------------------------------------------------------
 
-    def _zeros(self, test: TestFunction, crossings: list[SpecialPoint]) -> list[SpecialPoint]:
+    def _zeros(self, test: Event, crossings: list[SpecialPoint]) -> list[SpecialPoint]:
         """Return the zeros of a test function, looked for between the folds. At a fold or branch point they lie right there."""
         if test.asks is not None and not test.asks(self.segment):
             return []
@@ -234,24 +234,24 @@ class Inspection:
                 break
         return found
 
-    def _coincides(self, test: TestFunction, point: SpecialPoint) -> bool:
+    def _coincides(self, test: Event, point: SpecialPoint) -> bool:
         """Return whether a test function vanishes at a special point of the step."""
         if self._at_the_start(point) or not point.is_located:
             return False
         largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
         return bool(abs(point.trial.value(test)) <= _COINCIDENT * largest)
 
-    def _nearly(self, test: TestFunction, crossings: list[SpecialPoint]) -> SpecialPoint | None:
+    def _nearly(self, test: Event, crossings: list[SpecialPoint]) -> SpecialPoint | None:
         """Return the branch point at which a test function vanishes up to the discretization: nothing is located beside it."""
         largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
         return next((point for point in crossings if abs(point.trial.value(test)) <= _NEARLY * largest), None)
 
-    def _at_special(self, test: TestFunction, point: SpecialPoint) -> SpecialPoint:
+    def _at_special(self, test: Event, point: SpecialPoint) -> SpecialPoint:
         """Return the zero of a test function that lies at a special point."""
         details = None if test.describe is None else test.describe(point.trial)
         return SpecialPoint(point.at, test.label, test.name, point.trial, stop_of(test), details, test, same_as=point)
 
-    def _pieces(self, test: TestFunction, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
+    def _pieces(self, test: Event, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
         """Return the pieces of the step between the folds, without what is right beside some special points."""
         segment, aside = self.segment, _BESIDE * self.segment.step
         between = self._looked_at(test, self._knots) if test.looks else self._knots
@@ -266,7 +266,7 @@ class Inspection:
         pairs = itertools.pairwise(knots)
         return [(left, right) for left, right in pairs if not any(left[0] < at < right[0] for at in cut)]
 
-    def _looked_at(self, test: TestFunction, knots: list[Place]) -> list[Place]:
+    def _looked_at(self, test: Event, knots: list[Place]) -> list[Place]:
         """Return the knots and, where a test function changes its sign inside the step more than once, places between them."""
         inside = [self.segment.step * part / (test.looks + 1) for part in range(1, test.looks + 1)]
         known = [
@@ -313,7 +313,7 @@ class Inspection:
             point = self.branch_points.simple
             if self._is_home(point):
                 return dataclasses.replace(point, label="EP", name="trivial branch", stop=stop)
-        test = TestFunction("EP", "trivial branch", lambda there: there[name], terminal=True)
+        test = Event("EP", "trivial branch", lambda there: there[name], terminal=True)
         point = segment.locate(test, (segment.low, before), (segment.step, trial))
         if self._is_home(point):
             return dataclasses.replace(point, stop=stop)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -89,6 +90,7 @@ class InterpolatedZero(Finding):
     points: Array
     functions: Functions
     newton_error: float
+    has_equations: ClassVar[bool] = True
 
     @property
     def noise(self) -> Array:
@@ -96,7 +98,17 @@ class InterpolatedZero(Finding):
         nearest, system = int(np.abs(self.window.places - self.at).argmin()), self.trial.system
         return rounded_off(system, self.points[nearest], (system.weights * self.window.state.tangent,))
 
-    def again(self, system: Discretization, carry: Carrier, newton: Newton) -> InterpolatedZero:
+    def there(self, system: Discretization, tangent: Array) -> Trial:
+        """Return the point, with the tangent of the polynomial."""
+        return self.trial
+
+    def split(self, system: Discretization) -> Array:
+        """Return the error that Newton's method, or round-off, has left of the points around it."""
+        left = self.newton_error * (1 + np.abs(self.trial.x[system.state_size :]))
+        found: Array = np.maximum(left, self.noise[system.state_size :])
+        return found
+
+    def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> InterpolatedZero:
         """Return the same zero on another mesh, with another number of nodes: the change is the error of both.
 
         Raises

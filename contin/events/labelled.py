@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import numpy as np
+
 from contin.arrays import Array
+from contin.core.newton import Newton
+from contin.core.protocol import Carrier, Discretization
+from contin.core.trial import Linearization, Trial
+from contin.errors import ConvergenceError
+
+
+class Elsewhere(ConvergenceError):
+    """What was found again is another point, or nothing: the one that was looked for is not there."""
 
 
 class Finding:
@@ -12,6 +22,8 @@ class Finding:
 
     #: Branches cross there.
     is_branch_point: ClassVar[bool] = False
+    #: It was not located.
+    is_lost: ClassVar[bool] = False
     #: Dimension of the kernel beyond the tangent of the branch.
     nullity = 1
 
@@ -19,6 +31,32 @@ class Finding:
     def leaving(self) -> tuple[Array, ...]:
         """Unit tangents of the branches that meet there, first that of the branch it was found on."""
         return ()
+
+    #: Whether equations of its own locate it again, and not those of a test function.
+    has_equations: ClassVar[bool] = False
+
+    def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> Any:
+        """Return the same finding on another mesh, to which ``carry`` takes x.
+
+        Raises
+        ------
+        ConvergenceError
+            It was not found, or another one was.
+        """
+        raise NotImplementedError(f"a {type(self).__name__} has no equations")
+
+    def there(self, system: Discretization, tangent: Array) -> Trial:
+        """Return the point that was found, with a tangent."""
+        own: Any = self
+        return Trial(system, own.x, Linearization(tangent, np.nan))
+
+    def round_off(self, system: Discretization, newton: Newton) -> Array | float:
+        """Return by how much free parameters are off where Newton's method ends by round-off, shape (further unknowns,)."""
+        return 0.0
+
+    def split(self, system: Discretization) -> Array | float:
+        """Return by how much free parameters differ between the finding and what it may consist of, (further unknowns,)."""
+        return 0.0
 
     @property
     def is_simple_branch_point(self) -> bool:

@@ -22,7 +22,7 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.newton import Newton
-from contin.core.protocol import Discretization, inner
+from contin.core.protocol import Carrier, Discretization, inner
 from contin.errors import ConvergenceError
 from contin.events.labelled import Finding
 from contin.linalg.orientation import canonical_basis, ordered, oriented, oriented_along
@@ -94,6 +94,22 @@ class MultiplePoint(Finding):
     continuum: bool = False
     spread: float = 0.0
     is_branch_point: ClassVar[bool] = True
+    has_equations: ClassVar[bool] = True
+
+    @property
+    def is_lost(self) -> bool:  # type: ignore[override]
+        """It was bracketed only."""
+        return self.x is None
+
+    def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> MultiplePoint:
+        """Return the point with a kernel of the same dimension on another mesh."""
+        home = system.weights * carry(self.tangents[0])
+        return locate_multiple_point(system, carry(x), home, self.dimension, newton)
+
+    def split(self, system: Discretization) -> Array:
+        """Return by how much free parameters differ between it and the simple branch points that it may consist of."""
+        found: Array = self.spread * np.abs(self.tangents[0][system.state_size :])
+        return found
 
     @property
     def nullity(self) -> int:  # type: ignore[override]

@@ -15,11 +15,10 @@ from contin.core.settings import Settings
 from contin.core.settling import ROUNDS
 from contin.core.state import standing_at
 from contin.core.step import located
-from contin.core.trial import Linearization, TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
-from contin.events.branch_point import BranchPoint, locate_branch_point, rounded_off
-from contin.events.interpolated import InterpolatedZero
-from contin.events.multiple_point import MultiplePoint, locate_multiple_point
+from contin.events.branch_point import BranchPoint, locate_branch_point
+from contin.events.labelled import Elsewhere, Finding, finding_of
 from contin.events.segment import SpecialPoint
 from contin.linalg.factors import Factors
 
@@ -28,8 +27,6 @@ _FAR = 0.05
 #: Jumps of second derivatives at mesh points, relative to the largest, that show a corner where halving the mesh leaves more
 #: than the second number of them. Smooth solutions leave a half at degree 2, a quarter at degree 3.
 BENT, _FALLS = 1e-4, 0.7
-#: Cosine between the kernels of a branch point on two meshes, below which they are two points.
-_SAME_KERNEL = 0.9
 #: Meshes are halved at most so often: each halving divides the error by 2^(2 d), 16 to 65536.
 _HALVINGS = 4
 #: An error is given as no less than so many units in the last place of the largest parameter.
@@ -68,10 +65,6 @@ class Refined:
     is_lost: bool = False
 
 
-class _Elsewhere(ConvergenceError):
-    """What was found again is another point, or nothing: the one that was looked for is not there."""
-
-
 #: A special point on another mesh: the point, its details, and how far from it along the branch its place may be.
 _Found = tuple[Trial, Any, float]
 
@@ -86,7 +79,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     """
     trial, details, last = point.trial, point.details, np.inf
     errors = dict.fromkeys(trial.system.free, np.nan)
-    if isinstance(details, MultiplePoint) and details.x is None:
+    if finding_of(details).is_lost:
         return Refined(trial, errors, details, is_lost=True)
     try:
         trial, details, left = _on_switches(point, (trial, details, 0.0), settings.newton)
@@ -101,19 +94,18 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
             again = _again(point, trial, details, (system, carry), settings.newton)
             better, found, left = _on_switches(point, again, settings.newton)
         except ConvergenceError as error:
-            is_lost = last == np.inf and isinstance(error, _Elsewhere)
+            is_lost = last == np.inf and isinstance(error, Elsewhere)
             break
         system = better.system
         steps = np.abs(better.x[system.state_size :] - trial.x[coarse.state_size :])
         size = 1 + np.abs(better.x[system.state_size :])
         steps = np.maximum(steps, _UNITS * np.finfo(float).eps * size.max())
-        if isinstance(found, BranchPoint):
-            left = left + rounded_off(system, found, settings.newton)[system.state_size :]
+        left = left + finding_of(found).round_off(system, settings.newton)
         if np.any(steps > _FAR * size) or np.max(steps / size) > last:
             is_lost = last == np.inf
             break
         settled, steps = np.maximum(settings.mesh.tolerance * size, left) >= steps, steps + left
-        known = steps + _split(found, system)  # a curve of branch points has one unknown more
+        known = steps + finding_of(found).split(system)  # a curve of branch points has one unknown more
         sizes = known[: len(system.free)] * system.free_scales
         errors, last = dict(zip(system.free, map(float, sizes))), np.max(steps / size)
         if finer is not None and _is_bent(trial, better):
@@ -126,7 +118,7 @@ def refined(point: SpecialPoint, settings: Settings) -> Refined:
     return Refined(trial, _with_cut_off(errors, trial, point.test, settings), details, is_lost)
 
 
-def _with_cut_off(errors: dict[str, float], trial: Trial, test: TestFunction | None, settings: Settings) -> dict[str, float]:
+def _with_cut_off(errors: dict[str, float], trial: Trial, test: Event | None, settings: Settings) -> dict[str, float]:
     """Return the errors of the free parameters, and what cutting off an infinite time adds to them.
 
     A special point moves along the branch, too, to where its test function vanishes again, a first point to where the primary
@@ -138,7 +130,7 @@ def _with_cut_off(errors: dict[str, float], trial: Trial, test: TestFunction | N
         return errors
     if test is None:
         primary = settings.primary or system.free[0]
-        test = TestFunction("EP", "start", lambda trial: trial[primary])
+        test = Event("EP", "start", lambda trial: trial[primary])
     if test.label != "LP":
         size = float(np.abs(along).max())
         slope = _change(test, trial, along * (_ASIDE / size)) * size
@@ -149,7 +141,7 @@ def _with_cut_off(errors: dict[str, float], trial: Trial, test: TestFunction | N
     return {name: error + float(more) for (name, error), more in zip(errors.items(), added)}
 
 
-def _change(test: TestFunction, trial: Trial, move: Array) -> float:
+def _change(test: Event, trial: Trial, move: Array) -> float:
     """Return by how much a test function changes from a point to one beside it, over the distance of differences."""
     ends = [test.function(Trial.without_tangent(trial.system, trial.x + way * move)) for way in (1, -1)]
     return (ends[0] - ends[1]) / (2 * _ASIDE)
@@ -191,19 +183,6 @@ def _on_switches(point: SpecialPoint, found: _Found, newton: Newton) -> tuple[Tr
     return trial, details, moves
 
 
-def _split(details: Any, system: Discretization) -> Any:
-    """Return by how much free parameters differ between a multiple point and the simple ones that it may consist of.
-
-    Of a zero that was interpolated: the error that Newton's method, or round-off, has left of the points around it.
-    """
-    if isinstance(details, InterpolatedZero):
-        left = details.newton_error * (1 + np.abs(details.trial.x[system.state_size :]))
-        return np.maximum(left, details.noise[system.state_size :])
-    if not isinstance(details, MultiplePoint):
-        return 0.0
-    return details.spread * np.abs(details.tangents[0][system.state_size :])
-
-
 def _again(point: SpecialPoint, trial: Trial, details: Any, finer: tuple[Discretization, Carrier], newton: Newton) -> _Found:
     """Return the special point and its details on another mesh.
 
@@ -213,38 +192,29 @@ def _again(point: SpecialPoint, trial: Trial, details: Any, finer: tuple[Discret
         It was not found, or another one was.
     """
     system, carry = finer
-    if isinstance(details, MultiplePoint):
-        home = system.weights * carry(details.tangents[0])
-        again = locate_multiple_point(system, carry(trial.x), home, details.dimension, newton)
-        assert again.x is not None
-        return Trial(system, again.x, Linearization(carry(trial.tangent), np.nan)), again, 0.0
-    if isinstance(details, InterpolatedZero):
-        zero = details.again(system, carry, newton)
-        return zero.trial, zero, 0.0
-    if isinstance(details, BranchPoint) or (point.label == "BP" and point.test is None):
-        found = _branch_point_again(system, carry, trial.x, details, newton)
-        return Trial(system, found.x, Linearization(carry(trial.tangent), np.nan)), found, 0.0
+    known = _NEAREST if details is None and point.label == "BP" and point.test is None else finding_of(details)
+    if known.has_equations:
+        found = known.again(system, carry, trial.x, newton)
+        return found.there(system, carry(trial.tangent)), found, 0.0
     zero_again, apart = _zero_again(system, carry(trial.x), carry(trial.tangent), point.test, newton)
     return zero_again, details, apart
 
 
-def _branch_point_again(
-    system: Discretization, carry: Carrier, x: Array, details: BranchPoint | None, newton: Newton
-) -> BranchPoint:
-    """Return the branch point with the same kernel on another mesh; the nearest one where no kernel is known."""
-    if details is None:
+class _Nearest(Finding):
+    """The branch point nearest to a point, where no kernel is known."""
+
+    has_equations = True
+
+    def again(self, system: Discretization, carry: Carrier, x: Array, newton: Newton) -> BranchPoint:
+        """Return that on another mesh."""
         return locate_branch_point(system, carry(x), newton)
-    kernel = np.array([carry(vector) for vector in details.kernel])
-    found = locate_branch_point(system, carry(x), newton, kernel)
-    overlap = found.kernel @ (system.weights * kernel[:, : system.size]).T
-    if np.linalg.svd(overlap, compute_uv=False)[-1] < _SAME_KERNEL:
-        raise _Elsewhere("another branch point was found on the finer mesh")
-    return found.along(system, carry(details.tangents[0])) if details.tangents else found
 
 
-def _zero_again(
-    system: Discretization, x: Array, tangent: Array, test: TestFunction | None, newton: Newton
-) -> tuple[Trial, float]:
+#: Stands for what a first point that is a branch point has found: nothing yet.
+_NEAREST = _Nearest()
+
+
+def _zero_again(system: Discretization, x: Array, tangent: Array, test: Event | None, newton: Newton) -> tuple[Trial, float]:
     """Return the zero of a test function near x, by the secant method along the tangent; without one, x corrected.
 
     With how far off it may lie: where round-off of the function ends the secant method, the sign of the function decides.
@@ -305,4 +275,4 @@ def _known_to(function: Callable[[float], float]) -> float:
         if before[0] * before[1] < 0 and np.all(values / before > _GROWS):
             return apart
         apart *= _WIDER
-    raise _Elsewhere("the point was not found again on the finer mesh")
+    raise Elsewhere("the point was not found again on the finer mesh")

@@ -17,7 +17,7 @@ from contin.core.settling import settled
 from contin.core.small import corrected_small
 from contin.core.state import Reason, State, Stop
 from contin.core.step import located
-from contin.core.trial import Linearization, TestFunction, Trial, linearization
+from contin.core.trial import Event, Linearization, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.root import find_zero
 
@@ -44,13 +44,13 @@ class SpecialPoint:
     at : float
         Distance from the beginning of the step, along the tangent there.
     label, name : str
-        As in `TestFunction`.
+        As in `Event`.
     trial : Trial
     stop : Stop, optional
         The run ends here.
     details : object
         As in `contin.Point`.
-    test : TestFunction, optional
+    test : Event, optional
         Vanishes here.
     same_as : SpecialPoint, optional
         The fold or branch point that lies at the same place and is located better.
@@ -68,7 +68,7 @@ class SpecialPoint:
     trial: Trial
     stop: Stop | None = None
     details: Any = None
-    test: TestFunction | None = None
+    test: Event | None = None
     same_as: SpecialPoint | None = None
     errors: Mapping[str, float] | None = None
     is_lost: bool = False
@@ -200,7 +200,7 @@ class Segment:
             return self.before
         return Trial(state.system, state.x, Linearization(state.tangent, state.sign))
 
-    def locate(self, test: TestFunction, left: Place, right: Place, guess: float | None = None) -> SpecialPoint:
+    def locate(self, test: Event, left: Place, right: Place, guess: float | None = None) -> SpecialPoint:
         """Return the zero of a test function between two places; where location fails, the second one, which is not located."""
         (a, first), (b, last) = left, right
         ends, is_located = (first.value(test), last.value(test)), True
@@ -219,7 +219,7 @@ class Segment:
         details = None if test.describe is None else test.describe(there)
         return SpecialPoint(at, test.label, test.name, there, stop_of(test), details, test, is_located=is_located)
 
-    def _held(self, test: TestFunction, left: Place, right: Place) -> Place | None:
+    def _held(self, test: Event, left: Place, right: Place) -> Place | None:
         """Return the place between two where a free parameter has a value, with that held; None if it is not found.
 
         It begins where the cubic has the value. It finds no other place than one between the two, near the cubic.
@@ -265,7 +265,7 @@ class Segment:
         return Trial(system, small.x, Linearization(side * small.tangent, side * small.sign), small.iterations, small.error)
 
 
-def stop_of(test: TestFunction) -> Stop | None:
+def stop_of(test: Event) -> Stop | None:
     """Return the reason why a run ends at a zero of a test function; None where it goes on."""
     if not test.terminal:
         return None

@@ -17,7 +17,7 @@ from contin.arrays import Array
 from contin.core.newton import UNITS, Newton, correct
 from contin.core.protocol import Discretization
 from contin.core.step import CLEAR, trial_of
-from contin.core.trial import TestFunction, Trial, linearization
+from contin.core.trial import Event, Trial, linearization
 from contin.errors import ConvergenceError
 from contin.events.segment import Segment, SpecialPoint
 from contin.linalg.orientation import oriented
@@ -35,17 +35,17 @@ _DRAWS = 3
 _AGREES = 0.5
 
 
-def sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
+def sense(trial: Trial, fold: Event, newton: Newton) -> float:
     """Return the sign of the primary parameter's rate at a trial, computed once; zero where it is not significant."""
     return trial.value(_sense_function(fold, newton))
 
 
 @functools.lru_cache(maxsize=8)
-def _sense_function(fold: TestFunction, newton: Newton) -> TestFunction:
-    return TestFunction(fold.label, f"sense of {fold.name}", lambda trial: _sense(trial, fold, newton))
+def _sense_function(fold: Event, newton: Newton) -> Event:
+    return Event(fold.label, f"sense of {fold.name}", lambda trial: _sense(trial, fold, newton))
 
 
-def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
+def _sense(trial: Trial, fold: Event, newton: Newton) -> float:
     rate = trial.value(fold)
     if not abs(rate) < CLEAR:
         return float(np.sign(rate))
@@ -61,7 +61,7 @@ def _sense(trial: Trial, fold: TestFunction, newton: Newton) -> float:
     return float(np.sign(rate)) if significant else 0.0
 
 
-def _noise(trial: Trial, fold: TestFunction) -> float:
+def _noise(trial: Trial, fold: Event) -> float:
     """Return the rate of the primary parameter that is round-off, without a mesh.
 
     Each equation is evaluated with an error as large as one unit in the last place of x makes, of its own sign: discretized
@@ -109,7 +109,7 @@ def on_finer_mesh(trial: Trial, newton: Newton) -> Trial | None:
         return None
 
 
-def senses(segment: Segment, fold: TestFunction) -> tuple[float, float]:
+def senses(segment: Segment, fold: Event) -> tuple[float, float]:
     """Return the sense at both ends of a step.
 
     Beside a branch point or Hopf point tangents are blurred: there the parameter itself must have gone the same way.
@@ -121,7 +121,7 @@ def senses(segment: Segment, fold: TestFunction) -> tuple[float, float]:
     return (0.0 if gone * first < -STANDS * (1 + abs(before.x[at])) else first), last
 
 
-def passed_before(segment: Segment, fold: TestFunction) -> list[SpecialPoint]:
+def passed_before(segment: Segment, fold: Event) -> list[SpecialPoint]:
     """Return the fold that a step has behind it, where the parameter goes by more than round-off against its last sense.
 
     A fold on which the parameter changes by less than round-off over a whole step is not seen in that step: it lies on a
@@ -135,7 +135,7 @@ def passed_before(segment: Segment, fold: TestFunction) -> list[SpecialPoint]:
     return [_behind_plateau(segment, fold)] if moved and state.sense * behind < 0 and state.sensed is not None else []
 
 
-def _behind_plateau(segment: Segment, fold: TestFunction) -> SpecialPoint:
+def _behind_plateau(segment: Segment, fold: Event) -> SpecialPoint:
     """Return the beginning of a step as a fold; its errors are the way since the parameter's sense was told last."""
     assert segment.state.sensed is not None
     lengths = np.abs(free_values(segment.trial) - segment.state.sensed)

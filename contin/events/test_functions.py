@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from contin.core.trial import TestFunction, Trial
+from contin.core.trial import Event, Trial
 from contin.events.coefficient import Coefficient
 from contin.events.segment import Place, Segment, SpecialPoint
 from contin.names import value_names
@@ -15,7 +15,7 @@ from contin.names import value_names
 _OUTSIDE = 1e-6
 
 
-def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
+def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[Event]:
     """Return the test functions of points where a parameter or functional takes given values (AUTO's UZ).
 
     A value that is given twice counts once. Different values have different names.
@@ -23,11 +23,11 @@ def user_zeros(zeros: Mapping[str, Sequence[float]]) -> list[TestFunction]:
     return [_user_zero(name, value, text) for name, values in zeros.items() for value, text in value_names(values).items()]
 
 
-def _user_zero(name: str, value: float, text: str) -> TestFunction:
-    return TestFunction("UZ", f"{name} = {text}", lambda trial: trial[name] - value, column=name, value=value)
+def _user_zero(name: str, value: float, text: str) -> Event:
+    return Event("UZ", f"{name} = {text}", lambda trial: trial[name] - value, column=name, value=value)
 
 
-def limits(intervals: Mapping[str, Sequence[float]]) -> list[TestFunction]:
+def limits(intervals: Mapping[str, Sequence[float]]) -> list[Event]:
     """Return the test functions that end a run where a parameter or functional reaches an end of its interval."""
     result = []
     for name, (low, high) in intervals.items():
@@ -36,16 +36,16 @@ def limits(intervals: Mapping[str, Sequence[float]]) -> list[TestFunction]:
     return result
 
 
-def _limit(name: str, value: float, text: str, side: int) -> TestFunction:
+def _limit(name: str, value: float, text: str, side: int) -> Event:
     """Return the one of the upper (``side`` +1) or lower (-1) end."""
 
     def function(trial: Trial) -> float:
         return side * (trial[name] - value)
 
-    return TestFunction("EP", f"{name} = {text}", function, terminal=True, limit=True, column=name, value=value)
+    return Event("EP", f"{name} = {text}", function, terminal=True, limit=True, column=name, value=value)
 
 
-def within_limits(segment: Segment, points: list[SpecialPoint], ends: Sequence[TestFunction]) -> list[SpecialPoint]:
+def within_limits(segment: Segment, points: list[SpecialPoint], ends: Sequence[Event]) -> list[SpecialPoint]:
     """Return the special points of a step up to where it first leaves the limits, which may have been seen at a point only.
 
     A quantity that passes its limit and comes back in one step has the same sign at both ends of the step.
@@ -62,9 +62,9 @@ def within_limits(segment: Segment, points: list[SpecialPoint], ends: Sequence[T
     return points
 
 
-def fold(name: str) -> TestFunction:
+def fold(name: str) -> Event:
     """Return the test function of folds with respect to a free parameter: its component of the tangent (AUTO's LP)."""
-    return TestFunction("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name)
+    return Event("LP", name, lambda trial: trial.tangent[trial.system.parameter_index(name)], column=name)
 
 
 def with_normal_form(point: SpecialPoint, found: Coefficient, coarse: Coefficient) -> SpecialPoint:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from contin.core.protocol import Discretization
 from contin.core.settings import Settings
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.events.folds import may_turn
 from contin.events.inspection import Inspection
 from contin.events.trivial import crossed
@@ -23,9 +23,9 @@ Entry = Callable[[Inspection], bool]
 def watch_list(
     system: Discretization,
     settings: Settings,
-    tests: Sequence[TestFunction],
-    fold: TestFunction | None,
-    index: TestFunction | None,
+    tests: Sequence[Event],
+    fold: Event | None,
+    index: Event | None,
 ) -> list[Entry]:
     """Return the entries of a run; each returns whether it asks for a closer look at a step.
 
@@ -34,8 +34,8 @@ def watch_list(
     system : Discretization
         Of the first point; others of the run have the same free parameters.
     settings : Settings
-    tests : sequence of TestFunction
-    fold, index : TestFunction, optional
+    tests : sequence of Event
+    fold, index : Event, optional
         The rate of the primary parameter, and the index of a variational problem.
     """
     held = [test for test in tests if test.holds_one_of(system.free)]
@@ -63,7 +63,7 @@ def _determinant(counts: bool) -> Entry:
     return asks
 
 
-def _value(place: int, test: TestFunction) -> Entry:
+def _value(place: int, test: Event) -> Entry:
     """That of a value of a free parameter, the one at this place."""
     value = test.value
     assert value is not None
@@ -79,7 +79,7 @@ def _value(place: int, test: TestFunction) -> Entry:
     return asks
 
 
-def _sign(test: TestFunction) -> Entry:
+def _sign(test: Event) -> Entry:
     """That of a test function: what it says of a step itself or, where it has nothing to say, the signs at both ends."""
 
     def asks(inspection: Inspection) -> bool:
@@ -101,7 +101,7 @@ def _trivial(name: str) -> Entry:
     return asks
 
 
-def _changed(index: TestFunction) -> Entry:
+def _changed(index: Event) -> Entry:
     def asks(inspection: Inspection) -> bool:
         return abs(inspection.segment.before.value(index) - inspection.segment.trial.value(index)) > 0
 

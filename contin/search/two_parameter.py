@@ -14,7 +14,7 @@ from contin.continuation.progress import Progress, follow_until_interrupted
 from contin.continuation.run import Continuation
 from contin.core.settings import Options, Settings, settings_with
 from contin.core.system import System
-from contin.core.trial import TestFunction
+from contin.core.trial import Event
 from contin.defining.branch_point_curve import BranchPointCurve
 from contin.defining.event_curve import EventCurve
 from contin.defining.extended import Extended
@@ -28,7 +28,7 @@ from contin.search.codimension_two import leaving
 
 
 def curve(start: Point, second: str | None = None, settings: Settings | None = None, *, free: Sequence[str] | None = None,
-          event: TestFunction | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
+          event: Event | None = None, hold: str | None = None, kind: str | None = None, branch: int = 0,
           progress: bool | None = None, **options: Unpack[Options]) -> Branch:  # fmt: skip
     """Follow the curve of special points of one kind through one of them, in two parameters or more.
 
@@ -46,8 +46,8 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
         Or any of its fields by name. Defaults: ``primary``, of which folds are labelled, is ``second``; no ``branch_points``.
     free : pair of str, optional
         Both parameters, in place of ``second``; the first one replaces that in which the start was found.
-    event : TestFunction, optional
-        The one of yours (``test_functions``) that labelled the start.
+    event : Event, optional
+        The one of yours (``events``) that labelled the start.
     hold : str, optional
         A column that keeps the value of any start, such as ``"period"``; ``branch_points=True`` labels where curves cross.
     kind : str, optional
@@ -90,7 +90,7 @@ def curve(start: Point, second: str | None = None, settings: Settings | None = N
 
 
 def _check(event: object, hold: object, kind: object, branch: object, goes_on: bool) -> None:
-    checks.instance("event", event, (TestFunction, type(None)), "a TestFunction")
+    checks.instance("event", event, (Event, type(None)), "an Event")
     checks.instance("kind", kind, (str, type(None)), "a name")
     checks.whole("branch", branch, 0, 1)
     if kind is not None and not goes_on:
@@ -140,7 +140,7 @@ def _free_parameters(start: Point, second: str | None, free: Sequence[str] | Non
 _First = tuple[Extended, Array]
 
 
-def _first_of_curve(start: Point, names: Sequence[str], event: TestFunction | None, hold: str | None) -> _First:
+def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hold: str | None) -> _First:
     """Return the extended system of the kind of a point.
 
     Raises
@@ -224,7 +224,7 @@ def _of_codimension_two(start: Point, base: Any, x: Array) -> _First | None:
     return None
 
 
-def _event(start: Point, base: Any, x: Array, event: TestFunction) -> _First:
+def _event(start: Point, base: Any, x: Array, event: Event) -> _First:
     """A zero of a user's test function.
 
     Raises

@@ -118,7 +118,7 @@ def test_the_index_changes_where_the_half_loop_branches(m, n, nu, request):
     if (m, n, nu) not in QUICK and not request.config.getoption("--full"):
         pytest.skip("with --full only")
     system, x, tangent = primary_branch(RIBBON, m, n, nu, 10, 7)
-    settings = Settings(trivial="M2", limits={"kappa_n": (-150, 100)}, test_functions=Watch(RIBBON, system, x).monitors)
+    settings = Settings(trivial="M2", limits={"kappa_n": (-150, 100)}, events=Watch(RIBBON, system, x).monitors)
     found = follow(system, x, settings, tangent).labelled(LABEL)
     assert len(found) == AGREEMENT[m, n, nu]
     for point in found:

@@ -18,9 +18,7 @@ for point in branch:
     if isinstance(point.details, contin.lowlevel.BranchPoint):
         contin.trace(point, branch=1, direction=-1)
 why: str = branch.stop.advice if branch.stop else ""
-contin.trace(
-    branch.points[3], contin.Settings(zeros={"lam": [1.0]}, monitors=[contin.TestFunction("UZ", "one", lambda t: t["lam"])])
-)
+contin.trace(branch.points[3], contin.Settings(zeros={"lam": [1.0]}, events=[contin.Event("UZ", "one", lambda t: t["lam"])]))
 slopes: dict[str, dict[str, float]] = contin.sensitivities(branch.labelled("LP")[0], by=["k"])
 folds: contin.Branch = contin.curve(branch.labelled("LP")[0], "k", max_points=10)
 contin.save(branch, "branch.npz")

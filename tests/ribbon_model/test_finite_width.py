@@ -222,7 +222,7 @@ def test_folds_and_ends_against_the_quadrature(m, n, Gamma):
 @pytest.mark.full
 def test_a_branch_stops_where_the_law_ends():
     """(3, 1) at Gamma = 10 runs off to where U loses its convexity; the quadrature is lost at the same kappa_n."""
-    found = followed(3, 1, 10.0, test_functions=convexity.test_functions(FINITE_WIDTH))
+    found = followed(3, 1, 10.0, events=convexity.test_functions(FINITE_WIDTH))
     assert found.stop.reason == "event" and convexity.NAME in found.stop.message
     lost = exact_finite_width.curve(3, 1, NU, 10.0)[-1]
     assert lost.label == "MX" and lost.kappa_n == pytest.approx(found.points[-1]["kappa_n"], abs=0.05)
@@ -239,7 +239,7 @@ def test_a_second_minimum_that_is_shallow_is_not_taken(nu, Gamma, fold):
     ends = convexity.test_functions(FINITE_WIDTH)
     for intervals, degree in ((10, 7), (40, 4)):
         system, x, tangent = primary_branch(FINITE_WIDTH, 2, 10, nu, intervals, degree, Gamma=Gamma)
-        found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, test_functions=ends), tangent)
+        found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends), tangent)
         assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([fold], abs=1e-6)
 
 
@@ -256,7 +256,7 @@ def test_the_law_has_the_bending_of_the_single_loop(nu, Gamma):
 
 def test_the_outer_minimum_of_a_wide_strip_is_followed():
     """(1, 4) of steel, 200 x 5 x .1 mm; the fold is that of `exact_finite_width.curve`, which is lost at 11.7665."""
-    found = followed(1, 4, 7.853981634, test_functions=convexity.test_functions(FINITE_WIDTH))
+    found = followed(1, 4, 7.853981634, events=convexity.test_functions(FINITE_WIDTH))
     assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([17.723754], abs=1e-5)
     assert found.points[-1]["kappa_n"] == pytest.approx(11.7665, abs=0.01) and convexity.NAME in found.stop.message
 
@@ -277,7 +277,7 @@ def test_a_branch_on_which_the_energy_has_two_minima():
     """
     system, x, tangent = primary_branch(FINITE_WIDTH, 1, 5, 0.4, 10, 7, Gamma=40.0)
     ends = convexity.test_functions(FINITE_WIDTH)
-    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, test_functions=ends), tangent)
+    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends), tangent)
     assert [point["kappa_n"] for point in found.labelled("LP")] == pytest.approx([27.387660, -43.957859], abs=1e-6)
     assert found.stop.reason == "trivial branch"
     assert found.points[-1]["kappa_n"] == pytest.approx(thresholds(FINITE_WIDTH, 9, 5, 0.4, 40.0)[0], abs=1e-9)
@@ -288,7 +288,7 @@ def test_where_the_law_ends_the_margin_says_so(m, n, nu, Gamma, end):
     """Not before: `exact_finite_width.curve` is lost at -59.0396 and at .8925."""
     system, x, tangent = primary_branch(FINITE_WIDTH, m, n, nu, 10, 7, Gamma=Gamma)
     ends = convexity.test_functions(FINITE_WIDTH)
-    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, test_functions=ends), tangent)
+    found = follow(system, x, Settings(trivial="M2", limits={"kappa_n": (-100, 100)}, events=ends), tangent)
     assert found.stop.reason == "event" and convexity.NAME in found.stop.message
     assert found.points[-1]["kappa_n"] == pytest.approx(end, abs=0.01)
 

@@ -31,7 +31,7 @@ def cantilever_end(nu: float, k: float) -> float:
 
 def pulled(material: Material, **options) -> contin.Branch:
     strip = OpenStrip(material, finish=FREE_END, numbers={"force_normal": 0.0})
-    settings = {"limits": {"force_normal": (-1, 5)}, "test_functions": strip.domain_tests()}
+    settings = {"limits": {"force_normal": (-1, 5)}, "events": strip.domain_tests()}
     return contin.trace(strip.first_point(**options), free=["force_normal"], **settings)
 
 
@@ -58,7 +58,7 @@ def test_the_end_between_clamps_is_where_the_least_bending_is_nu_kappa_n():
         free=["bend"],
         direction=-1,
         limits={"bend": (-2, 1)},
-        test_functions=strip.domain_tests(),
+        events=strip.domain_tests(),
     )
     end = branch.points[-1]
     assert branch.stop.message.startswith("met the end of the law 'ribbon'") and end.errors["bend"] < 1e-9
@@ -141,7 +141,7 @@ def test_a_run_that_fails_beside_the_end_of_the_law_is_said_to_end_there():
     tapered = Material("ribbon", {"nu": 0.3, "kappa_n": 1.0}, {"thickness": "1 - s/2"})
     strip = OpenStrip(tapered, finish=FREE_END, numbers={"force_normal": 0.0})
     system, x = strip.first_point().system.with_free(("force_normal",), strip.first_point().x)
-    settings = contin.Settings(limits={"force_normal": (-1, 5)}, test_functions=strip.domain_tests())
+    settings = contin.Settings(limits={"force_normal": (-1, 5)}, events=strip.domain_tests())
     run = contin.lowlevel.Continuation(system, x, settings)
     points = [point for point in run if not point.label]
     assert strip.explained(run).startswith("the end of the law 'ribbon'")

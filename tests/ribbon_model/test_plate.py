@@ -120,7 +120,7 @@ def test_an_isotropic_strip_stated_as_a_plate_has_the_same_states():
     for numbers in ({"nu": 0.3}, dict(zip(plate.RIGIDITIES, isotropic(0.3)))):
         strip = OpenStrip(Material("ribbon", {**numbers, "kappa_n": 3.0}))
         branch = contin.trace(
-            strip.first_point(), free=["bend"], limits={"bend": (2.5, 3.5)}, test_functions=strip.domain_tests(),
+            strip.first_point(), free=["bend"], limits={"bend": (2.5, 3.5)}, events=strip.domain_tests(),
             zeros={"bend": [2.8]}, direction=-1,
         )  # fmt: skip
         found += [(point["energy"], point.index, *strip.reactions(point).values()) for point in branch.labelled("UZ")]

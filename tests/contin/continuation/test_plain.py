@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from contin import AlgebraicProblem, MapProblem, Settings, TestFunction
+from contin import AlgebraicProblem, Event, MapProblem, Settings
 from contin.continuation import lane as runs
 from contin.cycles.maps import MapSystem
 from contin.lowlevel import Algebraic, Continuation
@@ -97,7 +97,7 @@ RUNS = {
         {
             "limits": {"a": (-3, 5), "square": (-10, 4.3), "x": (-5, 1.9)},
             "zeros": {"a": [0.0, 0.2], "x": [0.5], "square": [1.0]},
-            "extrema": ["square"], "test_functions": [TestFunction("UZ", "mine", lambda trial: trial.x[0] - 1.1)],
+            "extrema": ["square"], "events": [Event("UZ", "mine", lambda trial: trial.x[0] - 1.1)],
         },
     ),
 }  # fmt: skip

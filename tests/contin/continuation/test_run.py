@@ -9,7 +9,7 @@ from bank.closed_forms import bratu, bratu_fold, bratu_load, bratu_load_of, brat
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, ProblemError, Settings, TestFunction, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, ConvergenceError, Event, ProblemError, Settings, solve, trace
 from contin.lowlevel import Collocation, Continuation, follow
 
 
@@ -52,15 +52,15 @@ def test_user_zeros_on_both_sides_of_a_fold(branch):
 
 def test_a_test_function_of_ones_own():
     """u(1/2) = 1: lam from the closed form."""
-    centre = TestFunction("UZ", "centre", lambda trial: trial.system.evaluate(trial.x, np.array([0.5]))[0, 0] - 1.0)
-    (point,) = follow(*bratu_start(), Settings(limits={"mean": (-1, 1)}, test_functions=[centre])).labelled("UZ")
+    centre = Event("UZ", "centre", lambda trial: trial.system.evaluate(trial.x, np.array([0.5]))[0, 0] - 1.0)
+    (point,) = follow(*bratu_start(), Settings(limits={"mean": (-1, 1)}, events=[centre])).labelled("UZ")
     assert point.name == "centre"
     assert point["lam"] == pytest.approx(bratu_load_of(1.0), abs=1e-10)
 
 
 def test_a_terminal_test_function_stops():
-    stop = TestFunction("UZ", "third", lambda trial: trial["lam"] - 1 / 3, terminal=True)
-    branch = follow(*bratu_start(), Settings(test_functions=[stop]))
+    stop = Event("UZ", "third", lambda trial: trial["lam"] - 1 / 3, terminal=True)
+    branch = follow(*bratu_start(), Settings(events=[stop]))
     assert branch.stop.reason == "event"
     assert abs(branch.points[-1]["lam"] - 1 / 3) < 1e-12
 
@@ -203,11 +203,11 @@ def test_a_point_that_is_not_found_shortens_the_step_and_does_not_lose_the_branc
                 raise ConvergenceError("a point inside the step is not found")
             return []
 
-        return TestFunction("UZ", "shy", lambda trial: 1.0, search=search)
+        return Event("UZ", "shy", lambda trial: 1.0, search=search)
 
     def followed(longest):
         return trace(solve(parabola, [1.0]), free=["a"], direction=-1, limits={"a": (-1, 4)},
-                     test_functions=[only_in_steps_below(longest)])  # fmt: skip
+                     events=[only_in_steps_below(longest)])  # fmt: skip
 
     assert str(followed(0.04).stop) == "reached a = 4"
     lost = followed(0.0)

@@ -7,7 +7,7 @@ import pytest
 from bank import abc, enz, pp2
 from bank.closed_forms import bratu, bratu_fold, pitchfork
 
-from contin import AlgebraicProblem, Settings, TestFunction, solve, trace
+from contin import AlgebraicProblem, Event, Settings, solve, trace
 
 
 def labels(branch):
@@ -53,9 +53,9 @@ def test_the_first_step_from_a_branch_point_is_inspected(step):
 def test_zeros_in_the_first_step_from_a_branch_point_but_not_the_start_itself():
     """On x^2 = mu with (dx/ds)^2 = 1 / (1 + 4 x^2): mu = .01 at x = .1, (dx/ds)^2 = .9 at x = 1/6, and X = .28 or -.28."""
     fork = trace(solve(pitchfork(), [0.0]), free=["mu"], limits={"mu": (-2, 2)}).labelled("BP")[0]
-    own = TestFunction("UZ", "own", lambda trial: trial.tangent[0] ** 2 - 0.9)
+    own = Event("UZ", "own", lambda trial: trial.tangent[0] ** 2 - 0.9)
     zeros = {"mu": [0.0, 0.01], "X": [0.0, 0.28, -0.28]}
-    branch = trace(fork, branch=1, limits={"mu": (-1, 1)}, zeros=zeros, test_functions=[own], step=0.6, angle=1.4, accuracy=1.0)
+    branch = trace(fork, branch=1, limits={"mu": (-1, 1)}, zeros=zeros, events=[own], step=0.6, angle=1.4, accuracy=1.0)
     found = branch.labelled("UZ")
     assert branch.points[1 : 1 + len(found)] == found  # all of them lie inside the first step
     assert [point.name.replace("-", "") for point in found] == ["mu = 0.01", "own", "X = 0.28"]

@@ -9,8 +9,8 @@ import pytest
 from contin import (
     AlgebraicProblem,
     BoundaryValueProblem,
+    Event,
     ProblemError,
-    TestFunction,
     curve,
     load,
     save,
@@ -32,14 +32,14 @@ def middle(trial):
     return float(trial.system.evaluate(trial.x, np.array([0.5]))[0, 0]) - 2.0
 
 
-HOT = TestFunction("UZ", "hot", middle)
+HOT = Event("UZ", "hot", middle)
 
 
 @functools.cache
 def branch():
     return trace(
         solve(perturbed_gelfand(), [0, 0]), free=["lam"], limits={"lam": (0, 6), "mean": (-1, 3)}, zeros={"mean": [1.0]},
-        test_functions=[HOT],
+        events=[HOT],
     )  # fmt: skip
 
 
@@ -52,7 +52,7 @@ def test_user_zeros_in_two_parameters(name):
     assert followed.points[-1].name == "eps = 0.25"
     there = trace(
         solve(perturbed_gelfand(), [0, 0], {"eps": 0.22}), free=["lam"], limits={"lam": (0, 6), "mean": (-1, 3)},
-        zeros={"mean": [1.0]}, test_functions=[HOT],
+        zeros={"mean": [1.0]}, events=[HOT],
     )  # fmt: skip
     known = next(point for point in there if point.name == name)
     (found,) = followed.labelled("UZ")
@@ -134,4 +134,4 @@ def test_wrong_events():
     with pytest.raises(ProblemError, match="for one of your own test functions, give it as event"):
         curve(start, "eps")
     with pytest.raises(ProblemError, match="event: 'cold' is 1 at the start; it must be the function that labelled it"):
-        curve(start, "eps", event=TestFunction("UZ", "cold", lambda trial: middle(trial) + 1.0))
+        curve(start, "eps", event=Event("UZ", "cold", lambda trial: middle(trial) + 1.0))

@@ -8,7 +8,7 @@ import pytest
 from bank import opt
 from bank.closed_forms import cusp, elastica
 
-from contin import AlgebraicProblem, BoundaryValueProblem, ProblemError, TestFunction, curve, sensitivities, solve, trace
+from contin import AlgebraicProblem, BoundaryValueProblem, Event, ProblemError, curve, sensitivities, solve, trace
 
 
 @functools.cache
@@ -178,8 +178,8 @@ def test_sensitivity_of_a_hopf_point():
 
 
 def test_what_is_held_must_be_a_column():
-    branch = trace(solve(BRUSSELATOR, [1.5, 0.7]), free=["B"], limits={"B": (1, 5)}, extrema=["B"], test_functions=[
-        TestFunction("UZ", "large", lambda trial: trial["y"] - 2)])  # fmt: skip
+    branch = trace(solve(BRUSSELATOR, [1.5, 0.7]), free=["B"], limits={"B": (1, 5)}, extrema=["B"], events=[
+        Event("UZ", "large", lambda trial: trial["y"] - 2)])  # fmt: skip
     (large,) = branch.labelled("UZ")  # y = B / A = 2
     with pytest.raises(ProblemError, match="held: must be given at a point UZ 'large'"):
         sensitivities(large)
@@ -217,8 +217,8 @@ def test_sensitivities_of_a_branch_point_by_a_parameter_of_another_size():
 def test_a_users_name_names_no_quantity(name, label):
     """x = -1.1 on x^3 - b x + a = 0 at a = 0.231: `curve` follows that, given as event, or asks for it."""
     problem = AlgebraicProblem(lambda u, p: (u.x**3 - p.b * u.x + p.a,), ["x"], {"a": 2.0, "b": 1.0})
-    event = TestFunction(label, name, lambda trial: trial["x"] + 1.1)
-    branch = trace(solve(problem, [-1.5]), free=["a"], direction=-1, limits={"a": (-2, 3)}, test_functions=[event])
+    event = Event(label, name, lambda trial: trial["x"] + 1.1)
+    branch = trace(solve(problem, [-1.5]), free=["a"], direction=-1, limits={"a": (-2, 3)}, events=[event])
     point = next(point for point in branch if point.name == name)
     with pytest.raises(ProblemError, match="give it as event"):
         curve(point, "b", limits={"b": (0.5, 2)})
