@@ -1,7 +1,7 @@
 """Time contin and other tools on your machine: pictures, a table of ratios, and every number as JSON.
 
-    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [cycles] [defaults] [problems]
-                            [--quick] [--out DIR] [--before DIR]
+    python scripts/bench.py [like-for-like] [fold] [cost] [startup] [many] [stress] [cores] [cycles] [small]
+                            [defaults] [problems] [--quick] [--out DIR] [--before DIR]
 
 Errors are measured against the exact quadrature of the branches (``ribbon_model.exact``), never against another run. A tool
 that is not installed is left out, and the output names it. See docs/performance.md.
@@ -23,7 +23,7 @@ from benchmarks.measure import ONE_THREAD  # noqa: E402  (it imports nothing tha
 
 os.environ.update(ONE_THREAD)
 
-PARTS = ("like-for-like", "fold", "cost", "startup", "many", "stress", "cores", "cycles", "defaults", "problems")
+PARTS = ("like-for-like", "fold", "cost", "startup", "many", "stress", "cores", "cycles", "small", "defaults", "problems")
 
 
 def arguments(argv=None) -> argparse.Namespace:
@@ -61,7 +61,7 @@ def arguments(argv=None) -> argparse.Namespace:
 
 def measure(part: str, options: argparse.Namespace) -> dict:
     """Run one part."""
-    from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, startup, stress
+    from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress
 
     from ribbon_model import exact
 
@@ -78,6 +78,8 @@ def measure(part: str, options: argparse.Namespace) -> dict:
         return stress.run(quick)
     if part == "cycles":
         return cycles.run(quick)
+    if part == "small":
+        return small.run(quick)
     if part == "defaults":
         return defaults.run(quick)
     exact_fold = exact.folds(1, 2)[0].kappa_n

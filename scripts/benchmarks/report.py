@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, startup, stress
+from benchmarks import cores, cost, cycles, defaults, fold, like_for_like, many, problems, small, startup, stress
 
 TITLES = {
     "like-for-like": "Like for like",
@@ -18,6 +18,7 @@ TITLES = {
     "stress": "Numerical stability",
     "cores": "Two cores",
     "cycles": "Cycles",
+    "small": "Small problems",
     "defaults": "Default degree",
     "problems": "New problems",
 }
@@ -30,6 +31,7 @@ TABLES = {
     "stress": stress.table,
     "cores": cores.table,
     "cycles": cycles.table,
+    "small": small.table,
     "defaults": defaults.table,
     "problems": problems.table,
 }
