@@ -7,7 +7,7 @@ import dataclasses
 from collections.abc import Callable, Iterator
 
 from contin import ContinError, Point, Reason, Settings, Stop
-from contin.lowlevel import Collocation, Continuation, State, exact_text
+from contin.lowlevel import Continuation, State, exact_text
 
 #: Points that a run must find with a changed field before that change is advised. With 1, changes were advised that help for
 #: one step only; with 100, a failed run takes as long again as a stage.
@@ -50,7 +50,7 @@ def _changes(run: Continuation) -> Iterator[tuple[str, State, Settings]]:
     for factor in (_SHORTER, _SHORTER**2):
         shorter = dataclasses.replace(settings, min_step=settings.min_step / factor)
         yield f"steps.smallest: {shorter.min_step:g}", state, shorter
-    if not isinstance(state.system, Collocation):
+    if not state.system.intervals:
         return
     system, carry = state.system.refined()
     previous = None if state.previous_tangent is None else carry(state.previous_tangent)

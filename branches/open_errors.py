@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from contin import ContinError, ConvergenceError, Point
-from contin.lowlevel import BranchPoint, Collocation, correct, locate_branch_point, point_of
+from contin.lowlevel import Collocation, correct, locate_branch_point, point_of
 
 #: First step of the secant method for a fold, in the norm of the run; located points lie within 1e-6 of it. Ten times larger:
 #: one more step.
@@ -41,7 +41,7 @@ def errors_of(point: Point, columns: Columns) -> dict[str, float]:
         return unknown
     fine, carry = point.system.refined()
     try:
-        if point.label == "BP" and isinstance(point.details, BranchPoint):
+        if point.label == "BP" and point.is_simple_branch_point:
             x = locate_branch_point(fine, carry(point.x), kernel=np.array([carry(vector) for vector in point.details.kernel])).x
         elif point.label == "BP":
             return unknown

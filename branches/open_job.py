@@ -26,7 +26,7 @@ from branches.open_config import MEANINGS, OpenConfig, StageConfig
 from branches.open_errors import errors_of
 from branches.store import BranchWriter, Kind, read_kept, read_state
 from contin import Branch, ContinError, ConvergenceError, MeshControl, Point, ProblemError, Reason, Settings, Stop, load, save
-from contin.lowlevel import BranchPoint, Collocation, Continuation, exact_text, point_of  # fmt: skip
+from contin.lowlevel import Collocation, Continuation, exact_text, point_of  # fmt: skip
 from ribbon_model.changed_ends import with_ends
 from ribbon_model.ends import ANGLES, angles_of
 from ribbon_model.open_strip import REACTIONS, OpenStrip
@@ -415,7 +415,7 @@ def _switched(config: OpenConfig, number: int, origin: Point, changed: bool) -> 
         No single branch leaves it, or not in this stage.
     """
     stage = config.stages[number - 1]
-    if not isinstance(origin.details, BranchPoint):
+    if not origin.is_simple_branch_point:
         raise ConfigError(
             f"start_at: {stage.start_at!r}: {origin.nullity} modes are neutral there, and no single branch leaves it; a phase "
             "or an imperfection tells the modes apart"

@@ -6,7 +6,7 @@ import dataclasses
 
 from branches.config import Config, ConfigError
 from contin import ContinError, ConvergenceError, MeshControl, Newton, Settings, Stop
-from contin.lowlevel import BranchPoint, Continuation
+from contin.lowlevel import Continuation
 from ribbon_model.domains import CELL, DOMAINS, HALF_LOOP
 from ribbon_model.laws import LAWS, TwoBendings
 from ribbon_model.secondary import force, secondary_branch
@@ -77,7 +77,7 @@ class UntilPrimary(Continuation):
         for point in super().__iter__():
             if point.label == "LP" and force(point) < _BESIDE:
                 continue
-            if point.name != "start" and isinstance(point.details, BranchPoint) and force(point) < _NO_FORCE:
+            if point.name != "start" and point.is_simple_branch_point and force(point) < _NO_FORCE:
                 self.stop = Stop("primary branch", "reached a primary branch, where R = 0")
                 point = dataclasses.replace(point, label="EP", name="primary branch")
             yield point

@@ -33,8 +33,8 @@ from contin.arrays import Array
 from contin.collocation.basis import interpolation
 from contin.core.trial import Event, Trial
 from contin.errors import ProblemError
+from contin.events.arc import SpecialPoint
 from contin.events.index import Stability, nullity_of
-from contin.events.segment import SpecialPoint
 from contin.linalg.orientation import canonical_basis
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from contin.problems.statement import MOST_CONDITIONS, Restated, check_statement
 
 if TYPE_CHECKING:
     from contin.core.trial import Event
+    from contin.events.arc import SpecialPoint
     from contin.events.index import Stability
-    from contin.events.segment import SpecialPoint
 
 
 @dataclass(frozen=True, eq=False, repr=False)

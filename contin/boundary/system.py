@@ -34,8 +34,8 @@ from contin.linalg.segments import run, share
 if TYPE_CHECKING:
     from contin.boundary.statement import BoundaryValueProblem
     from contin.core.trial import Event
+    from contin.events.arc import SpecialPoint
     from contin.events.index import Stability
-    from contin.events.segment import SpecialPoint
 
 
 class Collocation(System):

@@ -15,8 +15,8 @@ from contin.boundary.statement import BoundaryValueProblem
 from contin.boundary.system import Collocation
 from contin.core.trial import Event
 from contin.errors import ProblemError
+from contin.events.arc import SpecialPoint
 from contin.events.index import Stability
-from contin.events.segment import SpecialPoint
 from contin.functions.batch import Batch
 from contin.functions.signature import Arguments, argument_count
 from contin.problems.statement import check_statement

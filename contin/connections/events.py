@@ -32,7 +32,7 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.core.trial import Event, Trial
-from contin.events.segment import SpecialPoint
+from contin.events.arc import SpecialPoint
 from contin.linalg.orientation import oriented
 
 if TYPE_CHECKING:

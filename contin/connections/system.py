@@ -19,7 +19,7 @@ from contin.core.scales import Scales
 from contin.core.trial import Event, Trial
 from contin.defining.event_curve import EventCurve
 from contin.errors import ConvergenceError, ProblemError
-from contin.events.segment import SpecialPoint
+from contin.events.arc import SpecialPoint
 from contin.linalg.factors import Factors
 from contin.problems.angles import WINDING, check_windings
 from contin.problems.own_names import TIME

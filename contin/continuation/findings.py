@@ -11,9 +11,9 @@ import numpy as np
 from contin.continuation.notes import Notes, why_lost
 from contin.core.settings import Settings
 from contin.core.trial import Event
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.index import Stability, nullity_of
 from contin.events.refinement import refined
-from contin.events.segment import Segment, SpecialPoint
 from contin.events.test_functions import with_normal_form
 from contin.results.point import Point
 
@@ -44,7 +44,7 @@ def located_again(found: SpecialPoint, settings: Settings) -> SpecialPoint:
     return found
 
 
-def is_confirmed(point: SpecialPoint, segment: Segment, notes: Notes) -> bool:
+def is_confirmed(point: SpecialPoint, arc: Arc, notes: Notes) -> bool:
     """Return whether a special point was located and, where that was asked for, not missed on a finer mesh.
 
     Others are noted: they get no label. The end of a run keeps its own. So does a point whose errors are not known because
@@ -56,13 +56,11 @@ def is_confirmed(point: SpecialPoint, segment: Segment, notes: Notes) -> bool:
         if point.stop is None and unknown:
             notes.add(f"{what} at {notes.place(point.trial)}: its ± is nan, since Newton's method failed at the second look")
         return True
-    notes.inside(f"a possible {what} {why_lost(point.trial, point.is_located)}", segment)
+    notes.inside(f"a possible {what} {why_lost(point.trial, point.is_located)}", arc)
     return False
 
 
-def index_changes(
-    index: Event | None, segment: Segment, special: Sequence[SpecialPoint], notes: Notes
-) -> list[IndexChange | None]:
+def index_changes(index: Event | None, arc: Arc, special: Sequence[SpecialPoint], notes: Notes) -> list[IndexChange | None]:
     """Return the index before and after each special point of a step, and note what contradicts itself."""
     if index is None or not special:
         return [None] * len(special)
@@ -70,7 +68,7 @@ def index_changes(
     middles = [(a[-1].at + b[0].at) / 2 for a, b in itertools.pairwise(groups)]
     last = special[-1]  # behind a limit the step does not belong to the branch
     ends_there = last.stop is not None and last.test is not None and last.same_as is None
-    between = [segment.before, *(segment.near(s) for s in middles), last.trial if ends_there else segment.trial]
+    between = [arc.before, *(arc.near(s) for s in middles), last.trial if ends_there else arc.trial]
     values = [trial.value(index) for trial in between]
     whole = [None if np.isnan(value) else int(value) for value in values]
     changes: list[IndexChange | None] = []

@@ -8,9 +8,9 @@ import numpy as np
 
 from contin.core.settings import Settings
 from contin.core.trial import Event, Trial
+from contin.events.arc import Arc
 from contin.events.index import contradiction
 from contin.events.inspection import Inspection, Start
-from contin.events.segment import Segment
 from contin.events.watch import watch_list
 
 
@@ -39,14 +39,14 @@ class Judge:
         self.index = start[0].index
         self._watch = watch_list(start[0], settings, tests, fold, self.index)
 
-    def inspection(self, segment: Segment, settings: Settings) -> Inspection:
+    def inspection(self, arc: Arc, settings: Settings) -> Inspection:
         """Return the inspection of a step."""
-        return Inspection(segment, settings, self._start, self._fold)
+        return Inspection(arc, settings, self._start, self._fold)
 
     def asks(self, inspection: Inspection) -> bool:
         """Return whether a step must be looked at closely, by what both its ends say."""
-        segment = inspection.segment
-        return segment.state.singular or segment.is_moved or any(asks(inspection) for asks in self._watch)
+        arc = inspection.arc
+        return arc.state.singular or arc.is_moved or any(asks(inspection) for asks in self._watch)
 
     def doubt(self, inspection: Inspection) -> str:
         """Return why a step cannot be believed, as a clause; "" where it can.
@@ -56,16 +56,16 @@ class Judge:
         ConvergenceError
             A point inside the step that is needed to tell is not found.
         """
-        segment = inspection.segment
+        arc = inspection.arc
         doubt = inspection.doubt() or self._contradiction(inspection) or self._lost_end(inspection)
-        return doubt or self._moved_past(segment.trial) or inspection.strays(self._tests)
+        return doubt or self._moved_past(arc.trial) or inspection.strays(self._tests)
 
-    def ends_inside(self, segment: Segment) -> bool:
+    def ends_inside(self, arc: Arc) -> bool:
         """Return whether the run ends inside a step, and not at a limit: the point at its end is not accepted.
 
         The equations may not hold there, and no mesh be fine enough.
         """
-        before, trial = segment.before, segment.trial
+        before, trial = arc.before, arc.trial
         return any(test.passed(before.value(test), trial.value(test)) for test in self._ends)
 
     @property
@@ -75,13 +75,13 @@ class Judge:
 
     def _contradiction(self, inspection: Inspection) -> str:
         """Return how the change of index over a step contradicts its special points; "" if not."""
-        if not contradiction(self.index, inspection.segment, ()):
+        if not contradiction(self.index, inspection.arc, ()):
             return ""  # without special points, which take time
-        return contradiction(self.index, inspection.segment, inspection.special_points(self._tests))
+        return contradiction(self.index, inspection.arc, inspection.special_points(self._tests))
 
     def _lost_end(self, inspection: Inspection) -> str:
         """Return a clause if the run ends inside a step, at a place that was not located; "" otherwise."""
-        if not self.ends_inside(inspection.segment):
+        if not self.ends_inside(inspection.arc):
             return ""
         ends = [point for point in inspection.special_points(self._tests) if point.stop is not None]
         return "" if all(point.is_located for point in ends) else "the end of the run inside the step was not located"

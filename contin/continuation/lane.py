@@ -57,8 +57,8 @@ from contin.core.state import State
 from contin.core.step import aims
 from contin.core.trial import Event, Linearization, Trial
 from contin.errors import ConvergenceError
+from contin.events.arc import SpecialPoint
 from contin.events.inspection import Start, is_elsewhere
-from contin.events.segment import SpecialPoint
 from contin.events.spectra import spectra_of
 from contin.events.trivial import crossed, jumped
 from contin.linalg.condensation import Factorization

@@ -22,7 +22,7 @@ from contin.core.step import Judgement, trial_of
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
 from contin.events.accuracy import Accuracy, accuracy_of
-from contin.events.segment import Segment
+from contin.events.arc import Arc
 from contin.events.trivial import jumped
 
 #: A finer mesh stays if it makes the error smaller than this part of it. Where it does not, as at round-off or at a jump of the
@@ -85,7 +85,7 @@ class Place(Protocol):
     def go_on(self, moved: Moved | None) -> bool:
         """Let the run go on from a state on another mesh, if there is one."""
 
-    def ends_inside(self, segment: Segment) -> bool:
+    def ends_inside(self, arc: Arc) -> bool:
         """Return whether the run ends inside a step, at a place whose end is not accepted."""
 
 
@@ -153,7 +153,7 @@ class MeshPolicy:
             state, system=system, x=end.x, tangent=end.tangent, previous_tangent=previous, step=step, sign=end.sign
         ), end
 
-    def good_step(self, run: Place, step: float, made: Trial | None) -> tuple[Segment, Judgement]:
+    def good_step(self, run: Place, step: float, made: Trial | None) -> tuple[Arc, Judgement]:
         """Make a step of a given length whose end has an error within the tolerance of the mesh, as far as finer ones help.
 
         The mesh is adapted to the end of a step that is not good enough, and the step is made again from the same point, before
@@ -164,15 +164,11 @@ class MeshPolicy:
         ConvergenceError
         """
         control = self.steps.settings.mesh
-        segment, judgement = self.steps.attempt(run.state, run.here(), step, made)
-        accuracy = accuracy_of(segment.trial.settled)
+        arc, judgement = self.steps.attempt(run.state, run.here(), step, made)
+        accuracy = accuracy_of(arc.trial.settled)
         for _ in range(_ATTEMPTS):
-            end, known = segment.trial.settled, (run.state, run.here())
-            if (
-                not is_poor(accuracy, control)
-                or run.ends_inside(segment)
-                or unsettled(end, control.tolerance, self.steps.primary)
-            ):
+            end, known = arc.trial.settled, (run.state, run.here())
+            if not is_poor(accuracy, control) or run.ends_inside(arc) or unsettled(end, control.tolerance, self.steps.primary):
                 break
             other = finer(end.system, end.x, accuracy.error, control)
             if other is None or not run.go_on(self.moved(run.state, run.here, other)):
@@ -182,8 +178,8 @@ class MeshPolicy:
             if not better.error < _HELPS * accuracy.error:
                 run.go_on(known)
                 break
-            segment, judgement, accuracy = again, judged_again, better
-        return segment, judgement
+            arc, judgement, accuracy = again, judged_again, better
+        return arc, judgement
 
     def _fewest_intervals(self, state: State) -> int:
         """Return the fewest intervals that keep the state's error within the tolerance, however few the density asks for.

@@ -8,11 +8,11 @@ import numpy as np
 
 from contin.collocation.switching import Switching
 from contin.core.trial import Event, Trial
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.index import contradiction
 from contin.events.labelled import finding_of
 from contin.events.phase_loads import phase_loads
 from contin.events.refinement import BENT
-from contin.events.segment import Segment, SpecialPoint
 
 
 class Notes:
@@ -43,18 +43,18 @@ class Notes:
     def add(self, text: str) -> None:
         self.texts.append(text)
 
-    def inside(self, text: str, segment: Segment) -> None:
+    def inside(self, text: str, arc: Arc) -> None:
         """Note what was seen inside a step and not understood."""
-        ends = (trial[self.primary] for trial in (segment.before, segment.trial))
+        ends = (trial[self.primary] for trial in (arc.before, arc.trial))
         self.add(f"{text} (between {self.primary} = {' and '.join(f'{end:.10g}' for end in ends)})")
 
-    def doubts(self, index: Event | None, segment: Segment, found: list[SpecialPoint], doubt: str) -> None:
+    def doubts(self, index: Event | None, arc: Arc, found: list[SpecialPoint], doubt: str) -> None:
         """Note what the labelled points of a step do not explain: a change of the index or, without one, a doubt."""
-        contradicts = contradiction(index, segment, found)
+        contradicts = contradiction(index, arc, found)
         if contradicts and not found:  # beside points, changes of the index are noted
-            self.inside(f"{contradicts}, and the labelled points do not explain it", segment)
+            self.inside(f"{contradicts}, and the labelled points do not explain it", arc)
         elif doubt and not contradicts:
-            self.inside(doubt, segment)
+            self.inside(doubt, arc)
 
     def corners(self, trial: Trial) -> None:
         """Note once that conditions on states make the equations jump, and once that mesh points do not follow them."""
@@ -73,12 +73,12 @@ class Notes:
             what = f"has {load:.3g} of the largest number of a mode {place}" if is_mode else f"= {load:.6g} {place}"
             self.add(f"phases: {name} {what} and not zero, so the phase condition loads the structure; leave it out")
 
-    def noise(self, segment: Segment, allowed: float) -> None:
+    def noise(self, arc: Arc, allowed: float) -> None:
         """Note once that a point is known worse than ``allowed``."""
-        if segment.trial.newton_error > allowed and not self.is_noisy:
+        if arc.trial.newton_error > allowed and not self.is_noisy:
             self.is_noisy = True
             what = "the updates of Newton's method are round-off above its tolerance: see newton_error"
-            self.inside(f"from here on {what}", segment)
+            self.inside(f"from here on {what}", arc)
 
 
 def jump(trial: Trial, primary: str) -> str:

@@ -24,8 +24,8 @@ from contin.core.small import (
     evaluate_slopes,
     fill_matrix,
 )
+from contin.events.arc import LEAST_COSINE
 from contin.events.crossings import CALM, NEAR_ONE
-from contin.events.segment import LEAST_COSINE
 from contin.events.spectra import FIRST, LAST, Spectra, fill_cubic, fill_spectrum, may_double_or_twist, may_pass_axis
 from contin.functions.kernel import kernel
 from contin.functions.kernel_parts import Matrix, Stack, helper

@@ -34,9 +34,9 @@ from contin.core.step import predict, up_to_limits
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
 from contin.events.accuracy import Accuracy, accuracy_of, at_branch_point
+from contin.events.arc import Arc, SpecialPoint, with_details
 from contin.events.extrema import extremum
 from contin.events.inspection import Start
-from contin.events.segment import Segment, SpecialPoint, with_details
 from contin.events.test_functions import fold, limits, user_zeros, within_limits
 from contin.names import exact_text
 from contin.results.point import Point
@@ -205,9 +205,9 @@ class Continuation:
             self.state, self._end = moved
         return moved is not None
 
-    def ends_inside(self, segment: Segment) -> bool:
+    def ends_inside(self, arc: Arc) -> bool:
         """Return whether the run ends inside a step, and not at a limit: the point at its end is not accepted."""
-        return self._judge.ends_inside(segment)
+        return self._judge.ends_inside(arc)
 
     def _advance(self) -> Iterator[Point]:
         """Make one step: yield the labelled points inside it, then the point at its end."""
@@ -225,28 +225,28 @@ class Continuation:
             yield self._point(SpecialPoint(0.0, label, name, here), self.state, accuracy=self._accuracy)
             return
         self._accuracy = accuracy_of(step.end)
-        segment, special = step.segment, [step.segment.trial.system.judged(point) for point in step.special]
-        special = within_limits(segment, special, self._limits)
+        arc, special = step.arc, [step.arc.trial.system.judged(point) for point in step.special]
+        special = within_limits(arc, special, self._limits)
         end = next((number for number, point in enumerate(special) if point.stop is not None), len(special))
         found = [located_again(point, self.settings) for point in special[: end + 1]]
-        found = [point for point in found if is_confirmed(point, segment, self._notes)]
-        changes = index_changes(self._judge.index, segment, found, self._notes)
+        found = [point for point in found if is_confirmed(point, arc, self._notes)]
+        changes = index_changes(self._judge.index, arc, found, self._notes)
         if end == len(special):
-            self._notes.doubts(self._judge.index, segment, found, step.doubt if len(found) == len(special) else "")
+            self._notes.doubts(self._judge.index, arc, found, step.doubt if len(found) == len(special) else "")
         for point, change in zip(found, changes):
             if point.stop is not None:
                 self.stop = point.trial.system.explained(point.stop, point.trial)
                 point = with_details(point, self.stop)
-            yield self._point(point, segment.state, change)
+            yield self._point(point, arc.state, change)
             if self.stop is not None:
                 return
-        self.go_on((self._steps.accepted(segment, step.judgement, step.turns), step.end))
+        self.go_on((self._steps.accepted(arc, step.judgement, step.turns), step.end))
         self._notes.corners(step.end)
-        self._notes.noise(segment, max(self.settings.newton.tolerance, NOISY))
-        self.stop = ended(segment.trial, self.state, self.settings, self.primary, self._notes)
+        self._notes.noise(arc, max(self.settings.newton.tolerance, NOISY))
+        self.stop = ended(arc.trial, self.state, self.settings, self.primary, self._notes)
         label, name = ("EP", str(self.stop.reason)) if self.stop else ("", "")
-        found_at_end = located_again(SpecialPoint(segment.step, label, name, step.end), self.settings)
-        yield self._point(found_at_end, segment.state, accuracy=self._accuracy)
+        found_at_end = located_again(SpecialPoint(arc.step, label, name, step.end), self.settings)
+        yield self._point(found_at_end, arc.state, accuracy=self._accuracy)
 
     def _takes_shorter_steps(self) -> bool:
         """Take steps below the default ``min_step`` from here on, if the run goes on with them; say so."""
@@ -268,14 +268,14 @@ class Continuation:
         finest = max(settings.min_step, _FINEST * step)
         while True:
             try:
-                segment, judgement = self._meshes.good_step(self, step, made)
-                inspection = self._judge.inspection(segment, settings)
+                arc, judgement = self._meshes.good_step(self, step, made)
+                inspection = self._judge.inspection(arc, settings)
                 if not self._judge.asks(inspection):
-                    return Step(segment, judgement)
+                    return Step(arc, judgement)
                 doubt = self._judge.doubt(inspection)
                 if step < 2 * finest or not doubt:
                     special = inspection.special_points(self._tests)  # where these cannot be found the step is halved
-                    return Step(segment, judgement, special, inspection.turns, doubt)
+                    return Step(arc, judgement, special, inspection.turns, doubt)
                 problem = ConvergenceError(doubt)
             except ConvergenceError as error:
                 problem = error

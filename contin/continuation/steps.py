@@ -23,7 +23,7 @@ from contin.core.step import (
 )
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
-from contin.events.segment import Place, Segment, SpecialPoint
+from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.significance import STANDS, free_values, sense
 from contin.events.trivial import crossed, jumped
 
@@ -37,7 +37,7 @@ class Step(NamedTuple):
 
     Attributes
     ----------
-    segment : Segment
+    arc : Arc
     judgement : Judgement
     special : sequence of SpecialPoint
         Inside it, in order.
@@ -47,7 +47,7 @@ class Step(NamedTuple):
         What is left of it where the step cannot be halved any more.
     """
 
-    segment: Segment
+    arc: Arc
     judgement: Judgement
     special: Sequence[SpecialPoint] = ()
     turns: bool = False
@@ -55,8 +55,8 @@ class Step(NamedTuple):
 
     @property
     def end(self) -> Trial:
-        """The end of the segment on a mesh with points where conditions that the solution decides switch."""
-        return self.segment.trial.settled
+        """The end of the arc on a mesh with points where conditions that the solution decides switch."""
+        return self.arc.trial.settled
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Steps:
     primary: str
     fold: Event | None
 
-    def attempt(self, state: State, here: Trial, step: float, made: Trial | None = None) -> tuple[Segment, Judgement]:
+    def attempt(self, state: State, here: Trial, step: float, made: Trial | None = None) -> tuple[Arc, Judgement]:
         """Make one step of a given length from the state's point, as far as it can be believed by itself.
 
         ``made`` is its end, where a kernel has it.
@@ -103,15 +103,15 @@ class Steps:
         self._stay_off_trivial(state, before, trial)
         if settings.mesh.every:
             trial = settled(trial, state.tangent, settings.newton)
-        return Segment(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), judgement
+        return Arc(state, (low, before), trial, step, settings.newton, bool(settings.mesh.every)), judgement
 
-    def accepted(self, segment: Segment, judgement: Judgement, turned: bool) -> State:
+    def accepted(self, arc: Arc, judgement: Judgement, turned: bool) -> State:
         """Return the state behind a step, on the mesh that its end has settled on.
 
         The next step is chosen so that the predictor's error is ``accuracy`` of it.
         ``turned``: the step passes a fold. Behind it the parameter goes the other way, be it by less than round-off yet.
         """
-        settings, state, trial, step = self.settings, segment.state, segment.trial, segment.step
+        settings, state, trial, step = self.settings, arc.state, arc.trial, arc.step
         angle, accuracy = aims(settings, state.system)
         order, longest = 2 if state.previous_tangent is None else 3, settings.max_step
         free = slice(state.system.state_size, None)

@@ -22,8 +22,8 @@ from contin.problems.statement import Statement
 if TYPE_CHECKING:
     from contin.core.state import Stop
     from contin.core.trial import Event, Trial
+    from contin.events.arc import Arc, SpecialPoint
     from contin.events.coefficient import Coefficient
-    from contin.events.segment import Segment, SpecialPoint
     from contin.functions.batch import Batch
 
 #: Takes vectors of unknowns from one discretization of a problem to another.
@@ -272,7 +272,7 @@ class Discretization(Equations, Protocol):
         """The functions of a problem without a mesh whose steps kernels may make; ``gain`` is what angles of a map gain."""
         return None
 
-    def home(self, segment: Segment) -> SpecialPoint | None:
+    def home(self, arc: Arc) -> SpecialPoint | None:
         """Return the end of the branch inside a step, where solutions become those of another kind."""
         return None
 
@@ -280,7 +280,7 @@ class Discretization(Equations, Protocol):
         """Return whether a step from x to z has left its branch for solutions of no size."""
         return False
 
-    def cannot_branch(self, segment: Segment) -> bool:
+    def cannot_branch(self, arc: Arc) -> bool:
         """Return whether both ends of a step of a branch say that no other branch crosses it there."""
         return False
 

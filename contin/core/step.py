@@ -165,7 +165,7 @@ class Judgement(NamedTuple):
 def judged(state: State, guess: Array, trial: Trial) -> Judgement:
     """Return what the step from a state to a corrected point is judged by."""
     system, sums = state.system, np.empty(6)
-    fill_sums(Arc(state.x, state.tangent, trial.x, trial.tangent, guess), system.weights, system.state_size, sums)
+    fill_sums(BothEnds(state.x, state.tangent, trial.x, trial.tangent, guess), system.weights, system.state_size, sums)
     missed, whole, part, first, last, chord = sums.tolist()
     return Judgement(math.sqrt(missed), turned(whole, part, first, last), math.sqrt(chord))
 
@@ -203,7 +203,7 @@ def following_step(
     return min(max(step * min(max(factor, _SHORTER), _LONGER), shortest), max(longest, shortest))
 
 
-class Arc(NamedTuple):
+class BothEnds(NamedTuple):
     """Both ends of a step with their unit tangents, and the prediction of the second."""
 
     x: ReadOnlyVector
@@ -214,12 +214,12 @@ class Arc(NamedTuple):
 
 
 @kernel
-def fill_sums(arc: Arc, weights: ReadOnlyVector, states: int, sums: Vector) -> None:
+def fill_sums(ends: BothEnds, weights: ReadOnlyVector, states: int, sums: Vector) -> None:
     """Fill the weighted inner products that `judged` uses.
 
     |guess - last|^2, t.T of the tangents, and of the states alone t.T, |t|^2, |T|^2; |c|^2 of the chord.
     """
-    fill_sums_of(arc.x, arc.tangent, arc.last, arc.last_tangent, arc.guess, weights, states, sums)
+    fill_sums_of(ends.x, ends.tangent, ends.last, ends.last_tangent, ends.guess, weights, states, sums)
 
 
 @helper

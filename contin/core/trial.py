@@ -179,10 +179,10 @@ class Event:
     limit : bool
         The run must not go where the function is positive: a start on the limit, too, is left inwards only.
     search : callable, optional
-        ``search(segment, places)`` returns the special points between places of a step (`contin.events.segment`), where a
+        ``search(arc, places)`` returns the special points between places of a step (`contin.events.arc`), where a
         sign does not tell them all; None where it does.
     asks : callable, optional
-        ``asks(segment) -> bool``: whether ``search`` may find something in a step; without it, it is called for every step.
+        ``asks(arc) -> bool``: whether ``search`` may find something in a step; without it, it is called for every step.
     looks : int
         Number of places inside a step where the sign is looked at, too: two zeros in one step leave it as it was at the ends.
     unless : str

@@ -25,10 +25,10 @@ from contin.core.rounding import changes_of_multipliers
 from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Trial, sign_changed
 from contin.errors import ConvergenceError
+from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.hopf import hopf, hopf_points, passes
 from contin.events.labelled import frequency_of
 from contin.events.nearness import AS_FAR, CIRCLE, DEEPER, LOOKS, MINUS_ONE, ONE, comes_near
-from contin.events.segment import Place, Segment, SpecialPoint
 from contin.events.significance import on_finer_mesh
 
 if TYPE_CHECKING:
@@ -213,39 +213,39 @@ def doubled(system: PeriodicCollocation | MapSystem, point: SpecialPoint) -> Spe
     return dataclasses.replace(point, label="PD", name="period doubling", stop=stop)
 
 
-def _may_double(segment: Segment) -> bool:
+def _may_double(arc: Arc) -> bool:
     """Return whether there may be period doublings inside a step."""
-    test = doubling(segment.trial.system.order)
-    return not segment.before.value(test) * segment.trial.value(test) > 0 or _comes_near(segment, MINUS_ONE)
+    test = doubling(arc.trial.system.order)
+    return not arc.before.value(test) * arc.trial.value(test) > 0 or _comes_near(arc, MINUS_ONE)
 
 
-def _doublings(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
+def _doublings(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     """Return the period doublings between places of a step, in order."""
-    test = doubling(segment.trial.system.order)
+    test = doubling(arc.trial.system.order)
     known = [trial.value(test) for _, trial in knots]
-    if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(segment, MINUS_ONE):
+    if np.all(np.sign(known) == np.sign(known[0])) and not _comes_near(arc, MINUS_ONE):
         return []
-    if _mean_little(segment.before) and _mean_little(segment.trial):  # what is found is round-off, and takes long
-        lost = SpecialPoint(segment.step, test.label, test.name, segment.trial, test=test, is_located=False)
+    if _mean_little(arc.before) and _mean_little(arc.trial):  # what is found is round-off, and takes long
+        lost = SpecialPoint(arc.step, test.label, test.name, arc.trial, test=test, is_located=False)
         return [lost] if sign_changed(known[0], known[-1]) else []
-    inside = [segment.step * part for part in LOOKS]
-    looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda place: place[0])
+    inside = [arc.step * part for part in LOOKS]
+    looked = sorted([*knots, *((s, arc.guessed(s)) for s in inside)], key=lambda place: place[0])
     values = [trial.value(test) for _, trial in looked]
     if not np.isfinite(values).all() or (np.all(np.sign(values) == np.sign(values[0])) and not _dips(looked, values)):
         return []
-    knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda place: place[0])
-    knots = sorted([*knots, *_below(segment, knots, test)], key=lambda place: place[0])
+    knots = sorted([*knots, *((s, arc.near(s)) for s in inside)], key=lambda place: place[0])
+    knots = sorted([*knots, *_below(arc, knots, test)], key=lambda place: place[0])
     pieces = [(left, right) for left, right in itertools.pairwise(knots)
               if sign_changed(left[1].value(test), right[1].value(test))
-              and _changes_on_finer_mesh(left[1], right[1], test, segment.newton)]  # fmt: skip
-    return [_doubtful(segment.locate(test, left, right)) for left, right in pieces]
+              and _changes_on_finer_mesh(left[1], right[1], test, arc.newton)]  # fmt: skip
+    return [_doubtful(arc.locate(test, left, right)) for left, right in pieces]
 
 
-def _comes_near(segment: Segment, what: int) -> bool:
+def _comes_near(arc: Arc, what: int) -> bool:
     """Return whether multipliers can have passed something inside a step, and back, by their logarithms at both ends."""
-    ends = np.array([_without_trivial(segment.before), _without_trivial(segment.trial)])
+    ends = np.array([_without_trivial(arc.before), _without_trivial(arc.trial)])
     real, imaginary = np.ascontiguousarray(ends.real), np.ascontiguousarray(ends.imag)
-    return bool(comes_near(real, imaginary, what, int(not segment.trial.system.intervals)))
+    return bool(comes_near(real, imaginary, what, int(not arc.trial.system.intervals)))
 
 
 @functools.lru_cache(maxsize=4)
@@ -257,12 +257,12 @@ def _without_trivial(trial: Trial) -> ComplexArray:
     return found
 
 
-def keep_off_one(segment: Segment) -> bool:
+def keep_off_one(arc: Arc) -> bool:
     """Return whether no multiplier but the one that is 1 comes near 1 in a step of a branch of cycles, by those at both ends.
 
     That is where cycles branch.
     """
-    return not _comes_near(segment, ONE)
+    return not _comes_near(arc, ONE)
 
 
 def _changes_on_finer_mesh(left: Trial, right: Trial, test: Event, newton: Newton) -> bool:
@@ -303,22 +303,22 @@ def _parabola(places: Sequence[float], values: Sequence[float]) -> tuple[float, 
     return b - linear / (2 * square), square, middle - linear**2 / (4 * square)
 
 
-def _below(segment: Segment, knots: list[Place], test: Event) -> list[Place]:
+def _below(arc: Arc, knots: list[Place], test: Event) -> list[Place]:
     """Return places of the other sign, found by following the dips between places of one sign."""
     dips = _dips(knots, [trial.value(test) for _, trial in knots])
-    found = (_followed(segment, at, square, test) for at, square in dips)
+    found = (_followed(arc, at, square, test) for at, square in dips)
     return [place for place in found if place is not None]
 
 
-def _followed(segment: Segment, at: float, square: float, test: Event) -> Place | None:
+def _followed(arc: Arc, at: float, square: float, test: Event) -> Place | None:
     """Return a place near ``at`` where a function that dips towards zero has passed it; None where it turns before.
 
     ``square`` is about half its second derivative: by that and the value, the lowest place is no further off than the places
     on both sides that are looked at.
     """
-    sign, lowest = np.sign(segment.before.value(test)), math.inf
+    sign, lowest = np.sign(arc.before.value(test)), math.inf
     while True:
-        here = at, segment.near(at)
+        here = at, arc.near(at)
         value = sign * here[1].value(test)
         if value < 0:
             return here
@@ -326,14 +326,14 @@ def _followed(segment: Segment, at: float, square: float, test: Event) -> Place 
             return None
         lowest = value
         apart = math.sqrt(value / square)
-        if not 0 < at - apart < at + apart < segment.step:
+        if not 0 < at - apart < at + apart < arc.step:
             return None
-        sides = [(s, segment.near(s)) for s in (at - apart, at + apart)]
+        sides = [(s, arc.near(s)) for s in (at - apart, at + apart)]
         values = [sign * trial.value(test) for _, trial in sides]
         if min(values) < 0:
             return sides[int(np.argmin(values))]
         at, square, _ = _parabola((at - apart, at, at + apart), (values[0], value, values[1]))
-        if not square > 0 or not 0 < at < segment.step:
+        if not square > 0 or not 0 < at < arc.step:
             return None
 
 
@@ -351,16 +351,16 @@ def torus() -> Event:
     return Event("TR", "torus", hopf().function, search=_tori, asks=_may_twist)
 
 
-def _may_twist(segment: Segment) -> bool:
+def _may_twist(arc: Arc) -> bool:
     """Return whether there may be torus bifurcations inside a step."""
-    return _unstable(segment.before) != _unstable(segment.trial) or _comes_near(segment, CIRCLE)
+    return _unstable(arc.before) != _unstable(arc.trial) or _comes_near(arc, CIRCLE)
 
 
-def _tori(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
+def _tori(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     """Return the torus bifurcations between places of a step, in order."""
-    if not _may_twist(segment):
+    if not _may_twist(arc):
         return []
-    return [_doubtful(point) for point in hopf_points(segment, knots) if _passes(segment, point)]
+    return [_doubtful(point) for point in hopf_points(arc, knots) if _passes(arc, point)]
 
 
 @functools.lru_cache(maxsize=4)
@@ -382,6 +382,6 @@ def _mean_little(trial: Trial) -> bool:
     return trivial is not None and not abs(np.expm1(system.eigenvalues(trial.x)[trivial])) <= _MEANINGLESS
 
 
-def _passes(segment: Segment, point: SpecialPoint) -> bool:
+def _passes(arc: Arc, point: SpecialPoint) -> bool:
     """Return whether the pair of a torus bifurcation lies inside the circle on one side of it, and outside on the other."""
-    return not point.is_located or passes(segment, point.at, point.details["frequency"])
+    return not point.is_located or passes(arc, point.at, point.details["frequency"])

@@ -22,8 +22,8 @@ from contin.arrays import Array
 from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.root import find_zero
-from contin.events.segment import Segment, SpecialPoint
 from contin.problems.own_names import PERIOD
 
 if TYPE_CHECKING:
@@ -44,19 +44,17 @@ _ON_AXIS = 1e-9
 AMPLITUDE = Event("HB", "Hopf", lambda trial: trial.system.amplitude(trial.x))  # type: ignore[attr-defined]  # of cycles
 
 
-def hopf_point_inside(system: CycleCollocation, segment: Segment) -> SpecialPoint | None:
+def hopf_point_inside(system: CycleCollocation, arc: Arc) -> SpecialPoint | None:
     """Return the Hopf point inside a step of a branch of cycles, or None."""
-    before, trial = segment.before.value(AMPLITUDE), segment.trial.value(AMPLITUDE)
+    before, trial = arc.before.value(AMPLITUDE), arc.trial.value(AMPLITUDE)
     if not before > 0 > trial:
         return None
     try:
-        at = find_zero(
-            lambda s: system.amplitude(segment.guess(s)), (segment.low, before), (segment.step, trial), segment.precision
-        )
-        x, frequency, error = _hopf_point(system, segment.guess(at))
+        at = find_zero(lambda s: system.amplitude(arc.guess(s)), (arc.low, before), (arc.step, trial), arc.precision)
+        x, frequency, error = _hopf_point(system, arc.guess(at))
     except ConvergenceError:
         return None
-    if not segment.passes_by(x, at):
+    if not arc.passes_by(x, at):
         return None
     stop = Stop(Reason.HOPF, "the cycles shrink onto an equilibrium, a Hopf point")
     there, details = Trial.without_tangent(system, x), {"frequency": frequency, "pairs": 1}

@@ -32,8 +32,8 @@ import numpy as np
 
 from contin.arrays import Array
 from contin.core.multilinear import of_complex
+from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
-from contin.events.segment import SpecialPoint
 
 if TYPE_CHECKING:
     from contin.cycles.maps import MapSystem

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +10,15 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Mask
 from contin.core.rounding import on_circle
 from contin.core.scales import Scales
-from contin.core.trial import Event
-from contin.cycles.floquet import critical_angle, doubled, doubling, torus, unstable
-from contin.cycles.folds import events_on_folds
+from contin.cycles.branches import OfCycles
 from contin.cycles.map_curves import MapDoublingCurve, MapTorusCurve
 from contin.cycles.map_normal_forms import at_special_point
 from contin.cycles.phase import map_in_phase
 from contin.cycles.system import is_opposite, is_pair
 from contin.equilibria.system import Algebraic
+from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
-from contin.events.labelled import doubles
 from contin.events.nearness import NO_MULTIPLIER
-from contin.events.segment import SpecialPoint
 from contin.functions.batch import Batch
 from contin.linalg.periodic import log_eigenvalues
 from contin.problems.angles import check_windings, gain, whole_rounds, windings
@@ -38,7 +34,7 @@ _SHRUNK = 1e-7
 _MANY = 200
 
 
-class MapSystem(Algebraic):
+class MapSystem(OfCycles, Algebraic):
     """Cycles u_1 ... u_k of a map: f(u_j, p) - u_(j+1) = 0, with u_(k+1) = u_1. There are no scales.
 
     All points are unknowns, so that the equations are as nonlinear as f, and not as f applied k times: other cycles, which may
@@ -63,6 +59,7 @@ class MapSystem(Algebraic):
     gain: Array
     #: As of cycles: no symmetry is declared, and the multipliers are those of all rounds; none of them is always 1.
     order, autonomous = 1, False
+    of_doublings, of_tori = MapDoublingCurve, MapTorusCurve
 
     def __init__(
         self, problem: MapProblem, free: Sequence[str], parameters: Mapping[str, float] | None = None,
@@ -178,8 +175,7 @@ class MapSystem(Algebraic):
             return self, x
         x = self.continuous(x)
         read = windings(self.problem.angles, self.problem.state_names, self.gained(x))
-        other = self.with_parameters({name: given.get(name, value) for name, value in read.items()})
-        assert isinstance(other, MapSystem)
+        other: Any = self.with_parameters({name: given.get(name, value) for name, value in read.items()})
         return other, x
 
     def gained(self, x: Array) -> Array:
@@ -325,9 +321,12 @@ class MapSystem(Algebraic):
     def doubled(self, x: Array) -> tuple[MapSystem, Array]:
         """Return the same problem with twice the rounds, and x for it."""
         values = dict(zip(self.problem.parameters, self.all_parameters(x)))
-        other, states = self.with_parameters({ROUNDS: 2.0 * self.rounds}), self.states(x)
-        assert isinstance(other, MapSystem)
-        return other.with_rounds_of(other.pack(np.concatenate([states, states + self.gain]), values), {})
+        other: Any = self.with_parameters({ROUNDS: 2.0 * self.rounds})
+        states = self.states(x)
+        found: tuple[MapSystem, Array] = other.with_rounds_of(
+            other.pack(np.concatenate([states, states + self.gain]), values), {}
+        )
+        return found
 
     def with_scales(self, x: Array, states: Array, parameters: Array) -> tuple[MapSystem, Array]:
         """Return the same."""
@@ -336,42 +335,10 @@ class MapSystem(Algebraic):
     # --- what the kind knows of its branches --------------------------------------------------------------------------
 
     @property
-    def is_cycle(self) -> bool:
-        """Yes."""
-        return True
-
-    def unstable(self, x: Array) -> int:
-        """Return the number of unstable multipliers."""
-        return unstable(self, x)
-
-    @property
-    def curves(self) -> Mapping[str, type]:
-        """Those of period doublings and torus bifurcations."""
-        return {kind.kind: kind for kind in (MapDoublingCurve, MapTorusCurve)}
-
-    def defining(self, point: Any, x: Array) -> tuple[Any, Array] | None:
-        """Return those of period doublings and torus bifurcations."""
-        if doubles(point):
-            return MapDoublingCurve(self), x
-        return (MapTorusCurve(self), np.append(x, math.cos(critical_angle(self, point, x)))) if point.label == "TR" else None
-
-    def events(self) -> list[Event]:
-        """Return those of period doublings and torus bifurcations."""
-        return [doubling(), torus()]
-
-    @property
     def small_equations(self) -> Batch | None:
         """The map, of fixed points."""
         known: Batch = self.problem.batch("map")
         return known if type(self) is MapSystem and self.rounds == 1 else None
-
-    def events_on_folds(self) -> list[Event]:
-        """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
-        return events_on_folds(self)
-
-    def judged(self, point: SpecialPoint) -> SpecialPoint:
-        """Return a special point, as the end where cycles go twice round ones of half their length."""
-        return doubled(self, point)
 
     def coefficient(self, point: SpecialPoint) -> Coefficient | None:
         """Return those of folds, period doublings and torus bifurcations."""

@@ -25,9 +25,9 @@ from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Trial
 from contin.defining.critical_curve import CriticalCurve
 from contin.defining.fold_curve import normal_product, turns_back
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.events.interpolated import interpolated_zero
-from contin.events.segment import Segment, SpecialPoint
 
 #: Cosines of the angles at strong resonances.
 RESONANCES = {"R1": 1.0, "R2": -1.0, "R3": -0.5, "R4": 0.0}
@@ -147,32 +147,32 @@ def _resonance(label: str, kappa: float) -> Event:
     def distance(trial: Trial) -> float:
         return sign * (_curve(trial).kappa(trial.x) - kappa)
 
-    def search(segment: Segment, _: object) -> list[SpecialPoint] | None:
-        return _touched(segment, test, distance)
+    def search(arc: Arc, _: object) -> list[SpecialPoint] | None:
+        return _touched(arc, test, distance)
 
     at_end = abs(kappa) == 1
     test = Event(label, name, distance, terminal=at_end, search=search if at_end else None)
     return test
 
 
-def _touched(segment: Segment, test: Event, distance: Callable[[Trial], float]) -> list[SpecialPoint] | None:
+def _touched(arc: Arc, test: Event, distance: Callable[[Trial], float]) -> list[SpecialPoint] | None:
     """Return the resonance where the angle has an extremum; None where there is none in a step.
 
     A symmetry makes a round of equal parts. Where the pair of half a round passes i and -i, that of the round comes to -1 and
     goes back: both vectors are eigenvectors, and the equations of the curve singular. They are, too, where cycles that have an
     image become their own image: there the pair comes to 1, and the curve goes back on itself.
     """
-    a, b = (_change(trial) for trial in (segment.before, segment.trial))
+    a, b = (_change(trial) for trial in (arc.before, arc.trial))
     if not a * b < 0:
         return None
-    near = segment.low + (segment.step - segment.low) * a / (a - b)
-    if abs(distance(segment.guessed(near))) > _NEAR:
+    near = arc.low + (arc.step - arc.low) * a / (a - b)
+    if abs(distance(arc.guessed(near))) > _NEAR:
         return None
-    found = interpolated_zero(segment, (_change, distance), near)
+    found = interpolated_zero(arc, (_change, distance), near)
     if found is None:
         return None
     stop = None
-    if turns_back(found.trial, slice(segment.state.system.state_size, None)):
+    if turns_back(found.trial, slice(arc.state.system.state_size, None)):
         stop = Stop(Reason.PITCHFORK, f"met {test.name} on a symmetric cycle: beyond it the curve is its own mirror image")
     return [SpecialPoint(found.at, test.label, test.name, found.trial, stop, found, test)]
 

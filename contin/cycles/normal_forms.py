@@ -37,8 +37,8 @@ from contin.arrays import Array
 from contin.core.multilinear import of_complex
 from contin.cycles.floquet import has_double_one
 from contin.cycles.round import Round, Solver
+from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
-from contin.events.segment import SpecialPoint
 from contin.problems.own_names import PERIOD
 
 if TYPE_CHECKING:

@@ -23,17 +23,16 @@ from contin.core.scales import Scales
 from contin.core.state import Reason, Stop
 from contin.core.step import COLLAPSED
 from contin.core.trial import Event, Trial
+from contin.cycles.branches import OfCycles
 from contin.cycles.curves import DoublingCurve, TorusCurve
-from contin.cycles.floquet import critical_angle, doubled, doubling, keep_off_one, torus, unstable
-from contin.cycles.folds import events_on_folds
+from contin.cycles.floquet import keep_off_one
 from contin.cycles.homoclinic import explained, homoclinic
 from contin.cycles.hopf_end import AMPLITUDE, hopf_point_inside, shrunk
 from contin.cycles.normal_forms import at_special_point
 from contin.cycles.phase import cycle_in_phase, forced_cycle_in_phase, lasting
 from contin.errors import ProblemError
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.coefficient import Coefficient
-from contin.events.labelled import doubles
-from contin.events.segment import Segment, SpecialPoint
 from contin.functions.batch import Columns
 from contin.linalg.condensation import Factorization
 from contin.linalg.factors import Factors
@@ -69,7 +68,7 @@ _DIGITS = 9
 _OTHERWISE, _STILL = 1.01, 1e-9
 
 
-class PeriodicCollocation(Collocation):
+class PeriodicCollocation(OfCycles, Collocation):
     """A `CycleProblem` on a mesh: what forced and autonomous ones share.
 
     Attributes
@@ -80,6 +79,7 @@ class PeriodicCollocation(Collocation):
 
     problem: CycleProblem
     autonomous = True
+    of_doublings, of_tori = DoublingCurve, TorusCurve
     #: Twice those of other problems: with these, branches of Lorenz's cycles and of AUTO's pp2 take 15 orbits for 19, and 10
     #: for 15, and all special points of the tests' cycles are found.
     aims = 0.7, 0.05
@@ -325,41 +325,9 @@ class PeriodicCollocation(Collocation):
         """Where a kernel computes the multipliers."""
         return monodromy_of(self)
 
-    @property
-    def is_cycle(self) -> bool:
-        """Yes."""
-        return True
-
-    def unstable(self, x: Array) -> int:
-        """Return the number of unstable multipliers, without the one that is 1."""
-        return unstable(self, x)
-
-    @property
-    def curves(self) -> Mapping[str, type]:
-        """Those of period doublings and torus bifurcations."""
-        return {kind.kind: kind for kind in (DoublingCurve, TorusCurve)}
-
-    def defining(self, point: Any, x: Array) -> tuple[DoublingCurve | TorusCurve, Array] | None:
-        """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
-        if doubles(point):
-            return DoublingCurve(self), x
-        return (TorusCurve(self), np.append(x, math.cos(critical_angle(self, point, x)))) if point.label == "TR" else None
-
-    def events(self) -> list[Event]:
-        """Return those of period doublings (or a symmetry that breaks) and torus bifurcations."""
-        return [doubling(self.order), torus()]
-
-    def cannot_branch(self, segment: Segment) -> bool:
+    def cannot_branch(self, arc: Arc) -> bool:
         """Return whether no multiplier but the one that is 1 comes near 1: that is where cycles branch."""
-        return keep_off_one(segment)
-
-    def events_on_folds(self) -> list[Event]:
-        """Return those of a further multiplier 1, or another one -1, and of the end where cycles shrink."""
-        return events_on_folds(self)
-
-    def judged(self, point: SpecialPoint) -> SpecialPoint:
-        """Return a special point, as the end where cycles go twice round ones of half the period."""
-        return doubled(self, point)
+        return keep_off_one(arc)
 
     def coefficient(self, point: SpecialPoint) -> Coefficient | None:
         """Return those of folds, period doublings and torus bifurcations."""
@@ -602,9 +570,9 @@ class CycleCollocation(Conditioned, PeriodicCollocation):
             return self.with_reference(x)
         return self.with_reference(x + tangent / np.abs(tangent).max()) if np.isfinite(tangent).all() else self
 
-    def home(self, segment: Segment) -> SpecialPoint | None:
+    def home(self, arc: Arc) -> SpecialPoint | None:
         """Return the Hopf point inside a step."""
-        return hopf_point_inside(self, segment)
+        return hopf_point_inside(self, arc)
 
     def collapsed(self, x: Array, z: Array) -> bool:
         """Return whether z is an equilibrium, which solves the equations with any period, and curves of them with some."""

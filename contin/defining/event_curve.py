@@ -26,8 +26,8 @@ from contin.core.differences import derivative
 from contin.core.trial import Event, Trial
 from contin.defining.extended import FITS, Borders, Extended
 from contin.defining.fold_curve import shrinking
+from contin.events.arc import SpecialPoint
 from contin.events.extrema import orthonormal
-from contin.events.segment import SpecialPoint
 from contin.linalg.factors import Factors
 
 

@@ -24,8 +24,8 @@ from contin.core.state import Reason, Stop
 from contin.core.system import System
 from contin.core.trial import Event, Trial
 from contin.defining.extended import FITS, Borders, Extended, cosine
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.interpolated import interpolated_zero
-from contin.events.segment import Segment, SpecialPoint
 from contin.linalg.factors import Factors
 
 #: A curve of cycles ends where they are smaller than this part of the reference, an orbit a few steps before; parameters differ
@@ -111,7 +111,7 @@ class FoldCurve(Extended):
 
     def events(self) -> list[Event]:
         """Return those of cusps (w.F_zz v v = 0), of folds that meet a branch point (w.F_lambda = 0), and of the kind."""
-        cusp = Event("CP", "cusp", _bend, search=lambda segment, _: None if _may_be_cusp(segment) else [])
+        cusp = Event("CP", "cusp", _bend, search=lambda arc, _: None if _may_be_cusp(arc) else [])
         return [cusp, _MEETS, *self.base.events_on_folds()]
 
 
@@ -122,15 +122,15 @@ def _bend(trial: Trial) -> float:
     return float(system.gradient(trial.x, v, w) @ v)
 
 
-def _may_be_cusp(segment: Segment) -> bool:
+def _may_be_cusp(arc: Arc) -> bool:
     """Return whether the parameters reverse inside a step, as they do at a cusp, where they stand still.
 
     w.F_zz v v vanishes, too, where solutions have v as a symmetry, as the phase of a forced cycle whose forcing vanishes: there
     the parameters go on. At a pitchfork of the folds they reverse as well.
     """
-    places = [segment.state.system.state_size, segment.state.system.size - 1]
-    before, behind = (trial.tangent[places] for trial in (segment.before, segment.trial))
-    return bool(before @ behind < 0) and _singular_point(segment) is None
+    places = [arc.state.system.state_size, arc.state.system.size - 1]
+    before, behind = (trial.tangent[places] for trial in (arc.before, arc.trial))
+    return bool(before @ behind < 0) and _singular_point(arc) is None
 
 
 def _by_first(trial: Trial) -> float:
@@ -148,23 +148,23 @@ def _by_last(trial: Trial) -> float:
 
 
 @functools.lru_cache(maxsize=1)
-def _singular_point(segment: Segment) -> list[SpecialPoint] | None:
+def _singular_point(arc: Arc) -> list[SpecialPoint] | None:
     """Return the point inside a step where both w.F_lambda and w.F_mu vanish, in a list; None where there is none.
 
     The extended system is singular there. At a pitchfork the curve turns back as its mirror image, so that the run ends; at a
     transcritical bifurcation it goes on.
     """
-    a, b = (trial.value(_MEETS) for trial in (segment.before, segment.trial))
+    a, b = (trial.value(_MEETS) for trial in (arc.before, arc.trial))
     if not a * b < 0:
         return None
-    near = segment.low + (segment.step - segment.low) * a / (a - b)
-    largest = max(abs(_by_last(trial)) for trial in (segment.before, segment.trial))
-    if abs(_by_last(segment.guessed(near))) > _SMALL * largest:
+    near = arc.low + (arc.step - arc.low) * a / (a - b)
+    largest = max(abs(_by_last(trial)) for trial in (arc.before, arc.trial))
+    if abs(_by_last(arc.guessed(near))) > _SMALL * largest:
         return None
-    found = interpolated_zero(segment, (_by_first, _by_last), near)
+    found = interpolated_zero(arc, (_by_first, _by_last), near)
     if found is None:
         return None
-    system = segment.state.system
+    system = arc.state.system
     stop = None
     if turns_back(found.trial, [system.state_size, system.size - 1]):
         stop = Stop(Reason.PITCHFORK, "the folds end on a pitchfork: beyond it the curve is its own mirror image")
@@ -177,7 +177,7 @@ def turns_back(trial: Trial, parameters: Any) -> bool:
 
 
 #: Where the fold meets a branch point: w.F_lambda = 0.
-_MEETS = Event("BP", "fold meets a branch point", _by_first, search=lambda segment, _: _singular_point(segment))
+_MEETS = Event("BP", "fold meets a branch point", _by_first, search=lambda arc, _: _singular_point(arc))
 
 
 def shrinking(base: Discretization) -> list[Event]:

@@ -17,8 +17,8 @@ import numpy as np
 
 from contin.arrays import Array, ComplexArray
 from contin.core.multilinear import of_complex
+from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
-from contin.events.segment import SpecialPoint
 from contin.linalg.orientation import oriented
 
 if TYPE_CHECKING:

@@ -20,10 +20,10 @@ from contin.equilibria.folds import events_on_folds
 from contin.equilibria.given import check_given
 from contin.equilibria.hopf_curve import HopfCurve
 from contin.equilibria.lyapunov import at_hopf_point, critical_pair
+from contin.events.arc import SpecialPoint
 from contin.events.coefficient import Coefficient
 from contin.events.hopf import hopf
 from contin.events.labelled import frequency_of
-from contin.events.segment import SpecialPoint
 from contin.functions.batch import Batch, Columns
 from contin.linalg.dense import DenseFactors, eigenvalues
 from contin.linalg.factors import Factors

@@ -15,10 +15,10 @@ from contin.arrays import Array, ComplexArray
 from contin.core.protocol import inner
 from contin.core.trial import Trial, sign_changed
 from contin.errors import ConvergenceError
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.branch_point import locate_branch_point
 from contin.events.crossings import calm, crossings, is_watched, passed, quotients, quotients_along
 from contin.events.multiple_point import MultiplePoint, locate_multiple_point
-from contin.events.segment import Segment, SpecialPoint
 from contin.linalg.factors import Factors
 from contin.linalg.orientation import canonical_basis
 from contin.linalg.singular import smallest_directions
@@ -47,8 +47,8 @@ _TOGETHER = 0.1
 class BranchPointSearch:
     """The branch points inside one step."""
 
-    def __init__(self, segment: Segment) -> None:
-        self.segment = segment
+    def __init__(self, arc: Arc) -> None:
+        self.arc = arc
         self._shares: Array = np.empty(0)  # at which parts of the step branch points are expected, in order
 
     @property
@@ -59,13 +59,11 @@ class BranchPointSearch:
     @functools.cached_property
     def count(self) -> tuple[int, bool]:
         """How many branch points the step passes, and whether that is clear."""
-        state, before, trial = self.segment.state, self.segment.before, self.segment.trial
+        state, before, trial = self.arc.state, self.arc.before, self.arc.trial
         row, size = state.row, state.system.size
         if before.factors is None:
             before.refactor(row)
-        if before.sign == trial.sign and (
-            state.system.cannot_branch(self.segment) or calm(before.factors, trial.factors, size)
-        ):
+        if before.sign == trial.sign and (state.system.cannot_branch(self.arc) or calm(before.factors, trial.factors, size)):
             return 0, True
         watched = is_watched(before.factors, trial.factors, size)
         if watched and not self.sign_changes:
@@ -98,14 +96,14 @@ class BranchPointSearch:
         So the sign of A is that of g, as long as no singular value of M passes zero. Two zeros of g in the step would leave its
         sign as it was: it is looked at in the middle, too.
         """
-        segment, system = self.segment, self.segment.state.system
+        arc, system = self.arc, self.arc.state.system
         size, unit = system.size, np.zeros(system.size + 1)
-        right, left, response = smallest_directions(segment.trial.factors, size, 2)
+        right, left, response = smallest_directions(arc.trial.factors, size, 2)
         inverses = np.sort(np.linalg.svd(response, compute_uv=False)) if np.isfinite(response).all() else np.ones(2)
         if inverses[1] < _BY_FAR * inverses[0]:
             return None
         rows, unit[-1] = np.zeros((2, size + 1)), 1.0
-        rows[0, :-1], rows[1, :-1] = segment.state.row, right[0]
+        rows[0, :-1], rows[1, :-1] = arc.state.row, right[0]
         column = left[:1, : system.equations]
         matrix = functools.cache(lambda part: self._bordered(part, rows, column))
         first, last = matrix(0.0), matrix(1.0)
@@ -125,74 +123,74 @@ class BranchPointSearch:
         if matrix(0.5).solve(unit)[-1] * g[0] > 0:
             return 0, True
         with contextlib.suppress(ConvergenceError):  # the cubic may lie on the other side of a zero
-            middle = system.linearize(segment.at(segment.step / 2).x, rows, column)[1]
+            middle = system.linearize(arc.at(arc.step / 2).x, rows, column)[1]
             if middle.solve(unit)[-1] * g[0] > 0:
                 return 0, True
         return None
 
     def _whole(self, part: float) -> Factors:
         """Return the factors of [F_x; row] at a part of the step."""
-        trial, row = self.segment.trial, self.segment.state.row
+        trial, row = self.arc.trial, self.arc.state.row
         return trial.factors if part == 1 else self._bordered(part, row[None])
 
     def _bordered(self, part: float, rows: Array, columns: Array | tuple[()] = ()) -> Factors:
         """Return the factors of F_x with these rows and columns at a part of the step, inside it on the cubic."""
-        segment, ends = self.segment, {0.0: self.segment.before, 1.0: self.segment.trial}
-        x = ends[part].x if part in ends else segment.guess(segment.low + part * (segment.step - segment.low))
-        return segment.state.system.linearize(x, rows, columns)[1]
+        arc, ends = self.arc, {0.0: self.arc.before, 1.0: self.arc.trial}
+        x = ends[part].x if part in ends else arc.guess(arc.low + part * (arc.step - arc.low))
+        return arc.state.system.linearize(x, rows, columns)[1]
 
     @property
     def _gap(self) -> float:
         """Largest distance between two arms of a curve that count as branches which cross."""
-        return _GAP if self.segment.state.system.intervals else _GAP_WITHOUT_MESH
+        return _GAP if self.arc.state.system.intervals else _GAP_WITHOUT_MESH
 
     @property
     def sign_changes(self) -> bool:
         """The determinant's sign changes inside the step."""
-        return sign_changed(self.segment.before.sign, self.segment.trial.sign)
+        return sign_changed(self.arc.before.sign, self.arc.trial.sign)
 
     @functools.cached_property
     def simple(self) -> SpecialPoint:
         """The branch point inside the step, its bracket halved until the locator's answer lies inside it."""
-        segment = self.segment
-        state, trial, step = segment.state, segment.trial, segment.step
-        low, high = segment.low, step
+        arc = self.arc
+        state, trial, step = arc.state, arc.trial, arc.step
+        low, high = arc.low, step
         middle = low + self._share * (high - low)
         for _ in range(_HALVINGS):
             try:
-                found = locate_branch_point(state.system, segment.guess(middle), segment.newton)
+                found = locate_branch_point(state.system, arc.guess(middle), arc.newton)
                 at = inner(state.system, state.tangent, found.x - state.x)
-                inside = segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
-                if inside and found.gap < self._gap and segment.passes_by(found.x, at):
-                    found = found.along(state.system, segment.direction(at))
+                inside = arc.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE)
+                if inside and found.gap < self._gap and arc.passes_by(found.x, at):
+                    found = found.along(state.system, arc.direction(at))
                     return SpecialPoint(at, "BP", "", Trial.without_tangent(state.system, found.x), details=found)
             except ConvergenceError:
                 pass
             try:
-                sign = segment.at(middle).sign
+                sign = arc.at(middle).sign
             except ConvergenceError:
                 break
-            low, high = (middle, high) if sign == segment.before.sign else (low, middle)
+            low, high = (middle, high) if sign == arc.before.sign else (low, middle)
             middle = (low + high) / 2
         return SpecialPoint(high, "BP", "", trial, is_located=False)
 
     @functools.cached_property
     def multiple(self) -> SpecialPoint:
         """The multiple point inside the step, where several singular values vanish together; "possible" where they do not."""
-        segment = self.segment
-        state, step = segment.state, segment.step
-        count, middle = self.count[0], segment.low + self._share * (step - segment.low)
+        arc = self.arc
+        state, step = arc.state, arc.step
+        count, middle = self.count[0], arc.low + self._share * (step - arc.low)
         with contextlib.suppress(ConvergenceError):
             if np.ptp(self._shares) < _TOGETHER and not self._apart(middle):
-                found = locate_multiple_point(state.system, segment.guess(middle), state.row, count, segment.newton)
+                found = locate_multiple_point(state.system, arc.guess(middle), state.row, count, arc.newton)
                 assert found.x is not None
                 at = inner(state.system, state.tangent, found.x - state.x)
-                if segment.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE):
+                if arc.low - _OUTSIDE * step <= at <= step * (1 + _OUTSIDE):
                     trial = Trial.without_tangent(state.system, found.x)
                     return SpecialPoint(at, "BP", f"kernel of dimension {found.dimension}", trial, details=found)
-        kernel = smallest_directions(segment.trial.factors, state.system.size, count + 1)[0][:count]
+        kernel = smallest_directions(arc.trial.factors, state.system.size, count + 1)[0][:count]
         kernel = canonical_basis(kernel, state.system.weights)
-        return SpecialPoint(step, "BP", "", segment.trial, details=MultiplePoint(count, kernel), is_located=False)
+        return SpecialPoint(step, "BP", "", arc.trial, details=MultiplePoint(count, kernel), is_located=False)
 
     def _apart(self, middle: float) -> bool:
         """Return whether the singular values pass zero at different places, as seen from halfway between the expected ones.
@@ -201,10 +199,10 @@ class BranchPointSearch:
         ------
         ConvergenceError
         """
-        segment, (count, _) = self.segment, self.count
-        there = segment.at(middle)
-        there.refactor(segment.state.row)
-        values = quotients(segment.before.factors, there.factors, segment.state.system.size)
+        arc, (count, _) = self.arc, self.count
+        there = arc.at(middle)
+        there.refactor(arc.state.row)
+        values = quotients(arc.before.factors, there.factors, arc.state.system.size)
         passing, vanishing = passed(values)
         shares = _shares(values[passing | vanishing])
         return 0 < len(shares) < count or (len(shares) == count and float(np.ptp(shares)) > _TOGETHER)

@@ -18,7 +18,7 @@ import numpy as np
 from contin.core.protocol import inner
 from contin.core.trial import Event, Trial, sign_changed
 from contin.errors import ConvergenceError
-from contin.events.segment import Place, Segment, SpecialPoint
+from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.significance import passed_before, senses
 from contin.functions.kernel_parts import helper
 
@@ -77,16 +77,16 @@ def ends_low(first: float, last: float, linear: float, square: float) -> bool:
     return min(first, last) < _BESIDE * square and inwards < _SHALLOW * square
 
 
-def may_turn(segment: Segment, fold: Event) -> bool:
+def may_turn(arc: Arc, fold: Event) -> bool:
     """Return whether the primary parameter may turn inside a step, by its rates at both ends and their parabola.
 
     It may, too, where its sense cannot be told at an end, or is not that in which it went before.
     """
-    ends = senses(segment, fold)
-    if not ends[0] * ends[1] > 0 or segment.state.sense * ends[1] < 0:
+    ends = senses(arc, fold)
+    if not ends[0] * ends[1] > 0 or arc.state.sense * ends[1] < 0:
         return True
-    search = FoldSearch(segment, fold, lambda: None)
-    parabola = search._parabola((segment.low, segment.before), (segment.step, segment.trial)).times(ends[0])
+    search = FoldSearch(arc, fold, lambda: None)
+    parabola = search._parabola((arc.low, arc.before), (arc.step, arc.trial)).times(ends[0])
     return parabola.dips or parabola.ends_low
 
 
@@ -95,17 +95,17 @@ class FoldSearch:
 
     Parameters
     ----------
-    segment : Segment
+    arc : Arc
     fold : Event
         The tangent's component of the primary parameter, which is its name.
     pitchfork : callable
         Returns the fold at the branch point inside the step, where the parameter turns right there, or None.
     """
 
-    def __init__(self, segment: Segment, fold: Event, pitchfork: Callable[[], SpecialPoint | None]) -> None:
-        self.segment, self.fold, self.pitchfork = segment, fold, pitchfork
-        self._index = segment.trial.system.parameter_index(fold.name)
-        self._outside = _OUTSIDE * segment.step
+    def __init__(self, arc: Arc, fold: Event, pitchfork: Callable[[], SpecialPoint | None]) -> None:
+        self.arc, self.fold, self.pitchfork = arc, fold, pitchfork
+        self._index = arc.trial.system.parameter_index(fold.name)
+        self._outside = _OUTSIDE * arc.step
 
     def find(self) -> list[SpecialPoint]:
         """Return the folds inside the step, in order.
@@ -116,17 +116,17 @@ class FoldSearch:
         from a first point on which branches cross is that point. For rates that may be errors of the mesh see
         `contin.events.significance`.
         """
-        segment = self.segment
-        left, right = (segment.low, segment.before), (segment.step, segment.trial)
-        if not all(senses(segment, self.fold)):
-            return passed_before(segment, self.fold)
+        arc = self.arc
+        left, right = (arc.low, arc.before), (arc.step, arc.trial)
+        if not all(senses(arc, self.fold)):
+            return passed_before(arc, self.fold)
         found = self.between(left, right)
-        while segment.state.singular and found and not self._differs(left[1], found[0].trial):
+        while arc.state.singular and found and not self._differs(left[1], found[0].trial):
             del found[0]  # the first point itself: beside it tangents are blurred
         clear = max(abs(left[1].value(self.fold)), abs(right[1].value(self.fold))) >= _ROUND_OFF
-        if found and not (clear and segment.trial.newton_error <= segment.newton.tolerance):
+        if found and not (clear and arc.trial.newton_error <= arc.newton.tolerance):
             self._drop_round_off(found, left, right)
-        return found or passed_before(segment, self.fold)
+        return found or passed_before(arc, self.fold)
 
     def _drop_round_off(self, found: list[SpecialPoint], left: Place, right: Place) -> None:
         """Take out of the folds found those between which, or beside which, the parameter does not differ."""
@@ -155,7 +155,7 @@ class FoldSearch:
         if fork is not None and left[0] - self._outside <= fork.at <= right[0] + self._outside:
             return self._around(fork, left, right)
         if sign_changed(*ends):
-            return [self.segment.locate(self.fold, left, right, self.estimate(left, right))]
+            return [self.arc.locate(self.fold, left, right, self.estimate(left, right))]
         dip = self._dip(left, right)
         return [] if dip is None else self.between(left, dip) + self.between(dip, right)
 
@@ -165,10 +165,10 @@ class FoldSearch:
         The rate is odd around it: where another fold is close, its mirror image is, too, and the rate at the two places has
         the signs that it would have without both.
         """
-        aside = _ASIDE * self.segment.step
+        aside = _ASIDE * self.arc.step
         sides = [s for s in (fork.at - aside, fork.at + aside) if left[0] < s < right[0]]
         try:
-            near = [(s, self.segment.at(s)) for s in sides]
+            near = [(s, self.arc.at(s)) for s in sides]
         except ConvergenceError:  # right beside the fork the equations are too nearly singular: the ends decide
             return [fork] if sign_changed(left[1].value(self.fold), right[1].value(self.fold)) else []
         before, behind = (near[0] if fork.at - aside > left[0] else left), (near[-1] if fork.at + aside < right[0] else right)
@@ -193,7 +193,7 @@ class FoldSearch:
 
     def rate(self, trial: Trial) -> float:
         """Return the rate of the primary parameter along the state's tangent."""
-        state = self.segment.state
+        state = self.arc.state
         return trial.value(self.fold) / inner(state.system, state.tangent, trial.tangent)
 
     def estimate(self, left: Place, right: Place) -> float | None:
@@ -234,7 +234,7 @@ class FoldSearch:
             apart = self._distance(place, np.sqrt(value / square), left, right)
             if apart is None:
                 return None
-            near = [(s, self.segment.at(s)) for s in (place[0] + apart, place[0] + 2 * apart)]
+            near = [(s, self.arc.at(s)) for s in (place[0] + apart, place[0] + 2 * apart)]
             values = [sense * self.rate(trial) for _, trial in near]
             if min(values) < -flat:
                 return near[int(np.argmin(values))]
@@ -242,7 +242,7 @@ class FoldSearch:
             if not bend > 0:
                 return None
             s = place[0] + apart * (0.5 - (values[0] - value) / bend)
-            place = (s, self.segment.at(s)) if left[0] < s < right[0] else None
+            place = (s, self.arc.at(s)) if left[0] < s < right[0] else None
         return None
 
     def _suspect(self, left: Place, right: Place, parabola: _Parabola) -> tuple[Place | None, float]:
@@ -255,7 +255,7 @@ class FoldSearch:
         first, last, linear, square = parabola
         if parabola.dips:
             s = a - width * linear / (2 * square)
-            return (s, self.segment.at(s)), square / width**2
+            return (s, self.arc.at(s)), square / width**2
         return (left if first < last else right) if parabola.ends_low else None, square / width**2
 
     @staticmethod

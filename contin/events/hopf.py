@@ -18,8 +18,8 @@ import numpy as np
 from contin.arrays import Array, ComplexArray, Indices
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
+from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.root import find_zero
-from contin.events.segment import Place, Segment, SpecialPoint
 
 #: An eigenvalue with a smaller imaginary part, relative to 1 + its size, is real: a double real one splits by the square root
 #: of round-off.
@@ -52,9 +52,9 @@ def hopf() -> Event:
     return Event("HB", "Hopf", function, search=hopf_points, asks=may_pass)
 
 
-def may_pass(segment: Segment) -> bool:
+def may_pass(arc: Arc) -> bool:
     """Return whether a pair may pass the axis inside a step, by how far eigenvalues move between its ends."""
-    return _moving([(segment.low, segment.before), (segment.step, segment.trial)])[0]
+    return _moving([(arc.low, arc.before), (arc.step, arc.trial)])[0]
 
 
 def critical_real_part(frequency: float) -> Callable[[Trial], float]:
@@ -88,27 +88,27 @@ def _half_plane(values: ComplexArray) -> Any:
     return np.where(np.abs(values.imag) > _REAL * (1 + np.abs(values)), np.sign(values.imag), 0.0)
 
 
-def hopf_points(segment: Segment, knots: list[Place]) -> list[SpecialPoint]:
+def hopf_points(arc: Arc, knots: list[Place]) -> list[SpecialPoint]:
     """Return the Hopf points between places of a step, in order."""
-    symmetric: Any = getattr(segment.trial.system, "is_symmetric", None)
-    if symmetric is not None and symmetric(segment.state.x) and symmetric(segment.trial.x):
+    symmetric: Any = getattr(arc.trial.system, "is_symmetric", None)
+    if symmetric is not None and symmetric(arc.state.x) and symmetric(arc.trial.x):
         return []  # all eigenvalues are real
-    inside = sorted({segment.step * part / _PARTS for part in range(1, _PARTS)} - {s for s, _ in knots})
-    looked = sorted([*knots, *((s, segment.guessed(s)) for s in inside)], key=lambda knot: knot[0])
+    inside = sorted({arc.step * part / _PARTS for part in range(1, _PARTS)} - {s for s, _ in knots})
+    looked = sorted([*knots, *((s, arc.guessed(s)) for s in inside)], key=lambda knot: knot[0])
     moves = _moving(looked)
     if not any(moves):
         return []
     passed = _passed(looked, moves)
-    if segment.trial.system.size <= _SMALL:  # otherwise each place takes long
-        closely = _passed(*_looked_at_closely(segment, looked, moves))
+    if arc.trial.system.size <= _SMALL:  # otherwise each place takes long
+        closely = _passed(*_looked_at_closely(arc, looked, moves))
         if len(closely) > len(passed):
             passed, inside = closely, sorted({*inside, *(s for pair in closely for s in pair)} - {s for s, _ in knots})
     if passed:
-        knots = sorted([*knots, *((s, segment.near(s)) for s in inside)], key=lambda knot: knot[0])
+        knots = sorted([*knots, *((s, arc.near(s)) for s in inside)], key=lambda knot: knot[0])
     found: list[SpecialPoint] = []
     for left, right in itertools.pairwise(knots):
-        found += _between(segment, left, right, 0)
-    return _joined(sorted(found, key=lambda point: point.at), segment)
+        found += _between(arc, left, right, 0)
+    return _joined(sorted(found, key=lambda point: point.at), arc)
 
 
 def _moving(places: list[Place]) -> list[bool]:
@@ -133,7 +133,7 @@ def _moving(places: list[Place]) -> list[bool]:
     return [not far < distance for far, distance in zip(fastest * lengths, distances)]
 
 
-def _looked_at_closely(segment: Segment, places: list[Place], moves: list[bool]) -> tuple[list[Place], list[bool]]:
+def _looked_at_closely(arc: Arc, places: list[Place], moves: list[bool]) -> tuple[list[Place], list[bool]]:
     """Return the places and, where eigenvalues move far between two of them, further ones between these, on the cubic.
 
     A pair may pass the axis and come back: where two pairs nearly meet their real parts have narrow peaks. ``moves`` tells
@@ -143,7 +143,7 @@ def _looked_at_closely(segment: Segment, places: list[Place], moves: list[bool])
         between = [(left[0] + right[0]) / 2 for (left, right), far in zip(itertools.pairwise(places), moves) if far]
         if not between:
             break
-        places = sorted([*places, *((s, segment.guessed(s)) for s in between)], key=lambda place: place[0])
+        places = sorted([*places, *((s, arc.guessed(s)) for s in between)], key=lambda place: place[0])
         moves = _moving(places)
     return places, moves
 
@@ -202,25 +202,25 @@ def _nearest_pairs(gaps: Array) -> tuple[Indices, Indices]:
     return rows, columns
 
 
-def _between(segment: Segment, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
+def _between(arc: Arc, left: Place, right: Place, depth: int) -> list[SpecialPoint]:
     """Return the Hopf points between two places."""
     if not _passes_as_pair(left[1], right[1]):
         return []
     first, last = _changes(left[1], right[1])
     one, other = _half_plane(first), _half_plane(last)
     if np.all(one == other):
-        located = [_located(segment, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
+        located = [_located(arc, left, right, pair) for pair in zip(first[one > 0], last[one > 0])]
         found = [point for point in located if point is not None]
-        if all(_pairs_at(point) >= _count_at(point, found, segment) for point in found):
+        if all(_pairs_at(point) >= _count_at(point, found, arc) for point in found):
             return found
     if depth == _CUTS:
         return []
     middle = (left[0] + right[0]) / 2
-    there = middle, segment.near(middle)
-    return _between(segment, left, there, depth + 1) + _between(segment, there, right, depth + 1)
+    there = middle, arc.near(middle)
+    return _between(arc, left, there, depth + 1) + _between(arc, there, right, depth + 1)
 
 
-def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint | None:
+def _located(arc: Arc, left: Place, right: Place, pair: tuple[complex, complex]) -> SpecialPoint | None:
     """Return the place where the real part of an eigenvalue vanishes that has these values at two places.
 
     The second place, not located, where that fails; None where the pair turns out to be real.
@@ -228,15 +228,15 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
     (a, b), (first, last) = (left[0], right[0]), pair
 
     def real_part(s: float) -> float:
-        found = _nearest(first + (last - first) * (s - a) / (b - a)).function(segment.at(s))
+        found = _nearest(first + (last - first) * (s - a) / (b - a)).function(arc.at(s))
         if not math.isfinite(found):
             raise ConvergenceError("no eigenvalue is known there")
         return found
 
     is_located = True
     try:
-        at = find_zero(real_part, (a, first.real), (b, last.real), segment.precision)
-        there = segment.at(at)
+        at = find_zero(real_part, (a, first.real), (b, last.real), arc.precision)
+        there = arc.at(at)
     except ConvergenceError:
         (at, there), is_located = right, False
     values = _upper(there)
@@ -250,20 +250,20 @@ def _located(segment: Segment, left: Place, right: Place, pair: tuple[complex, c
         return None
     label, name = crossing
     test = _nearest(1j * frequency)
-    if is_located and 0.0 in (first.real, last.real) and not passes(segment, at, frequency):
+    if is_located and 0.0 in (first.real, last.real) and not passes(arc, at, frequency):
         return None  # the pair lies on the axis before
     details = {"frequency": frequency, "pairs": 1}
     return SpecialPoint(at, label, name, there, None, details, test, is_located=is_located)
 
 
-def passes(segment: Segment, at: float, frequency: float) -> bool:
+def passes(arc: Arc, at: float, frequency: float) -> bool:
     """Return whether the pair of this frequency lies on different sides of the axis before and behind a place.
 
     One that is on the axis up to round-off at either place does not.
     """
     sides = []
-    for s in (at - _BESIDE * segment.step, at + _BESIDE * segment.step):
-        trial = segment.near(s)
+    for s in (at - _BESIDE * arc.step, at + _BESIDE * arc.step):
+        trial = arc.near(s)
         system: Any = trial.system
         values = system.eigenvalues(trial.x)
         sides.append(values[np.argmin(np.abs(values - 1j * frequency))].real)
@@ -276,16 +276,16 @@ def _pairs_at(point: SpecialPoint) -> int:
     return int(np.count_nonzero(_is_complex(values) & (np.abs(values.real) < _ON_AXIS * (1 + np.abs(values)))))
 
 
-def _count_at(point: SpecialPoint, found: list[SpecialPoint], segment: Segment) -> int:
+def _count_at(point: SpecialPoint, found: list[SpecialPoint], arc: Arc) -> int:
     """Return how many of the points found lie at the place of one of them."""
-    return sum(abs(point.at - other.at) <= _TOGETHER * segment.step for other in found)
+    return sum(abs(point.at - other.at) <= _TOGETHER * arc.step for other in found)
 
 
-def _joined(found: list[SpecialPoint], segment: Segment) -> list[SpecialPoint]:
+def _joined(found: list[SpecialPoint], arc: Arc) -> list[SpecialPoint]:
     """Return the points, those at one place joined."""
     result: list[SpecialPoint] = []
     for point in found:
-        if result and point.at - result[-1].at <= _TOGETHER * segment.step and point.trial is not result[-1].trial:
+        if result and point.at - result[-1].at <= _TOGETHER * arc.step and point.trial is not result[-1].trial:
             if _pairs_at(point) > result[-1].details["pairs"]:
                 result[-1].details["pairs"] += 1
         else:

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from contin.core.trial import Event
+from contin.events.arc import Arc, SpecialPoint
 from contin.events.labelled import finding_of
-from contin.events.segment import Segment, SpecialPoint
 
 
-def contradiction(index: Event | None, segment: Segment, special: Iterable[SpecialPoint]) -> str:
+def contradiction(index: Event | None, arc: Arc, special: Iterable[SpecialPoint]) -> str:
     """Return how the index over a step contradicts its special points, as a clause; "" where it does not.
 
     It changes at special points only, by no more than the dimension of what vanishes there. A larger change means that
@@ -18,7 +18,7 @@ def contradiction(index: Event | None, segment: Segment, special: Iterable[Speci
     """
     if index is None:
         return ""
-    before, after = segment.before.value(index), segment.trial.value(index)
+    before, after = arc.before.value(index), arc.trial.value(index)
     if not abs(after - before) > sum(map(nullity_of, special)):
         return ""
     return f"the {index.name} goes from {before:g} to {after:g}"

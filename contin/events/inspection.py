@@ -20,10 +20,10 @@ from contin.core.protocol import Discretization, inner
 from contin.core.settings import Settings
 from contin.core.state import Reason, Stop
 from contin.core.trial import Event, Linearization, Trial
+from contin.events.arc import Arc, Place, SpecialPoint, stop_of
 from contin.events.branch_points import BranchPointSearch
 from contin.events.folds import FoldSearch
 from contin.events.labelled import finding_of
-from contin.events.segment import Place, Segment, SpecialPoint, stop_of
 from contin.events.trivial import crossed, round_off
 
 #: A special point of the first step, this close to where it began (as a part of the step), is the first point itself: it was
@@ -78,7 +78,7 @@ class Inspection:
 
     Parameters
     ----------
-    segment : Segment
+    arc : Arc
     settings : Settings
     start : tuple (system, x, tangent)
         The first point of the run, to recognise a closed branch.
@@ -86,9 +86,9 @@ class Inspection:
         The tangent's component of the primary parameter; None where folds are not looked for.
     """
 
-    def __init__(self, segment: Segment, settings: Settings, start: Start, fold: Event | None) -> None:
-        self.segment, self.settings, self.start, self.fold = segment, settings, start, fold
-        self.branch_points = BranchPointSearch(segment)
+    def __init__(self, arc: Arc, settings: Settings, start: Start, fold: Event | None) -> None:
+        self.arc, self.settings, self.start, self.fold = arc, settings, start, fold
+        self.branch_points = BranchPointSearch(arc)
         self._found: list[SpecialPoint] | None = None
 
     # --- does the step stay on its branch? -----------------------------------------------------------------------
@@ -171,8 +171,8 @@ class Inspection:
 
     def _at_the_start(self, point: SpecialPoint) -> bool:
         """Return whether a special point is the first point of the run once more."""
-        state = self.segment.state
-        near = max(_AT_START * self.segment.step, _BLURRED if state.singular else 0.0)
+        state = self.arc.state
+        near = max(_AT_START * self.arc.step, _BLURRED if state.singular else 0.0)
         return state.accepted == 0 and point.stop is None and point.at < near
 
     # --- folds ---------------------------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ class Inspection:
         """Folds with respect to the primary parameter, in order."""
         if self.fold is None:
             return []
-        return FoldSearch(self.segment, self.fold, self._pitchfork).find()
+        return FoldSearch(self.arc, self.fold, self._pitchfork).find()
 
     @property
     def turns(self) -> bool:
@@ -201,7 +201,7 @@ class Inspection:
         tangents = finding_of(found.details).leaving
         if not tangents:
             return None
-        component = tangents[0][self.segment.trial.system.parameter_index(fold.name)]
+        component = tangents[0][self.arc.trial.system.parameter_index(fold.name)]
         stationary = abs(component) < _STATIONARY
         return dataclasses.replace(found, label=fold.label, name=fold.name, test=fold) if stationary else None
 
@@ -209,13 +209,13 @@ class Inspection:
 
     def _zeros(self, test: Event, crossings: list[SpecialPoint]) -> list[SpecialPoint]:
         """Return the zeros of a test function, looked for between the folds. At a fold or branch point they lie right there."""
-        if test.asks is not None and not test.asks(self.segment):
+        if test.asks is not None and not test.asks(self.arc):
             return []
         if test.search is not None:
-            points: list[SpecialPoint] | None = test.search(self.segment, self._knots)
+            points: list[SpecialPoint] | None = test.search(self.arc, self._knots)
             if points is not None:
                 return points
-        state = self.segment.state
+        state = self.arc.state
         same = [point for point in (*self._folds, *crossings) if self._coincides(test, point)]
         found = [self._at_special(test, point) for point in same if test.confirm is None or test.confirm(point.trial)]
         for left, right in self._pieces(test, same):
@@ -224,10 +224,10 @@ class Inspection:
                 before = 0.0  # the first point lies on the zero
             if not test.passed(before, after):
                 continue
-            point = self.segment.locate(test, left, right)
+            point = self.arc.locate(test, left, right)
             if not point.is_located and (special := self._nearly(test, crossings)) is not None:
                 point = self._at_special(test, special)
-            again = any(abs(point.at - other.at) < _CLOSE * self.segment.step for other in same)
+            again = any(abs(point.at - other.at) < _CLOSE * self.arc.step for other in same)
             if not again and (test.confirm is None or test.confirm(point.trial)):
                 found.append(point)
             if test.terminal:
@@ -238,12 +238,12 @@ class Inspection:
         """Return whether a test function vanishes at a special point of the step."""
         if self._at_the_start(point) or not point.is_located:
             return False
-        largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
+        largest = max(abs(self.arc.before.value(test)), abs(self.arc.trial.value(test)))
         return bool(abs(point.trial.value(test)) <= _COINCIDENT * largest)
 
     def _nearly(self, test: Event, crossings: list[SpecialPoint]) -> SpecialPoint | None:
         """Return the branch point at which a test function vanishes up to the discretization: nothing is located beside it."""
-        largest = max(abs(self.segment.before.value(test)), abs(self.segment.trial.value(test)))
+        largest = max(abs(self.arc.before.value(test)), abs(self.arc.trial.value(test)))
         return next((point for point in crossings if abs(point.trial.value(test)) <= _NEARLY * largest), None)
 
     def _at_special(self, test: Event, point: SpecialPoint) -> SpecialPoint:
@@ -253,44 +253,44 @@ class Inspection:
 
     def _pieces(self, test: Event, same: list[SpecialPoint]) -> list[tuple[Place, Place]]:
         """Return the pieces of the step between the folds, without what is right beside some special points."""
-        segment, aside = self.segment, _BESIDE * self.segment.step
+        arc, aside = self.arc, _BESIDE * self.arc.step
         between = self._looked_at(test, self._knots) if test.looks else self._knots
         if not same:
             return list(itertools.pairwise(between))
         knots, cut = [], [point.at for point in same]
         for place in between:
-            if not any(abs(place[0] - at) <= aside for at in cut) or place[0] in (0.0, segment.step):
+            if not any(abs(place[0] - at) <= aside for at in cut) or place[0] in (0.0, arc.step):
                 knots.append(place)
-        beside = [s for at in cut for s in (at - aside, at + aside) if 0 < s < segment.step]
-        knots = sorted([*knots, *((s, segment.near(s)) for s in beside)], key=lambda place: place[0])
+        beside = [s for at in cut for s in (at - aside, at + aside) if 0 < s < arc.step]
+        knots = sorted([*knots, *((s, arc.near(s)) for s in beside)], key=lambda place: place[0])
         pairs = itertools.pairwise(knots)
         return [(left, right) for left, right in pairs if not any(left[0] < at < right[0] for at in cut)]
 
     def _looked_at(self, test: Event, knots: list[Place]) -> list[Place]:
         """Return the knots and, where a test function changes its sign inside the step more than once, places between them."""
-        inside = [self.segment.step * part / (test.looks + 1) for part in range(1, test.looks + 1)]
+        inside = [self.arc.step * part / (test.looks + 1) for part in range(1, test.looks + 1)]
         known = [
             *((s, trial.value(test)) for s, trial in knots),
-            *((s, test.function(self.segment.guessed(s))) for s in inside),
+            *((s, test.function(self.arc.guessed(s))) for s in inside),
         ]
         signs = np.sign([value for _, value in sorted(known)])
         if np.count_nonzero(np.diff(signs)) <= 1:
             return knots
-        return sorted([*knots, *((s, self.segment.near(s)) for s in inside)], key=lambda place: place[0])
+        return sorted([*knots, *((s, self.arc.near(s)) for s in inside)], key=lambda place: place[0])
 
     @functools.cached_property
     def _knots(self) -> list[Place]:
         """Return places, each behind the one before, between which a test function has one zero at most, if all is seen."""
-        segment = self.segment
-        folds = [(fold.at, fold.trial) for fold in self._folds if 0 < fold.at < segment.step]
-        return [(0.0, segment.beginning()), *folds, (segment.step, segment.trial)]
+        arc = self.arc
+        folds = [(fold.at, fold.trial) for fold in self._folds if 0 < fold.at < arc.step]
+        return [(0.0, arc.beginning()), *folds, (arc.step, arc.trial)]
 
     # --- ends ----------------------------------------------------------------------------------------------------
 
     @functools.cached_property
     def _own_home(self) -> SpecialPoint | None:
         """The end of the branch that the kind of problem knows."""
-        return self.segment.trial.system.home(self.segment)
+        return self.arc.trial.system.home(self.arc)
 
     @functools.cached_property
     def _home(self) -> SpecialPoint | None:
@@ -304,9 +304,9 @@ class Inspection:
         It is the branch point inside the step if the quantity is zero there, else the quantity's zero. Either must lie on the
         cubic through both ends of the step: elsewhere it belongs to another branch.
         """
-        segment, name = self.segment, self.settings.trivial
-        before, trial = segment.before, segment.trial
-        if name is None or not crossed(before, trial, name, segment.newton):
+        arc, name = self.arc, self.settings.trivial
+        before, trial = arc.before, arc.trial
+        if name is None or not crossed(before, trial, name, arc.newton):
             return None
         stop = Stop(Reason.TRIVIAL_BRANCH, f"returned to the trivial branch ({name} = 0)")
         if not self.settings.branch_points or self.branch_points.sign_changes:
@@ -314,33 +314,33 @@ class Inspection:
             if self._is_home(point):
                 return dataclasses.replace(point, label="EP", name="trivial branch", stop=stop)
         test = Event("EP", "trivial branch", lambda there: there[name], terminal=True)
-        point = segment.locate(test, (segment.low, before), (segment.step, trial))
+        point = arc.locate(test, (arc.low, before), (arc.step, trial))
         if self._is_home(point):
             return dataclasses.replace(point, stop=stop)
         stop = Stop(Reason.NO_CONVERGENCE, f"{name} changed its sign, but no zero of it was found on the branch", _ADVICE)
-        return SpecialPoint(segment.step, "MX", "trivial branch", trial, stop, is_located=False)
+        return SpecialPoint(arc.step, "MX", "trivial branch", trial, stop, is_located=False)
 
     def _is_home(self, point: SpecialPoint) -> bool:
         """Return whether the trivial quantity vanishes at a point on the branch."""
-        segment, name = self.segment, self.settings.trivial
+        arc, name = self.arc, self.settings.trivial
         assert name is not None
-        largest = max(abs(segment.before[name]), abs(segment.trial[name]))
-        zero = max(_TRIVIAL * largest, round_off(point.trial, name, segment.newton))
+        largest = max(abs(arc.before[name]), abs(arc.trial[name]))
+        zero = max(_TRIVIAL * largest, round_off(point.trial, name, arc.newton))
         if not point.is_located or abs(point.trial[name]) > zero:
             return False
-        return segment.passes_by(point.trial.x, point.at)
+        return arc.passes_by(point.trial.x, point.at)
 
     def may_close(self) -> bool:
         """Return whether the first point of the run may lie in this step."""
-        segment = self.segment
-        if segment.state.accepted < FEWEST:
+        arc = self.arc
+        if arc.state.accepted < FEWEST:
             return False
-        return not is_elsewhere(self.start, segment.beginning(), segment.trial, segment.step)
+        return not is_elsewhere(self.start, arc.beginning(), arc.trial, arc.step)
 
     def _closed(self) -> SpecialPoint | None:
         """Return the end of a branch that comes back to its first point."""
-        segment = self.segment
-        state, trial, step = segment.state, segment.trial, segment.step
+        arc = self.arc
+        state, trial, step = arc.state, arc.trial, arc.step
         home, x, tangent = self.start
         if not self.may_close():
             return None
@@ -358,7 +358,7 @@ class Inspection:
         if not passed[0] < 0 <= passed[1] or inner(state.system, trial.tangent, leaving) < _SAME_WAY:
             return None
         at = step * passed[0] / (passed[0] - passed[1])
-        off = segment.guess(at) - first
+        off = arc.guess(at) - first
         if np.sqrt(inner(state.system, off, off)) > _BACK * step:
             return None
         there = Trial(state.system, x, Linearization(tangent, trial.sign), trial.iterations, trial.newton_error)
@@ -374,7 +374,7 @@ class Inspection:
             return False
         if not fold.is_located:  # the equations are singular at the crossing: nothing else was found
             return True
-        near = _SAME + _SAME_SHARE * self.segment.step
+        near = _SAME + _SAME_SHARE * self.arc.step
         close = [other for other in others if np.max(np.abs(fold.trial.x - other.trial.x)) < near]
         return any(not self._is_beside(fold, other) for other in close)
 
@@ -386,7 +386,7 @@ class Inspection:
         known = finding_of(crossing.details)
         if not known.is_simple_branch_point or not known.leaving:
             return False
-        at = self.segment.trial.system.parameter_index(fold.name)
+        at = self.arc.trial.system.parameter_index(fold.name)
         rate, p = known.leaving[0][at], crossing.trial.x[at]
         change, expected = fold.trial.x[at] - p, rate * (fold.at - crossing.at) / 2
         if abs(rate) < _STATIONARY or abs(change) < _STANDS * (1 + abs(p)):

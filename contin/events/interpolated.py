@@ -26,9 +26,9 @@ from contin.core.state import State, standing_at
 from contin.core.step import located
 from contin.core.trial import Linearization, Trial
 from contin.errors import ConvergenceError
+from contin.events.arc import Arc
 from contin.events.labelled import Finding
 from contin.events.root import find_zero
-from contin.events.segment import Segment
 
 #: Numbers of nodes, even: none is right at the zero. The second number is for the error estimate.
 _NODES = 12, 10
@@ -123,13 +123,13 @@ class InterpolatedZero(Finding):
         return _interpolated(window, points, self.functions)
 
 
-def interpolated_zero(segment: Segment, functions: Functions, near: float) -> InterpolatedZero | None:
+def interpolated_zero(arc: Arc, functions: Functions, near: float) -> InterpolatedZero | None:
     """Return the common zero of test functions inside a step; None where there is none, or no points around it are found."""
     best, least = None, np.inf
     for share in _WIDTHS:
         try:
-            windows = [Window(segment.state, near, share * segment.step, count) for count in _NODES]
-            found, other = (_around(segment, window, functions) for window in windows)
+            windows = [Window(arc.state, near, share * arc.step, count) for count in _NODES]
+            found, other = (_around(arc, window, functions) for window in windows)
         except ConvergenceError:
             continue
         change = float(np.abs(found.trial.x - other.trial.x).max())
@@ -139,12 +139,12 @@ def interpolated_zero(segment: Segment, functions: Functions, near: float) -> In
     return best
 
 
-def _around(segment: Segment, window: Window, functions: Functions) -> InterpolatedZero:
+def _around(arc: Arc, window: Window, functions: Functions) -> InterpolatedZero:
     """Return the zero from points that are found one after the other, each from an extrapolation of those before.
 
     The end of the step may be so near to the zero that neither its tangent nor its factors are of use.
     """
-    state, points = segment.state, list[Trial]()
+    state, points = arc.state, list[Trial]()
     places = window.places
     for number, place in enumerate(places):
         known = slice(max(0, number - _BEHIND), number)  # those right behind
@@ -152,7 +152,7 @@ def _around(segment: Segment, window: Window, functions: Functions) -> Interpola
             guess = state.x + place * state.tangent
         else:
             guess = _through(places[known], points[known], place)
-        points.append(located(state, guess, float(place), segment.newton))
+        points.append(located(state, guess, float(place), arc.newton))
     return _interpolated(window, points, functions)
 
 

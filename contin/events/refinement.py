@@ -17,9 +17,9 @@ from contin.core.state import standing_at
 from contin.core.step import located
 from contin.core.trial import Event, Trial
 from contin.errors import ConvergenceError
+from contin.events.arc import SpecialPoint
 from contin.events.branch_point import BranchPoint, locate_branch_point
 from contin.events.labelled import Elsewhere, Finding, finding_of
-from contin.events.segment import SpecialPoint
 from contin.linalg.factors import Factors
 
 #: A special point on a finer mesh whose parameters moved by more than this, relative to 1 + their size, is another one.

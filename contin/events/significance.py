@@ -19,7 +19,7 @@ from contin.core.protocol import Discretization
 from contin.core.step import CLEAR, trial_of
 from contin.core.trial import Event, Trial, linearization
 from contin.errors import ConvergenceError
-from contin.events.segment import Segment, SpecialPoint
+from contin.events.arc import Arc, SpecialPoint
 from contin.linalg.orientation import oriented
 
 #: A change of a parameter below this, relative to 1 + its size, may be round-off of the corrector.
@@ -109,38 +109,38 @@ def on_finer_mesh(trial: Trial, newton: Newton) -> Trial | None:
         return None
 
 
-def senses(segment: Segment, fold: Event) -> tuple[float, float]:
+def senses(arc: Arc, fold: Event) -> tuple[float, float]:
     """Return the sense at both ends of a step.
 
     Beside a branch point or Hopf point tangents are blurred: there the parameter itself must have gone the same way.
     """
-    state, before = segment.state, segment.before
-    first, last = sense(before, fold, segment.newton), sense(segment.trial, fold, segment.newton)
+    state, before = arc.state, arc.before
+    first, last = sense(before, fold, arc.newton), sense(arc.trial, fold, arc.newton)
     at = before.system.parameter_index(fold.name)
     gone = before.x[at] - state.x[at] if state.singular else 0.0
     return (0.0 if gone * first < -STANDS * (1 + abs(before.x[at])) else first), last
 
 
-def passed_before(segment: Segment, fold: Event) -> list[SpecialPoint]:
+def passed_before(arc: Arc, fold: Event) -> list[SpecialPoint]:
     """Return the fold that a step has behind it, where the parameter goes by more than round-off against its last sense.
 
     A fold on which the parameter changes by less than round-off over a whole step is not seen in that step: it lies on a
     plateau, on which a rate may seem significant by chance. The errors of such a fold are the length of the plateau, in all
     free parameters.
     """
-    state, behind = segment.state, sense(segment.trial, fold, segment.newton)
+    state, behind = arc.state, sense(arc.trial, fold, arc.newton)
     at = state.system.parameter_index(fold.name)
-    gone = segment.trial.x[at] - state.x[at]
+    gone = arc.trial.x[at] - state.x[at]
     moved = gone * behind > STANDS * (1 + abs(state.x[at]))
-    return [_behind_plateau(segment, fold)] if moved and state.sense * behind < 0 and state.sensed is not None else []
+    return [_behind_plateau(arc, fold)] if moved and state.sense * behind < 0 and state.sensed is not None else []
 
 
-def _behind_plateau(segment: Segment, fold: Event) -> SpecialPoint:
+def _behind_plateau(arc: Arc, fold: Event) -> SpecialPoint:
     """Return the beginning of a step as a fold; its errors are the way since the parameter's sense was told last."""
-    assert segment.state.sensed is not None
-    lengths = np.abs(free_values(segment.trial) - segment.state.sensed)
-    errors = dict(zip(segment.state.system.free, map(float, lengths)))
-    return SpecialPoint(0.0, fold.label, fold.name, segment.before, test=fold, errors=errors)
+    assert arc.state.sensed is not None
+    lengths = np.abs(free_values(arc.trial) - arc.state.sensed)
+    errors = dict(zip(arc.state.system.free, map(float, lengths)))
+    return SpecialPoint(0.0, fold.label, fold.name, arc.before, test=fold, errors=errors)
 
 
 def free_values(trial: Trial) -> Array:

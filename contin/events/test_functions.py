@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 from contin.core.trial import Event, Trial
+from contin.events.arc import Arc, Place, SpecialPoint
 from contin.events.coefficient import Coefficient
-from contin.events.segment import Place, Segment, SpecialPoint
 from contin.names import value_names
 
 #: A point lies outside a limit where it is further off than this part of the way from the point before: it was located there to
@@ -45,19 +45,19 @@ def _limit(name: str, value: float, text: str, side: int) -> Event:
     return Event("EP", f"{name} = {text}", function, terminal=True, limit=True, column=name, value=value)
 
 
-def within_limits(segment: Segment, points: list[SpecialPoint], ends: Sequence[Event]) -> list[SpecialPoint]:
+def within_limits(arc: Arc, points: list[SpecialPoint], ends: Sequence[Event]) -> list[SpecialPoint]:
     """Return the special points of a step up to where it first leaves the limits, which may have been seen at a point only.
 
     A quantity that passes its limit and comes back in one step has the same sign at both ends of the step.
     """
-    last: Place = (segment.low, segment.before)
+    last: Place = (arc.low, arc.before)
     for number, point in enumerate(points):
         if point.stop is not None:
             break
         for test in ends:
             value, before = test.function(point.trial), last[1].value(test)
             if before < 0 and value > _OUTSIDE * (abs(before) + value):
-                return [*points[:number], segment.locate(test, last, (point.at, point.trial))]
+                return [*points[:number], arc.locate(test, last, (point.at, point.trial))]
         last = (point.at, point.trial)
     return points
 

@@ -43,7 +43,7 @@ def watch_list(
     entries += [_value(system.free.index(test.column), test) for test in held]
     entries += [_sign(test) for test in tests if test not in held]
     if fold is not None:
-        entries.append(lambda inspection: may_turn(inspection.segment, fold))
+        entries.append(lambda inspection: may_turn(inspection.arc, fold))
     if settings.trivial is not None:
         entries.append(_trivial(settings.trivial))
     if index is not None:
@@ -57,7 +57,7 @@ def _determinant(counts: bool) -> Entry:
     """That of the determinant's sign and, where branch points are looked for, of singular values that come near zero."""
 
     def asks(inspection: Inspection) -> bool:
-        before, trial = inspection.segment.before, inspection.segment.trial
+        before, trial = inspection.arc.before, inspection.arc.trial
         return before.sign != trial.sign or (counts and inspection.branch_points.count != (0, True))
 
     return asks
@@ -69,7 +69,7 @@ def _value(place: int, test: Event) -> Entry:
     assert value is not None
 
     def asks(inspection: Inspection) -> bool:
-        before, trial = inspection.segment.before, inspection.segment.trial
+        before, trial = inspection.arc.before, inspection.arc.trial
         system = trial.system
         at, size = system.state_size + place, system.free_scales[place]
         first, last = before.x[at] * size - value, trial.x[at] * size - value
@@ -83,26 +83,26 @@ def _sign(test: Event) -> Entry:
     """That of a test function: what it says of a step itself or, where it has nothing to say, the signs at both ends."""
 
     def asks(inspection: Inspection) -> bool:
-        segment = inspection.segment
+        arc = inspection.arc
         if test.asks is not None:
-            return test.asks(segment)
+            return test.asks(arc)
         if test.search is not None or test.looks:
             return True
-        return test.passed(segment.before.value(test), segment.trial.value(test))
+        return test.passed(arc.before.value(test), arc.trial.value(test))
 
     return asks
 
 
 def _trivial(name: str) -> Entry:
     def asks(inspection: Inspection) -> bool:
-        segment = inspection.segment
-        return crossed(segment.before, segment.trial, name, segment.newton)
+        arc = inspection.arc
+        return crossed(arc.before, arc.trial, name, arc.newton)
 
     return asks
 
 
 def _changed(index: Event) -> Entry:
     def asks(inspection: Inspection) -> bool:
-        return abs(inspection.segment.before.value(index) - inspection.segment.trial.value(index)) > 0
+        return abs(inspection.arc.before.value(index) - inspection.arc.trial.value(index)) > 0
 
     return asks

@@ -17,6 +17,7 @@ from contin.core.system import System
 from contin.core.trial import Trial
 from contin.cycles.floquet import Floquet, floquet
 from contin.errors import ProblemError
+from contin.events.labelled import finding_of
 from contin.events.phase_loads import phase_loads
 from contin.problems.own_names import PERIOD
 from contin.results import portrait
@@ -170,6 +171,11 @@ class Point:
         positive where they are supercritical. Its estimated error is ``details["normal_form_error"]``.
         """
         return self.details.get("normal_form") if isinstance(self.details, Mapping) else None
+
+    @property
+    def is_simple_branch_point(self) -> bool:
+        """Two branches cross there, and their tangents are known."""
+        return finding_of(self.details).is_simple_branch_point
 
     @property
     def curves(self) -> tuple[str, ...]:

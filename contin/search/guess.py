@@ -18,7 +18,7 @@ from contin.errors import ProblemError
 from contin.names import exact_text
 from contin.problems.angles import WINDING, periods_of, whole_rounds, windings
 from contin.results.point import Point
-from contin.search.multipliers import with_guessed_multipliers
+from contin.search.lagrange import with_guessed_multipliers
 
 #: A mesh point of a guess that lies closer to the end of the part that is computed is left out. Ten times
 #: larger, the first mesh has a longer interval there; it is adapted in any case.

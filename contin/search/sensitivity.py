@@ -14,7 +14,7 @@ from contin.core.trial import Linearization, Trial
 from contin.errors import ProblemError
 from contin.events.bordered import BorderedMatrix
 from contin.events.hopf import critical_real_part
-from contin.events.labelled import finding_of, frequency_of
+from contin.events.labelled import frequency_of
 from contin.results.point import Point, system_of
 
 
@@ -68,7 +68,7 @@ def sensitivities(
     wide, x = system.with_free((*system.free, *by), point.x)
     if point.label == "LP":
         return _of_fold(point, wide, x, by)
-    if finding_of(point.details).is_simple_branch_point:
+    if point.is_simple_branch_point:
         return {name: _of_branch_point(point, name) for name in by}
     fixed = _fixed(point, held)
     return {name: _held(point, name, fixed) for name in by}

@@ -21,7 +21,6 @@ from contin.defining.extended import Extended
 from contin.defining.extremum_curve import ExtremumCurve
 from contin.defining.fold_curve import FoldCurve
 from contin.errors import ProblemError
-from contin.events.labelled import finding_of
 from contin.results.branch import Branch
 from contin.results.point import Point
 from contin.search.codimension_two import leaving
@@ -161,7 +160,7 @@ def _first_of_curve(start: Point, names: Sequence[str], event: Event | None, hol
 
 
 def _branch_points(start: Point, base: System, x: Array) -> _First | None:
-    return (BranchPointCurve(base), np.append(x, 0.0)) if finding_of(start.details).is_simple_branch_point else None
+    return (BranchPointCurve(base), np.append(x, 0.0)) if start.is_simple_branch_point else None
 
 
 def _folds(start: Point, base: System, x: Array) -> _First | None:

@@ -198,8 +198,8 @@ def test_a_point_that_is_not_found_shortens_the_step_and_does_not_lose_the_branc
     parabola = AlgebraicProblem(lambda u, p: (p.a - u.x**2,), ["x"], {"a": 1.0})
 
     def only_in_steps_below(longest):
-        def search(segment, places):
-            if segment.step > longest:
+        def search(arc, places):
+            if arc.step > longest:
                 raise ConvergenceError("a point inside the step is not found")
             return []
 

@@ -9,8 +9,8 @@ from contin import AlgebraicProblem, Newton, solve, trace
 from contin.core.state import standing_at
 from contin.core.step import corrected, predict
 from contin.core.trial import linearization
+from contin.events.arc import Arc
 from contin.events.folds import FoldSearch
-from contin.events.segment import Segment
 from contin.events.test_functions import fold
 from contin.lowlevel import Algebraic
 
@@ -29,8 +29,8 @@ def search(square, start, step):
     state = standing_at(system, x, tangent, step)
     before = corrected(state, x, 0.0, Newton())
     trial = corrected(state, predict(state, step), step, Newton())
-    segment = Segment(state, (0.0, before), trial, step, Newton())
-    return FoldSearch(segment, fold("mu"), lambda: None), (0.0, before), (step, trial)
+    arc = Arc(state, (0.0, before), trial, step, Newton())
+    return FoldSearch(arc, fold("mu"), lambda: None), (0.0, before), (step, trial)
 
 
 @pytest.mark.parametrize("half", [0.3, 0.1, 1e-2, 1e-3])
@@ -65,7 +65,7 @@ def test_a_parameter_that_does_not_move_has_no_folds():
     system = Algebraic(problem, ["mu"])
     state = standing_at(system, np.zeros(2), np.array([1.0, 0.0]), 0.5)
     before, trial = (corrected(state, predict(state, s), s, Newton()) for s in (0.0, 0.5))
-    search = FoldSearch(Segment(state, (0.0, before), trial, 0.5, Newton()), fold("mu"), lambda: None)
+    search = FoldSearch(Arc(state, (0.0, before), trial, 0.5, Newton()), fold("mu"), lambda: None)
     assert search.between((0.0, before), (0.5, trial)) == []
 
 

@@ -100,7 +100,7 @@ class SpecialPoint:
         return self.stop is not None and self.stop.reason == Reason.PITCHFORK
 
 
-class Segment:
+class Arc:
     """The piece of a curve between the state of a run and the corrected point at the end of a step.
 
     Parameters
