@@ -57,7 +57,7 @@ def layers(pyproject: Path = ROOT / "pyproject.toml") -> list[str]:
     """Return the rooms from top to bottom, as the contract on their order lists them; the foundation last."""
     contracts = tomllib.loads(pyproject.read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
     (rows,) = (contract["layers"] for contract in contracts if contract.get("containers") == ["contin"])
-    return [room.strip() for row in rows[:-1] for room in row.split("|")] + [FOUNDATION]
+    return [room.strip() for row in rows if ":" not in row for room in row.split("|")] + [FOUNDATION]
 
 
 def room_of(module: str, rooms: list[str]) -> str:
